@@ -1,0 +1,44 @@
+"""The ways in which a run can end other than well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that is wrong with a case file.
+
+    place: where in the file, as the user wrote it, e.g. ``materials.soft.young`` or ``line 3, column 7``
+    found: what stands there; expected: what should stand there.
+    """
+
+    place: str
+    found: str
+    expected: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: found {self.found}; expected {self.expected}"
+
+
+class CaseError(Exception):
+    """The case file is wrong; nothing was computed or written. Carries every fault at once."""
+
+    def __init__(self, source: str, faults: tuple[Fault, ...]) -> None:
+        self.source = source
+        self.faults = faults
+        count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
+        super().__init__("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
+
+
+class ConvergenceError(Exception):
+    """A load step did not converge at the smallest step.
+
+    reason: a short name, e.g. "mode cycle", "singular tangent", "iteration limit", "linear solver"
+    detail: where and what to try, in sentences.
+    """
+
+    def __init__(self, reason: str, detail: str) -> None:
+        self.reason = reason
+        self.detail = detail
+        super().__init__(f"{reason}: {detail}")

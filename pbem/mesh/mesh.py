@@ -1,0 +1,135 @@
+"""The discretised model: plain arrays, equal on all ranks, of a size proportional to the number of nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Contact pairs of all interfaces and cracks, m in all; those of one interface are neighbours, by arc length.
+
+    interface (m,): index into Mesh.interface_names; first, second (m,): the two nodes. The pair of a crack has only
+    one node, whose unknown displacement is the jump u_r - u_l: there second = first and crack is True.
+    position, normal (m,): complex; normal is outward of the first side. arc_length (m,): from the curve's first point.
+    weight (m,): integration weight (length) of the pair's node.
+    """
+
+    interface: Integer
+    first: Integer
+    second: Integer
+    crack: Bool
+    position: Complex
+    normal: Complex
+    arc_length: Real
+    weight: Real
+
+    @property
+    def count(self) -> int:
+        return len(self.interface)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Elements and nodes of all regions, region after region; node j of element e is e * (order + 1) + j.
+
+    An element runs from start to end (complex) with its region on the left, so that its outward normal is -i times
+    its direction. A crack's element stands for both faces: it runs in the curve's direction, is the first face, and
+    its displacement is the jump u_r - u_l of the first face against the second.
+
+    start, end, region, curve, crack: per element (e,). position, normal, weight, traction_equation: per node (n,).
+    local: nodes' coordinates on the element [-1, 1] (order + 1,).
+    """
+
+    order: int
+    local: Real
+    start: Complex
+    end: Complex
+    region: Integer
+    curve: Integer
+    crack: Bool
+    position: Complex
+    normal: Complex
+    weight: Real
+    traction_equation: Bool
+    pairs: Pairs
+    region_names: tuple[str, ...]
+    curve_names: tuple[str, ...]
+    interface_names: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def nodes(self) -> int:
+        return len(self.position)
+
+    @property
+    def elements(self) -> int:
+        return len(self.start)
+
+    @property
+    def node_element(self) -> Integer:
+        return np.repeat(np.arange(self.elements), self.order + 1)
+
+    @property
+    def node_region(self) -> Integer:
+        return np.repeat(self.region, self.order + 1)
+
+    @property
+    def node_curve(self) -> Integer:
+        return np.repeat(self.curve, self.order + 1)
+
+    @property
+    def node_crack(self) -> Bool:
+        return np.repeat(self.crack, self.order + 1)
+
+
+@dataclass(frozen=True)
+class Faces:
+    """The nodes as results show them: all nodes of the mesh, then the second faces of the cracks.
+
+    position, normal (complex), region, curve, element, weight: per node (n,); normal is outward of the region.
+    start, end: per element (e,) complex, in the direction of travel with the region on the left.
+    """
+
+    position: Complex
+    normal: Complex
+    region: Integer
+    curve: Integer
+    element: Integer
+    weight: Real
+    start: Complex
+    end: Complex
+
+
+def list_faces(mesh: Mesh) -> Faces:
+    """Append the second face of every crack element, travelled backwards with its nodes in reversed order."""
+    per_element = mesh.order + 1
+    crack = np.flatnonzero(mesh.crack)
+    nodes = second_face_nodes(mesh)
+    return Faces(
+        position=np.concatenate([mesh.position, mesh.position[nodes]]),
+        normal=np.concatenate([mesh.normal, -mesh.normal[nodes]]),
+        region=np.concatenate([mesh.node_region, mesh.node_region[nodes]]),
+        curve=np.concatenate([mesh.node_curve, mesh.node_curve[nodes]]),
+        element=np.concatenate(
+            [mesh.node_element, np.repeat(mesh.elements + np.arange(len(crack)), per_element)]
+        ),
+        weight=np.concatenate([mesh.weight, mesh.weight[nodes]]),
+        start=np.concatenate([mesh.start, mesh.end[crack]]),
+        end=np.concatenate([mesh.end, mesh.start[crack]]),
+    )
+
+
+def second_face_nodes(mesh: Mesh) -> Integer:
+    """The mesh nodes that the appended second-face nodes lie on, in the order in which they are appended."""
+    per_element = mesh.order + 1
+    crack = np.flatnonzero(mesh.crack)
+    return (crack[:, None] * per_element + np.arange(per_element)[::-1]).ravel()

@@ -1,0 +1,105 @@
+"""Curves as chains of straight or circular legs, with the number and grading of the elements on each leg."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A straight or circular piece of a curve from `start` to `end` (complex points) with its elements.
+
+    A circular leg has its `center` and the signed angle `sweep` (radians, counter-clockwise positive) it runs
+    through. Element ends lie at t^power from every refined end (t uniform); with no refined end they are uniform.
+    """
+
+    start: complex
+    end: complex
+    elements: int
+    refine_start: bool = False
+    refine_end: bool = False
+    power: float = 3.0
+    center: complex | None = None
+    sweep: float = 0.0
+
+    @property
+    def length(self) -> float:
+        if self.center is None:
+            return abs(self.end - self.start)
+        return abs(self.start - self.center) * abs(self.sweep)
+
+    def point(self, t: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Points at the fractions t (any shape) of the leg's length, as complex numbers."""
+        if self.center is None:
+            points = self.start + (self.end - self.start) * t
+        else:
+            points = self.center + (self.start - self.center) * np.exp(1j * self.sweep * t)
+        return np.where(t == 0.0, self.start, np.where(t == 1.0, self.end, points))
+
+    def tangent(self, at_end: bool) -> complex:
+        """Unit tangent in the direction of travel at the start or the end."""
+        if self.center is None:
+            return (self.end - self.start) / abs(self.end - self.start)
+        radius = (self.end if at_end else self.start) - self.center
+        turn = 1j if self.sweep > 0 else -1j
+        return turn * radius / abs(radius)
+
+    def reverse(self) -> Leg:
+        return replace(
+            self, start=self.end, end=self.start, sweep=-self.sweep,
+            refine_start=self.refine_end, refine_end=self.refine_start,
+        )
+
+    def split(self, t: float, elements: tuple[int, int]) -> tuple[Leg, Leg]:
+        """Two legs that meet at the fraction t, with the given numbers of elements and no refined ends at t."""
+        middle = complex(self.point(np.array(t)))
+        first = replace(self, end=middle, elements=elements[0], sweep=self.sweep * t, refine_end=False)
+        second = replace(self, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False)
+        return first, second
+
+    def element_ends(self) -> NDArray[np.complex128]:
+        """The elements + 1 ends of the elements along the leg."""
+        t = np.linspace(0.0, 1.0, self.elements + 1)
+        if self.refine_start and self.refine_end:
+            t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)
+        elif self.refine_start:
+            t = t**self.power
+        elif self.refine_end:
+            t = 1 - (1 - t) ** self.power
+        return self.point(t)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A named chain of legs, each starting where the one before ends; `closed` if the last ends where the first starts."""
+
+    name: str
+    legs: tuple[Leg, ...]
+
+    @property
+    def start(self) -> complex:
+        return self.legs[0].start
+
+    @property
+    def end(self) -> complex:
+        return self.legs[-1].end
+
+    @property
+    def closed(self) -> bool:
+        return self.start == self.end
+
+    @property
+    def length(self) -> float:
+        return sum(leg.length for leg in self.legs)
+
+    def reverse(self) -> Curve:
+        return Curve(self.name, tuple(leg.reverse() for leg in reversed(self.legs)))
+
+
+def turning_angle(incoming: complex, outgoing: complex) -> float:
+    """Angle in (-pi, pi] from one unit tangent to the next."""
+    return cmath.phase(outgoing / incoming)

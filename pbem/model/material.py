@@ -1,0 +1,33 @@
+"""Linear elastic, isotropic materials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Material:
+    """young: Young's modulus (stress, > 0); poisson: Poisson's ratio in (-1, 0.5); plane: strain or stress."""
+
+    name: str
+    young: float
+    poisson: float
+    plane: Literal["strain", "stress"] = "strain"
+    density: float = 0.0
+
+    @property
+    def shear_modulus(self) -> float:
+        return self.young / (2.0 * (1.0 + self.poisson))
+
+    @property
+    def kappa(self) -> float:
+        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress."""
+        if self.plane == "strain":
+            return 3.0 - 4.0 * self.poisson
+        return (3.0 - self.poisson) / (1.0 + self.poisson)
+
+    @property
+    def plane_modulus(self) -> float:
+        """E' = 8 G / (kappa + 1): E/(1 - nu^2) in plane strain, E in plane stress."""
+        return 8.0 * self.shear_modulus / (self.kappa + 1.0)

@@ -1,0 +1,138 @@
+"""The model: physics and topology with every name resolved, and no elements but their numbers on each leg."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pbem.model.curve import Curve
+from pbem.model.material import Material
+
+Quantity = Literal["displacement", "traction"]
+
+
+@dataclass(frozen=True)
+class Side:
+    """A curve as part of a loop; `forward` if the loop runs in the direction in which the curve was written."""
+
+    curve: str
+    forward: bool
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed chain of sides, travelled with the region on the left. `outer`: counter-clockwise, encloses the region."""
+
+    sides: tuple[Side, ...]
+    outer: bool
+
+
+@dataclass(frozen=True)
+class Region:
+    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each."""
+
+    name: str
+    material: Material
+    loops: tuple[Loop, ...]
+    cracks: tuple[str, ...] = ()
+    infinite: bool = False
+
+
+@dataclass(frozen=True)
+class Law:
+    """What an interface or crack does. All strengths are stresses >= 0; `friction` is the friction coefficient.
+
+    kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches.
+    gap: initial normal opening (length, >= 0).
+    pressurised: "open": fluid pressure acts in open parts only; "all": in closed parts too.
+    """
+
+    kind: Literal["bonded", "coulomb", "open"]
+    friction: float = 0.0
+    cohesion: float = 0.0
+    tensile_strength: float = 0.0
+    gap: float = 0.0
+    pressurised: Literal["open", "all"] = "open"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A curve shared by two regions, or a crack in one region (`second` is None).
+
+    The first side is the side of the first region that lists the curve; of a crack, the side on the left of the
+    curve's direction.
+    """
+
+    name: str
+    first: str
+    second: str | None
+    law: Law
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is known on an outer curve, in two directions: x, y (global) or normal (outward), tangential (local).
+
+    known: per direction the quantity whose values the stages give; the other one is unknown.
+    """
+
+    curve: str
+    frame: Literal["global", "local"] = "global"
+    known: tuple[Quantity, Quantity] = ("traction", "traction")
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A part of the load history: the values at its end, linear from those at the end of the stage before (0 at first).
+
+    boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
+    file leaves out are carried over); pressure: fluid pressure of every interface.
+    """
+
+    name: str
+    steps: int
+    boundary: Mapping[str, tuple[float, float]]
+    pressure: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Analysis:
+    scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
+    order: int = 2
+    tips: bool = True
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
+    newton_tolerance: float = 1e-9
+    newton_max_iterations: int = 50
+    min_step: float = 1e-4
+    petsc: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Model:
+    """size: largest extent of all curves (length); curves are in the order of the file, as are the regions.
+
+    interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
+    one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
+    notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
+    """
+
+    title: str
+    units_length: str
+    units_stress: str
+    source: str
+    regions: tuple[Region, ...]
+    curves: Mapping[str, Curve]
+    interfaces: Mapping[str, Interface]
+    conditions: Mapping[str, Condition]
+    crack_tips: Mapping[str, tuple[bool, bool]]
+    stages: tuple[Stage, ...]
+    analysis: Analysis
+    solver: SolverOptions
+    output_every: int
+    size: float
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,61 @@
+"""What a converged load step is, and what Newton's method did to reach it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+STICK, SLIP, OPEN = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One Newton iteration: relative residual before it was accepted, pairs that changed mode, counts, seconds."""
+
+    number: int
+    residual: float
+    changed: int
+    stick: int
+    slip: int
+    open: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """State of all m contact pairs, in the order of Mesh.pairs.
+
+    mode (m,) int8: STICK, SLIP, OPEN; opening (initial gap included), slip: lengths; traction_n, traction_s:
+    traction on the first side along n and s (stress).
+    """
+
+    mode: NDArray[np.int8]
+    opening: NDArray[np.float64]
+    slip: NDArray[np.float64]
+    traction_n: NDArray[np.float64]
+    traction_s: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A converged load step.
+
+    number: from 1 on, sub-steps counted; stage: index; factor: fraction of the stage reached, in (0, 1].
+    displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
+    last_of_stage: True at factor 1.
+    """
+
+    number: int
+    stage: int
+    factor: float
+    iterations: tuple[Iteration, ...]
+    residual: float
+    displacement: NDArray[np.complex128]
+    traction: NDArray[np.complex128]
+    contact: ContactState
+
+    @property
+    def last_of_stage(self) -> bool:
+        return self.factor == 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,3 +60,22 @@ class Step:
     @property
     def last_of_stage(self) -> bool:
         return self.factor == 1.0
+
+
+class Reporter(Protocol):
+    """Who is told of the run as it goes on (on rank 0 only); all calls return at once."""
+
+    def note(self, text: str) -> None:
+        """A choice or a fact that the user should know, one sentence."""
+
+    def start_step(self, stage: int, reached: float, target: float) -> None:
+        """A step of a stage is tried, from one fraction of the stage to another."""
+
+    def iterate(self, iteration: Iteration) -> None:
+        """A Newton iteration has ended."""
+
+    def accept(self, step: Step) -> None:
+        """A step has converged."""
+
+    def reject(self, reason: str, detail: str) -> None:
+        """A step has failed and will be halved."""

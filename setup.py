@@ -1,0 +1,46 @@
+"""The compiled part of the build and the cases that are installed with the package; the rest is in pyproject.toml.
+
+PBEM_MARCH names the processor to build for (as gcc's -march, or -mcpu on other machines than x86), e.g. x86-64-v3.
+Unset it is the processor of this machine; empty, the compiler's default.
+"""
+
+import os
+import platform
+
+from setuptools import Extension, find_packages, setup
+
+# The parts of -ffast-math that let logarithm and arc tangent be vectorised. NaN and infinity keep their meaning, and
+# nothing of it reaches the linker, where -ffast-math would change the arithmetic of the whole process.
+# __FAST_MATH__ makes the C library declare its vector functions.
+MATH_FLAGS = [
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-fassociative-math",
+    "-fno-signed-zeros",
+    "-freciprocal-math",
+    "-D__FAST_MATH__",
+]
+
+
+def select_processor_flags() -> list[str]:
+    """Return the compiler option that names the processor to build for, or none."""
+    processor = os.environ.get("PBEM_MARCH", "native")
+    if not processor:
+        return []
+    on_x86 = platform.machine().lower() in ("x86_64", "amd64", "i686")
+    return [f"-march={processor}" if on_x86 else f"-mcpu={processor}"]
+
+
+setup(
+    packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
+    package_dir={"pbem.cases": "cases"},
+    package_data={"pbem": ["py.typed"], "pbem.cases": ["*.toml"]},
+    ext_modules=[
+        Extension(
+            "pbem.bem._kernels",
+            sources=["pbem/bem/_kernels.c"],
+            extra_compile_args=["-O3", *select_processor_flags(), *MATH_FLAGS],
+            libraries=["m"],
+        )
+    ],
+)

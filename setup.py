@@ -34,7 +34,7 @@ def select_processor_flags() -> list[str]:
 setup(
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
     package_dir={"pbem.cases": "cases"},
-    package_data={"pbem": ["py.typed"], "pbem.cases": ["*.toml"]},
+    package_data={"pbem.cases": ["*.toml"]},
     ext_modules=[
         Extension(
             "pbem.bem._kernels",

@@ -45,7 +45,8 @@ class Mesh:
     its direction. A crack's element stands for both faces: it runs in the curve's direction, is the first face, and
     its displacement is the jump u_r - u_l of the first face against the second.
 
-    start, end, region, curve, crack: per element (e,). position, normal, weight, traction_equation: per node (n,).
+    start, end, region, curve, crack, tip: per element (e,); tip is 1 or 2 where the jump has the square-root shape of
+    a crack tip at the element's start or end, else 0. position, normal, weight, traction_equation: per node (n,).
     local: nodes' coordinates on the element [-1, 1] (order + 1,).
     """
 
@@ -56,6 +57,7 @@ class Mesh:
     region: Integer
     curve: Integer
     crack: Bool
+    tip: NDArray[np.int8]
     position: Complex
     normal: Complex
     weight: Real

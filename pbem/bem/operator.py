@@ -1,0 +1,181 @@
+"""The operator B = [H, -G] of the collocated boundary integral equations, by rows of collocation points.
+
+The vector v = (u, t) holds the displacement of every node, x and y, then the traction of every node; on a crack u is
+the jump u_r - u_l and t the traction on the first face. B v = 0 states every node's equation, free term included:
+
+    displacement equation   u/2 - A u - B t = 0
+    traction equation       t/2 - A u - B t = 0     (on a crack t - A u - B t = 0: both faces lie there)
+
+Traction equations are multiplied by length/shear modulus, so that all rows are lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.bem.rows import Sources, evaluate_rows
+from pbem.mesh.mesh import Mesh
+from pbem.model.material import Material
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+# Scratch memory of one call of the kernels, in bytes.
+CHUNK_BYTES = 32_000_000
+
+
+@dataclass(frozen=True)
+class Block:
+    """Dense rows of one region: rows (2 k,) count from this rank's first row; columns index v; matrix (2 k, columns)."""
+
+    region: int
+    rows: Integer
+    columns: Integer
+    matrix: Real
+
+
+@dataclass(frozen=True)
+class RowOperator:
+    """The rows of B of the nodes first_node .. last_node - 1: dense blocks, one per region, and the sparse free terms."""
+
+    first_node: int
+    last_node: int
+    blocks: tuple[Block, ...]
+    free: sparse.csr_matrix
+
+    @property
+    def rows(self) -> int:
+        return 2 * (self.last_node - self.first_node)
+
+    def apply(self, v: Real) -> Real:
+        """This rank's rows of B v, lengths, for v of shape (4 nodes,)."""
+        result: Real = self.free @ v
+        for block in self.blocks:
+            result[block.rows] += block.matrix @ v[block.columns]
+        return result
+
+    def multiply_block(self, block: Block, constraints: sparse.csr_matrix, columns: Integer) -> Real:
+        """A block's rows of B M, dense, in the given columns of the constraint map M."""
+        chosen = constraints[:, columns]
+        product: Real = (chosen[block.columns].T @ block.matrix.T).T
+        product += (self.free[block.rows] @ chosen).toarray()
+        return np.ascontiguousarray(product)
+
+
+def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
+    """The elements of every region; lengths in the logarithm are divided by 8 times the region's extent."""
+    sources = []
+    for region, material in enumerate(materials):
+        own = mesh.region == region
+        start, end = mesh.start[own], mesh.end[own]
+        points = np.concatenate([start, end])
+        extent = max(np.ptp(points.real), np.ptp(points.imag))
+        sources.append(
+            Sources(start, end, mesh.tip[own], mesh.local, material.kappa, material.shear_modulus, 8 * extent)
+        )
+    return sources
+
+
+def assemble_rows(
+    mesh: Mesh, materials: Sequence[Material], first_node: int, last_node: int, needed: Bool, length: float
+) -> RowOperator:
+    """Rows of B of the nodes in [first_node, last_node).
+
+    needed (4 nodes,): entries of v that can ever differ from zero; the other columns are not stored.
+    length: multiplies the traction equations, over the region's shear modulus.
+    """
+    nodes = np.arange(first_node, last_node)
+    scale = np.where(mesh.traction_equation, length / _shear_moduli(mesh, materials), 1.0)
+    sources = collect_sources(mesh, materials)
+    node_region = mesh.node_region
+    blocks = []
+    for region in np.unique(node_region[nodes]):
+        own = nodes[node_region[nodes] == region]
+        columns = _needed_columns(mesh, int(region), needed)
+        matrix = np.empty((2 * len(own), len(columns)))
+        for part, where in _list_chunks(own, mesh.traction_equation, sources[region]):
+            values = _evaluate_columns(mesh, sources[region], int(region), part, columns, mesh.traction_equation[part[0]])
+            matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
+        rows = (2 * (own - first_node)[:, None] + np.arange(2)).ravel()
+        blocks.append(Block(int(region), rows, columns, matrix))
+    return RowOperator(first_node, last_node, tuple(blocks), _collect_free_terms(mesh, nodes, scale))
+
+
+def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes: Integer, needed: Bool) -> list[Block]:
+    """Blocks whose product with v is the displacement -int T u + int U t at the given crack nodes.
+
+    There it is the mean displacement of the two faces. Block.rows count from the first of the given nodes.
+    """
+    sources = collect_sources(mesh, materials)
+    node_region = mesh.node_region
+    blocks = []
+    for region in np.unique(node_region[nodes]):
+        at = np.flatnonzero(node_region[nodes] == region)
+        columns = _needed_columns(mesh, int(region), needed)
+        matrix = np.empty((2 * len(at), len(columns)))
+        for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), sources[region]):
+            matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False)
+        blocks.append(Block(int(region), (2 * at[:, None] + np.arange(2)).ravel(), columns, matrix))
+    return blocks
+
+
+def _shear_moduli(mesh: Mesh, materials: Sequence[Material]) -> Real:
+    return np.array([material.shear_modulus for material in materials])[mesh.node_region]
+
+
+def _collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:
+    value = np.where(mesh.node_crack[nodes], 1.0, 0.5) * scale[nodes]
+    first_column = np.where(mesh.traction_equation[nodes], 2 * mesh.nodes, 0) + 2 * nodes
+    columns = (first_column[:, None] + np.arange(2)).ravel()
+    rows = np.arange(2 * len(nodes))
+    return sparse.csr_matrix((np.repeat(value, 2), (rows, columns)), shape=(2 * len(nodes), 4 * mesh.nodes))
+
+
+def _region_nodes(mesh: Mesh, region: int) -> Integer:
+    return np.flatnonzero(mesh.node_region == region)
+
+
+def _needed_columns(mesh: Mesh, region: int, needed: Bool) -> Integer:
+    """Entries of v that act on a region: displacements of its nodes, tractions of those not on cracks."""
+    nodes = _region_nodes(mesh, region)
+    bounding = nodes[~mesh.node_crack[nodes]]
+    columns = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * (mesh.nodes + bounding), 2 * (mesh.nodes + bounding) + 1])
+    columns.sort()
+    return columns[needed[columns]]
+
+
+def _list_chunks(nodes: Integer, traction: Bool, sources: Sources) -> list[tuple[Integer, Integer]]:
+    """Runs of nodes with the same equation that fit into the scratch memory, and their rows in the block."""
+    row_bytes = 2 * 8 * 2 * sources.count * len(sources.local) * 2
+    most = max(1, CHUNK_BYTES // row_bytes)
+    chunks = []
+    for kind in (False, True):
+        at = np.flatnonzero(traction[nodes] == kind)
+        for begin in range(0, len(at), most):
+            part = at[begin : begin + most]
+            chunks.append((nodes[part], (2 * part[:, None] + np.arange(2)).ravel()))
+    return chunks
+
+
+def _evaluate_columns(
+    mesh: Mesh, sources: Sources, region: int, nodes: Integer, columns: Integer, traction: bool
+) -> Real:
+    """Values at nodes (displacement, or traction on the node's normal) in the given columns of v."""
+    own = _region_nodes(mesh, region)
+    first = own[0]
+    on = mesh.node_element[nodes] - mesh.node_element[first]
+    of_displacement = columns < 2 * mesh.nodes
+    with_tractions = bool((~of_displacement).any())
+    displacement, tractions = evaluate_rows(
+        sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions
+    )
+    parts = [displacement[:, columns[of_displacement] - 2 * first]]
+    if tractions is not None:
+        parts.append(tractions[:, columns[~of_displacement] - 2 * (mesh.nodes + first)])
+    return np.concatenate(parts, axis=1)

@@ -1,0 +1,117 @@
+"""The constraint map v = M x + m: boundary conditions, equilibrium of the faces, and contact modes, as sparse columns.
+
+Every node owns two unknowns, those in which its own two equations are written: on an outer node the unknown one of
+displacement and traction in each of the condition's directions; on the first node of an interface pair its
+displacement; on the second node (or a crack's one node) the two free quantities of the pair's mode along n and s.
+All unknowns are lengths: a traction is the traction scale (modulus/length) times its unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.contact.laws import G_N, G_S, P_N, P_S, Linearisation, PairState
+from pbem.contact.loads import Load, OuterNodes
+from pbem.mesh.mesh import Mesh
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class ConstraintMap:
+    """matrix (4 nodes, 2 nodes), offset (4 nodes,): displacements and tractions from the unknowns."""
+
+    matrix: sparse.csr_matrix
+    offset: Real
+
+    def evaluate(self, unknowns: Real) -> Real:
+        """v (4 nodes,) from x (2 nodes,)."""
+        result: Real = self.matrix @ unknowns + self.offset
+        return result
+
+
+class _Entries:
+    """Collects vector-valued contributions: at a node, for u or t, the complex coefficient of one unknown."""
+
+    def __init__(self, nodes: int) -> None:
+        self.nodes = nodes
+        self.rows: list[Integer] = []
+        self.columns: list[Integer] = []
+        self.values: list[Real] = []
+
+    def add(self, field: int, node: Integer, unknown: Integer, coefficient: Complex) -> None:
+        for component, value in enumerate((coefficient.real, coefficient.imag)):
+            kept = value != 0
+            self.rows.append((2 * self.nodes * field + 2 * node + component)[kept])
+            self.columns.append(unknown[kept])
+            self.values.append(value[kept])
+
+    def build(self) -> sparse.csr_matrix:
+        entries = (np.concatenate(self.values), (np.concatenate(self.rows), np.concatenate(self.columns)))
+        return sparse.csr_matrix(entries, shape=(4 * self.nodes, 2 * self.nodes))
+
+
+DISPLACEMENT, TRACTION = 0, 1
+
+
+def build_constraints(
+    mesh: Mesh, outer: OuterNodes, gap: Real, law: Linearisation, load: Load, traction_scale: float
+) -> ConstraintMap:
+    """The map for the given linearised laws of the pairs and the given load; gap (m,): initial openings."""
+    entries = _Entries(mesh.nodes)
+    offset = np.zeros((2, mesh.nodes), dtype=complex)
+    _constrain_outer_nodes(entries, offset, outer, load, traction_scale)
+    _constrain_pairs(entries, offset, mesh, gap, law)
+    return ConstraintMap(entries.build(), np.stack([offset.real, offset.imag], axis=2).ravel())
+
+
+def _constrain_outer_nodes(
+    entries: _Entries, offset: Complex, outer: OuterNodes, load: Load, traction_scale: float
+) -> None:
+    for k in range(2):
+        direction, known = outer.direction[:, k], outer.displacement_known[:, k]
+        unknown = 2 * outer.node + k
+        for field, taken, scale in ((DISPLACEMENT, ~known, 1.0), (TRACTION, known, traction_scale)):
+            entries.add(field, outer.node[taken], unknown[taken], scale * direction[taken])
+        for field, taken in ((DISPLACEMENT, known), (TRACTION, ~known)):
+            offset[field, outer.node[taken]] += load.values[taken, k] * direction[taken]
+
+
+def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation) -> None:
+    pairs = mesh.pairs
+    n, s = pairs.normal, 1j * pairs.normal
+    crack, joint = pairs.crack, ~pairs.crack
+    constant_jump = (law.offset[:, G_N] - gap) * n + law.offset[:, G_S] * s
+    constant_traction = law.offset[:, P_N] * n + law.offset[:, P_S] * s
+    for k in range(2):
+        unknown = 2 * pairs.second + k
+        jump = law.tangent[:, G_N, k] * n + law.tangent[:, G_S, k] * s
+        traction = law.tangent[:, P_N, k] * n + law.tangent[:, P_S, k] * s
+        entries.add(TRACTION, pairs.first, unknown, traction)
+        entries.add(TRACTION, pairs.second[joint], unknown[joint], -traction[joint])
+        entries.add(DISPLACEMENT, pairs.second[joint], unknown[joint], jump[joint])
+        entries.add(DISPLACEMENT, pairs.first[crack], unknown[crack], -jump[crack])
+        common = 2 * pairs.first[joint] + k
+        along = np.full(len(common), 1j**k)
+        entries.add(DISPLACEMENT, pairs.first[joint], common, along)
+        entries.add(DISPLACEMENT, pairs.second[joint], common, along)
+    offset[TRACTION, pairs.first] += constant_traction
+    offset[TRACTION, pairs.second[joint]] -= constant_traction[joint]
+    offset[DISPLACEMENT, pairs.second[joint]] += constant_jump[joint]
+    offset[DISPLACEMENT, pairs.first[crack]] -= constant_jump[crack]
+
+
+def read_pair_unknowns(mesh: Mesh, unknowns: Real) -> Real:
+    """The two unknowns (m, 2) of every pair's mode, from x (2 nodes,)."""
+    return unknowns.reshape(-1, 2)[mesh.pairs.second]
+
+
+def evaluate_pairs(mesh: Mesh, law: Linearisation, unknowns: Real) -> PairState:
+    """Tractions and jumps of all pairs from x (2 nodes,)."""
+    return law.evaluate(read_pair_unknowns(mesh, unknowns))

@@ -1,0 +1,44 @@
+"""Collocation nodes on an element and the polynomials that interpolate between them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+
+
+def place_nodes(order: int) -> Real:
+    """Coordinates in (-1, 1) of the order + 1 collocation nodes: the Gauss points."""
+    nodes: Real = legendre.leggauss(order + 1)[0]
+    return nodes
+
+
+def interpolate_shapes(local: Real, exponent: float = 0.0) -> Real:
+    """Coefficients (power k, shape j) of the shapes s^exponent * s^k that are 1 at node j and 0 at the others.
+
+    local (p + 1,): the nodes' coordinates on the axis that the powers refer to; positive if exponent is not whole.
+    """
+    powers = local[:, None] ** (np.arange(len(local)) + exponent)
+    return np.ascontiguousarray(np.linalg.inv(powers))
+
+
+def integrate_shapes(local: Real) -> Real:
+    """Weights (p + 1,) that integrate a polynomial over [-1, 1] from its values at the nodes."""
+    power = np.arange(len(local))
+    moments = (1 - (-1.0) ** (power + 1)) / (power + 1)
+    weights: Real = moments @ interpolate_shapes(local)
+    return weights
+
+
+@cache
+def tip_shapes(nodes: tuple[float, ...]) -> tuple[Real, Real]:
+    """Coefficients of the square-root shapes t^(k + 1/2), t = distance from the tip over the length, in (0, 1).
+
+    First for a tip at the element's start, then at its end; rows are powers, columns the nodes in element order.
+    """
+    local = np.array(nodes)
+    return interpolate_shapes((1 + local) / 2, 0.5), interpolate_shapes((1 - local) / 2, 0.5)

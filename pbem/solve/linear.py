@@ -1,0 +1,180 @@
+"""Linear solvers for the tangent operator: dense LU by LAPACK or ScaLAPACK, sparse block LU by MUMPS, or GMRES on these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from pbem.errors import ConvergenceError
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Method = Literal["lu", "mumps"]
+
+PREFIX = "pbem_"
+
+
+def choose_method(requested: str, regions: int) -> Method:
+    """The direct solver: sparse for several regions, since a region's rows are zero in the others' columns."""
+    if requested in ("lu", "mumps"):
+        return "lu" if requested == "lu" else "mumps"
+    return "lu" if regions == 1 else "mumps"
+
+
+def apply_petsc_options(options: Mapping[str, str]) -> None:
+    """Put options into PETSc's database under the program's prefix; those of the command line already there win."""
+    database = PETSc.Options()
+    for name, value in options.items():
+        if not database.hasName(PREFIX + name):
+            database.setValue(PREFIX + name, value)
+
+
+def clear_petsc_options(options: Mapping[str, str]) -> None:
+    """Take a run's options out of PETSc's database, so that the next run of the process starts clean."""
+    database = PETSc.Options()
+    for name in options:
+        database.delValue(PREFIX + name)
+
+
+class LinearSolver:
+    """Holds the distributed matrix, its Krylov solver and its factors; rows in contiguous shares of the ranks.
+
+    reuse: keep the factors of an earlier matrix as preconditioner while GMRES converges quickly with them.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, method: Method, local_rows: int, rows: int, reuse: bool) -> None:
+        self.method = method
+        self.reuse = reuse
+        self.comm = comm
+        self.factored = False
+        self.shape = ((local_rows, rows), (local_rows, rows))
+        self.matrix: PETSc.Mat | None = None
+        self.solver: PETSc.KSP | None = None
+        self.converted: PETSc.Mat | None = None  # ScaLAPACK's copy of the dense matrix, which it factors
+        self.factor_type = "mumps" if method == "mumps" else ("petsc" if comm.size == 1 else "scalapack")
+        self.workspace = 30  # per cent by which MUMPS may exceed its estimate (ICNTL(14))
+        self.right, self.left = self._make_vectors()
+
+    def _make_vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        right = PETSc.Vec().createMPI(self.shape[0], comm=self.comm)
+        return right, right.duplicate()
+
+    def allocate(self, row_lengths: Integer) -> None:
+        """Make the matrix; row_lengths (local_rows,): the number of columns in which each row can be non-zero."""
+        if self.method == "lu":
+            self.matrix = PETSc.Mat().createDense(self.shape, comm=self.comm)
+            self.matrix.setUp()
+            return
+        begin = int(self.comm.exscan(self.shape[0][0]) or 0)
+        first, last = begin, begin + self.shape[0][0]
+        self.matrix = PETSc.Mat().create(comm=self.comm)
+        self.matrix.setSizes(self.shape)
+        self.matrix.setType("aij")
+        inside = np.minimum(row_lengths, last - first).astype(PETSc.IntType)
+        self.matrix.setPreallocationNNZ((inside, row_lengths.astype(PETSc.IntType)))
+        self.matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, True)
+
+    def fill(self, rows: Integer, columns: Integer, values: Real) -> None:
+        """Set a dense block: local row numbers, global column numbers, values (rows, columns)."""
+        assert self.matrix is not None
+        if self.method == "lu":
+            self.matrix.getDenseArray()[np.ix_(rows, columns)] = values
+            return
+        begin = self.matrix.getOwnershipRange()[0]
+        self.matrix.setValues(
+            (rows + begin).astype(PETSc.IntType), columns.astype(PETSc.IntType), np.ascontiguousarray(values)
+        )
+
+    def finish_filling(self) -> None:
+        """End an update of the matrix; its factors are made anew at the next solution unless they are reused."""
+        assert self.matrix is not None
+        self.matrix.assemble()
+        if self.solver is None or not self.reuse:
+            self._renew()
+
+    def _make_solver(self) -> None:
+        solver = PETSc.KSP().create(comm=self.comm)
+        solver.setOptionsPrefix(PREFIX)
+        if self.factor_type == "scalapack":
+            assert self.matrix is not None
+            self.converted = self.matrix.convert("scalapack", out=PETSc.Mat())
+        solver.setOperators(self.matrix, self.converted)
+        direct = self.factor_type != "scalapack" and not self.reuse
+        solver.setType("preonly" if direct else "fgmres")
+        solver.setTolerances(rtol=1e-13, atol=0.0, divtol=1e10, max_it=60)
+        preconditioner = solver.getPC()
+        preconditioner.setType("lu")
+        preconditioner.setFactorSolverType(self.factor_type)
+        if self.factor_type == "mumps":
+            preconditioner.setFactorSetUpSolverType()
+            factor = preconditioner.getFactorMatrix()
+            factor.setMumpsIcntl(7, 2)
+            factor.setMumpsIcntl(14, self.workspace)
+        if self.reuse:
+            preconditioner.setReusePreconditioner(True)
+        solver.setFromOptions()
+        self.solver = solver
+
+    def _destroy_solver(self) -> None:
+        for item in (self.solver, self.converted):
+            if item is not None:
+                item.destroy()
+        self.solver = self.converted = None
+        self.factored = False
+
+    def solve(self, rhs: Real) -> Real:
+        """This rank's part of the solution for this rank's part of the right-hand side.
+
+        Raises ConvergenceError ("singular tangent" or "linear solver") on all ranks alike.
+        """
+        for _ in range(6):
+            assert self.solver is not None
+            self.right.setArray(rhs)
+            self.solver.solve(self.right, self.left)
+            reason = self.solver.getConvergedReason()
+            if reason > 0:
+                self.factored = True
+                return np.array(self.left.getArray())
+            if not self._recover():
+                break
+        raise self._explain(reason)
+
+    def _recover(self) -> bool:
+        """Whether another try makes sense: more room for MUMPS, or fresh factors in place of reused ones."""
+        assert self.solver is not None
+        if self.factor_type == "mumps":
+            code = self.solver.getPC().getFactorMatrix().getMumpsInfog(1)
+            if code in (-8, -9, -11, -12, -14, -15, -17, -18, -20):
+                self.workspace = 2 * self.workspace + 50
+                self._renew()
+                return True
+            if code < 0:
+                return False
+        if self.reuse and self.factored:
+            self._renew()
+            return True
+        return False
+
+    def _renew(self) -> None:
+        self._destroy_solver()
+        self._make_solver()
+
+    def _explain(self, reason: int) -> ConvergenceError:
+        if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED:
+            detail = "the tangent operator has no LU factors; a body is probably free to move"
+            return ConvergenceError("singular tangent", detail)
+        names = {value: name for name, value in vars(PETSc.KSP.ConvergedReason).items() if isinstance(value, int)}
+        return ConvergenceError("linear solver", f"PETSc's solver ended with {names.get(reason, reason)}")
+
+    def destroy(self) -> None:
+        """Free PETSc's storage (older versions of petsc4py never do it by themselves)."""
+        self._destroy_solver()
+        for item in (self.matrix, self.right, self.left):
+            if item is not None:
+                item.destroy()
+        self.matrix = None

@@ -1,0 +1,108 @@
+"""The march through the load history: steps, halved where they fail, each committed once when it has converged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.contact.laws import ModeState, start_modes
+from pbem.errors import ConvergenceError
+from pbem.solve.newton import Memory, Solution, solve_step
+from pbem.solve.problem import Problem, Tangent
+from pbem.solve.step import ContactState, Reporter, Step
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a march begins: after a number of steps, at a fraction of a stage, with the memory of the pairs."""
+
+    number: int
+    stage: int
+    factor: float
+    memory: Memory
+
+
+def start_from_rest(problem: Problem) -> Start:
+    """The unloaded state: closed pairs stick."""
+    count = problem.mesh.pairs.count
+    return Start(0, 0, 0.0, Memory(start_modes(problem.laws), np.zeros(count), np.zeros(count)))
+
+
+def start_from(number: int, stage: int, factor: float, contact: ContactState) -> Start:
+    """The state of a stored step."""
+    modes = ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
+    return Start(number, stage, factor, Memory(modes, contact.slip, contact.traction_n))
+
+
+def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
+    """Yield the converged steps of all stages in turn.
+
+    A step that fails is halved, down to solver.min_step of a stage; the factors of a stage's own steps are always met.
+    Raises ConvergenceError with the reason of the last failure, after the steps before it were yielded.
+    """
+    begin = start or start_from_rest(problem)
+    tangent = Tangent(problem)
+    number, memory = begin.number, begin.memory
+    try:
+        for stage in range(begin.stage, len(problem.model.stages)):
+            steps = problem.model.stages[stage].steps
+            reached = begin.factor if stage == begin.stage else 0.0
+            while reached < 1.0:
+                planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
+                solution, reached = _advance(problem, tangent, memory, stage, reached, planned, reporter)
+                memory = Memory(solution.modes, solution.pairs.g_s, solution.pairs.p_n)
+                number += 1
+                step = describe_step(problem, solution, number, stage, reached)
+                reporter.accept(step)
+                yield step
+    finally:
+        tangent.destroy()
+
+
+def _advance(
+    problem: Problem, tangent: Tangent, memory: Memory, stage: int, reached: float, planned: float, reporter: Reporter
+) -> tuple[Solution, float]:
+    """One converged step towards the planned fraction of the stage; returns it and the fraction reached."""
+    target = planned
+    while True:
+        reporter.start_step(stage, reached, target)
+        try:
+            return solve_step(problem, tangent, memory, problem.evaluate_load(stage, target), reporter), target
+        except ConvergenceError as error:
+            half = 0.5 * (target - reached)
+            if half < problem.model.solver.min_step:
+                name = problem.model.stages[stage].name
+                raise ConvergenceError(
+                    error.reason,
+                    f"stage {name!r} stopped at the fraction {reached:.6g}; the step to {target:.6g} failed and is the "
+                    f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}",
+                ) from error
+            reporter.reject(error.reason, error.detail)
+            target = reached + half
+
+
+def describe_step(problem: Problem, solution: Solution, number: int, stage: int, factor: float) -> Step:
+    """Displacements and tractions on all faces, crack faces recovered from their displacement equation, and contact."""
+    mesh = problem.mesh
+    values = solution.v[0::2] + 1j * solution.v[1::2]
+    displacement, traction = values[: mesh.nodes].copy(), values[mesh.nodes :]
+    cracks = problem.all_crack_nodes
+    jump = displacement[cracks]
+    mean = problem.recover_crack_displacement(solution.v)
+    displacement[cracks] = mean + jump / 2
+    opposite = np.zeros(mesh.nodes, dtype=complex)
+    opposite[cracks] = mean - jump / 2
+    order = problem.second_faces
+    pairs = solution.pairs
+    return Step(
+        number=number,
+        stage=stage,
+        factor=factor,
+        iterations=solution.iterations,
+        residual=solution.residual,
+        displacement=np.concatenate([displacement, opposite[order]]),
+        traction=np.concatenate([traction, -traction[order]]),
+        contact=ContactState(solution.modes.mode, pairs.g_n, pairs.g_s, pairs.p_n, pairs.p_s),
+    )

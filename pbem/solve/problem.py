@@ -1,0 +1,143 @@
+"""One discretised problem on the ranks: its operator, its tangent operator K = B M, and residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from pbem.bem.operator import Block, RowOperator, assemble_displacement_rows, assemble_rows
+from pbem.contact.constraints import ConstraintMap, build_constraints
+from pbem.contact.laws import Linearisation, PairLaws, collect_laws
+from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
+from pbem.mesh.mesh import Mesh, second_face_nodes
+from pbem.model.model import Model
+from pbem.parallel import gather_parts, norm_of_parts, share_nodes
+from pbem.solve.linear import LinearSolver, choose_method
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What stays the same through a run; equal on all ranks but for `operator`, which holds this rank's rows.
+
+    offsets (ranks + 1,): first node of every rank. traction_scale: modulus/length, the unit of traction unknowns.
+    """
+
+    comm: MPI.Intracomm
+    model: Model
+    mesh: Mesh
+    outer: OuterNodes
+    laws: PairLaws
+    operator: RowOperator
+    crack_rows: tuple[Block, ...]
+    crack_nodes: Integer
+    traction_scale: float
+    block_columns: tuple[Integer, ...]
+
+    @property
+    def unknowns(self) -> int:
+        return 2 * self.mesh.nodes
+
+    @cached_property
+    def all_crack_nodes(self) -> Integer:
+        """The crack nodes of all ranks, in the order in which their recovered displacements are gathered."""
+        return np.flatnonzero(self.mesh.node_crack)
+
+    @cached_property
+    def second_faces(self) -> Integer:
+        """Nodes of the cracks' second faces in the order in which results append them."""
+        return second_face_nodes(self.mesh)
+
+    def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
+        """The constraint map for linearised laws and a load."""
+        return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale)
+
+    def evaluate_load(self, stage: int, factor: float) -> Load:
+        return evaluate_load(self.model, self.mesh, self.outer, stage, factor)
+
+    def measure(self, part: Real) -> float:
+        """Norm of a vector spread over the ranks."""
+        return norm_of_parts(self.comm, part)
+
+    def recover_crack_displacement(self, v: Real) -> NDArray[np.complex128]:
+        """Mean displacement of the two faces at all crack nodes (complex, in mesh order), on every rank."""
+        part = np.zeros(2 * len(self.crack_nodes))
+        for block in self.crack_rows:
+            part[block.rows] = block.matrix @ v[block.columns]
+        whole = gather_parts(self.comm, part)
+        return whole[0::2] + 1j * whole[1::2]
+
+
+def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
+    """Assemble this rank's rows; shares are balanced by the number of matrix entries."""
+    materials = [region.material for region in model.regions]
+    outer = collect_outer_nodes(model, mesh)
+    needed = find_needed_columns(model, mesh, outer)
+    node_region = mesh.node_region
+    costs = np.bincount(node_region, minlength=len(materials)).astype(float)[node_region]
+    offsets = share_nodes(costs, comm.size)
+    first, last = int(offsets[comm.rank]), int(offsets[comm.rank + 1])
+    operator = assemble_rows(mesh, materials, first, last, needed, model.size)
+    crack_nodes = np.flatnonzero(mesh.node_crack)
+    shares = np.linspace(0, len(crack_nodes), comm.size + 1).astype(int)
+    own_cracks = crack_nodes[shares[comm.rank] : shares[comm.rank + 1]]
+    modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
+    return Problem(
+        comm=comm,
+        model=model,
+        mesh=mesh,
+        outer=outer,
+        laws=collect_laws(model, mesh),
+        operator=operator,
+        crack_rows=tuple(assemble_displacement_rows(mesh, materials, own_cracks, needed)),
+        crack_nodes=own_cracks,
+        traction_scale=modulus / model.size,
+        block_columns=tuple(find_unknowns_of_region(mesh, outer, block.region) for block in operator.blocks),
+    )
+
+
+def find_unknowns_of_region(mesh: Mesh, outer: OuterNodes, region: int) -> Integer:
+    """Unknowns, in rising order, on which a region's displacements and tractions can depend in any mode."""
+    own = mesh.node_region == region
+    pairs = mesh.pairs
+    touching = own[pairs.first] | own[pairs.second]
+    nodes = np.unique(np.concatenate([outer.node[own[outer.node]], pairs.first[touching], pairs.second[touching]]))
+    columns: Integer = (2 * nodes[:, None] + np.arange(2)).ravel()
+    return columns
+
+
+class Tangent:
+    """The tangent operator K = B M(mode) in a linear solver."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        options = problem.model.solver
+        method = choose_method(options.linear, len(problem.mesh.region_names))
+        operator = problem.operator
+        self.solver = LinearSolver(
+            problem.comm, method, operator.rows, problem.unknowns, reuse=options.linear == "gmres"
+        )
+        lengths = np.zeros(operator.rows, dtype=np.int64)
+        for block, columns in zip(operator.blocks, problem.block_columns, strict=True):
+            lengths[block.rows] = len(columns)
+        self.solver.allocate(lengths)
+
+    def update(self, constraints: ConstraintMap) -> None:
+        """Form K for a constraint map."""
+        operator = self.problem.operator
+        for block, columns in zip(operator.blocks, self.problem.block_columns, strict=True):
+            self.solver.fill(block.rows, columns, operator.multiply_block(block, constraints.matrix, columns))
+        self.solver.finish_filling()
+
+    def solve(self, rhs: Real) -> Real:
+        """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side."""
+        return gather_parts(self.problem.comm, self.solver.solve(rhs))
+
+    def destroy(self) -> None:
+        self.solver.destroy()

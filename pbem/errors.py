@@ -42,3 +42,15 @@ class ConvergenceError(Exception):
         self.reason = reason
         self.detail = detail
         super().__init__(f"{reason}: {detail}")
+
+
+class ResultFileError(Exception):
+    """A result file cannot be written, is not one of pbem's, or does not belong to the case.
+
+    path: the file as the user named it; reason: what is wrong and what to do, one sentence.
+    """
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        self.reason = reason
+        super().__init__(f"{path}: {reason}")

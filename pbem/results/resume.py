@@ -1,0 +1,56 @@
+"""Going on with a result file: is it of this case, and where did it stop?"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+import numpy as np
+
+from pbem.errors import ResultFileError
+from pbem.mesh.mesh import Mesh, list_faces
+from pbem.model.model import Model
+from pbem.results.layout import ITERATION, PAIR_DATASETS, STEP_DATASETS, sort_pairs, to_columns
+from pbem.solve.step import ContactState, Step
+
+
+def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> None:
+    if "case" not in file.attrs:
+        raise ResultFileError(path, "is not a result file of pbem")
+    if file.attrs["case"] != model.source:
+        raise ResultFileError(path, "holds the results of another case, or the case file was changed since; "
+                                    "run without resuming, or name another output file")
+    position = to_columns(list_faces(mesh).position)
+    stored = file["nodes/position"][...]
+    if stored.shape != position.shape or np.abs(stored - position).max() > 1e-12 * model.size:
+        raise ResultFileError(path, "holds another mesh of this case (it was written by another version of pbem); "
+                                    "run without resuming")
+
+
+def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
+    steps = file["steps"]
+    k = min(len(steps[name]) for name in STEP_DATASETS)
+    if k == 0:
+        return None
+    contact = {name: np.zeros(mesh.pairs.count, dtype=kind) for name, kind in PAIR_DATASETS.items()}
+    for interface, pairs in sort_pairs(mesh).items():
+        for name, values in contact.items():
+            values[pairs] = file["contact"][interface][name][k - 1]
+    fields = {name: file["fields"][name][k - 1] @ np.array([1, 1j]) for name in ("displacement", "traction")}
+    return Step(
+        number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
+        iterations=(), residual=float(steps["residual"][k - 1]), contact=ContactState(**contact), **fields,
+    )
+
+
+def truncate(file: h5py.File, last_number: int) -> None:
+    """Cut everything that goes beyond the last step that was stored completely."""
+    k = min(len(file["steps"][name]) for name in STEP_DATASETS)
+
+    def cut(_: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.maxshape[0] is None and item.dtype != ITERATION:
+            item.resize(k, axis=0)
+
+    file.visititems(cut)
+    convergence = file["convergence"]
+    convergence.resize(int(np.searchsorted(convergence["step"], last_number, side="right")), axis=0)

@@ -1,0 +1,184 @@
+"""Writes the result file: the header at once, then one more entry along the first axis per stored step."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+import h5py
+import numpy as np
+
+from pbem.errors import ConvergenceError, ResultFileError
+from pbem.mesh.mesh import Mesh, list_faces
+from pbem.model.model import Model
+from pbem.results.layout import (
+    ITERATION,
+    PAIR_DATASETS,
+    STEP_DATASETS,
+    append_row,
+    extend,
+    open_file,
+    sort_pairs,
+    to_columns,
+    write_attributes,
+    write_header,
+)
+from pbem.results.output import check_output_path
+from pbem.results.resume import check_same_case, read_last_step, truncate
+from pbem.solve.step import Iteration, Step
+
+
+class ResultWriter:
+    """Context manager that writes results.h5 as the run goes on; for one rank only.
+
+    The header is written under a temporary name and moved to `path` when complete, so that a file of that name always
+    can be read. Every `model.output_every`-th step is stored, and the last of each stage; when the run ends early, the
+    last one reached as well. Steps are on the disk when `append` returns.
+
+    Leaving the context sets the status to "finished"; leaving it by an exception, to "failed" with the attribute
+    `failure` (text) and `failure_reason` (short name).
+
+    last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
+        petsc_options: Sequence[str] = (),
+    ) -> None:
+        """Raises ResultFileError if the file cannot be written there."""
+        target = check_output_path(path)
+        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+        try:
+            file = open_file(temporary, "w")
+            try:
+                write_header(file, model, mesh)
+                write_attributes(file, model, ranks, petsc_version, petsc_options)
+                file.flush()
+                temporary.replace(target)
+            except BaseException:
+                file.close()
+                temporary.unlink(missing_ok=True)
+                raise
+        except OSError as error:
+            raise ResultFileError(str(path), f"cannot be written ({error})") from error
+        self._start(target, file, model, mesh, None)
+
+    @classmethod
+    def resume(
+        cls, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
+        petsc_options: Sequence[str] = (),
+    ) -> ResultWriter:
+        """A writer that goes on after the last step stored in an existing file of the same case.
+
+        Raises ResultFileError if there is no such file, it cannot be read, or it holds another case or mesh.
+        """
+        target = check_output_path(path)
+        if not target.exists():
+            raise ResultFileError(str(path), "there is no such file to resume; run without resuming")
+        try:
+            file = open_file(target, "r+")
+        except OSError as error:
+            raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
+        try:
+            check_same_case(str(path), file, model, mesh)
+            last_step = read_last_step(file, mesh)
+            truncate(file, 0 if last_step is None else last_step.number)
+            write_attributes(file, model, ranks, petsc_version, petsc_options)
+            file.flush()
+        except BaseException as error:
+            file.close()
+            if isinstance(error, KeyError | OSError | ValueError):
+                raise ResultFileError(str(path), f"is not a complete result file ({error})") from error
+            raise
+        writer = cls.__new__(cls)
+        writer._start(target, file, model, mesh, last_step)
+        return writer
+
+    def _start(self, path: Path, file: h5py.File, model: Model, mesh: Mesh, last_step: Step | None) -> None:
+        self.path = path
+        self.last_step = last_step
+        self._file = file
+        self._every = max(1, model.output_every)
+        faces = list_faces(mesh)
+        self._weight = faces.weight
+        self._nodes_of_curve = {name: np.flatnonzero(faces.curve == _index(mesh.curve_names, name))
+                                for name in model.conditions}
+        self._pairs_of_interface = sort_pairs(mesh)
+        self._pending: Step | None = None
+
+    def append(self, step: Step) -> None:
+        """Store the step if it is its turn, and its iterations in any case; flush."""
+        rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
+        extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
+        if step.last_of_stage or step.number % self._every == 0:
+            self._store(step)
+        else:
+            self._pending = step
+        self._file.flush()
+
+    def _store(self, step: Step) -> None:
+        self._pending = None
+        file = self._file
+        append_row(file["fields/displacement"], to_columns(step.displacement))
+        append_row(file["fields/traction"], to_columns(step.traction))
+        for name, nodes in self._nodes_of_curve.items():
+            force = complex(np.dot(self._weight[nodes], step.traction[nodes]))
+            append_row(file["reactions"][name], np.array([force.real, force.imag]))
+        for name, pairs in self._pairs_of_interface.items():
+            group = file["contact"][name]
+            for quantity in PAIR_DATASETS:
+                append_row(group[quantity], getattr(step.contact, quantity)[pairs])
+        # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
+        values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
+        for quantity, value in zip(STEP_DATASETS, values, strict=True):
+            append_row(file["steps"][quantity], np.array(value))
+
+    def finish(self) -> None:
+        """Set the status to "finished" and close the file."""
+        self._close("finished")
+
+    def fail(self, reason: str, detail: str) -> None:
+        """Set the status to "failed", with the reason (a short name) and its detail (sentences); close the file."""
+        if self._file:
+            self._file.attrs["failure"] = f"{reason}: {detail}" if detail else reason
+            self._file.attrs["failure_reason"] = reason
+        self._close("failed")
+
+    def _close(self, status: str) -> None:
+        if not self._file:
+            return
+        if self._pending is not None:
+            self._store(self._pending)
+        self._file.attrs["status"] = status
+        self._file.close()
+
+    def __enter__(self) -> ResultWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.finish()
+            return
+        # What ended the run must be what the user hears of, not that its last words could not be written.
+        with suppress(Exception):
+            if isinstance(error, ConvergenceError):
+                self.fail(error.reason, error.detail)
+            elif isinstance(error, KeyboardInterrupt):
+                self.fail("interrupted", "the run was stopped by the user or the batch system")
+            else:
+                self.fail(type(error).__name__, str(error))
+        self._file.close()
+
+
+def _index(names: tuple[str, ...], name: str) -> int:
+    return names.index(name) if name in names else -1
+
+
+def _iteration_row(step: int, iteration: Iteration) -> tuple[float, ...]:
+    return (step, iteration.number, iteration.residual, iteration.changed,
+            iteration.stick, iteration.slip, iteration.open, iteration.seconds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,15 @@ class Fault:
         return f"{self.place}: found {self.found}; expected {self.expected}"
 
 
-class CaseError(Exception):
+class PbemError(Exception):
+    """What the user can do something about; raised by all ranks alike."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Errors travel between the ranks: they are made again from their own attributes.
+        return (type(self), tuple(vars(self).values()))
+
+
+class CaseError(PbemError):
     """The case file is wrong; nothing was computed or written. Carries every fault at once."""
 
     def __init__(self, source: str, faults: tuple[Fault, ...]) -> None:
@@ -31,7 +40,7 @@ class CaseError(Exception):
         super().__init__("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
 
 
-class ConvergenceError(Exception):
+class ConvergenceError(PbemError):
     """A load step did not converge at the smallest step.
 
     reason: a short name, e.g. "mode cycle", "singular tangent", "iteration limit", "linear solver"
@@ -44,7 +53,7 @@ class ConvergenceError(Exception):
         super().__init__(f"{reason}: {detail}")
 
 
-class ResultFileError(Exception):
+class ResultFileError(PbemError):
     """A result file cannot be written, is not one of pbem's, or does not belong to the case.
 
     path: the file as the user named it; reason: what is wrong and what to do, one sentence.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import traceback
-from types import TracebackType
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -14,16 +15,45 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
+T = TypeVar("T")
+
 world: MPI.Intracomm = MPI.COMM_WORLD
 
 
-def abort_on_exception(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """An exception hook: print the traceback once and end all ranks, so that none waits for this one for ever."""
-    text = "".join(traceback.format_exception(kind, error, trace))
-    sys.stderr.write(f"rank {world.rank} of {world.size} failed:\n{text}")
-    sys.stderr.flush()
-    if world.size > 1:
-        world.Abort(1)
+@contextmanager
+def abort_if_unexpected(comm: MPI.Intracomm, expected: type[Exception]) -> Iterator[None]:
+    """End all ranks at once, with the traceback printed once, when an exception other than `expected` leaves the block.
+
+    Exceptions of the expected kind are those that all ranks raise alike. With one rank nothing is done.
+    """
+    try:
+        yield
+    except expected:
+        raise
+    except BaseException:
+        if comm.size == 1:
+            raise
+        sys.stdout.flush()
+        sys.stderr.write(f"pbem: rank {comm.rank} of {comm.size} failed, all ranks end\n{traceback.format_exc()}")
+        sys.stderr.flush()
+        comm.Abort(1)
+
+
+def do_on_first(comm: MPI.Intracomm, expected: type[Exception], action: Callable[[], T], share: bool = True) -> T:
+    """Call action on the first rank only; all ranks get its value, or raise its exception of the expected kind.
+
+    share=False keeps the value on the first rank (it cannot be sent); the others get None.
+    """
+    value, error = None, None
+    if comm.rank == 0:
+        try:
+            value = action()
+        except expected as caught:
+            error = caught
+    error = comm.bcast(error, root=0)
+    if error is not None:
+        raise error
+    return comm.bcast(value, root=0) if share else value  # type: ignore[return-value]
 
 
 def share_nodes(costs: Real, ranks: int) -> Integer:

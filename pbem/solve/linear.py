@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Literal
 
 import numpy as np
@@ -26,19 +27,29 @@ def choose_method(requested: str, regions: int) -> Method:
     return "lu" if regions == 1 else "mumps"
 
 
-def apply_petsc_options(options: Mapping[str, str]) -> None:
-    """Put options into PETSc's database under the program's prefix; those of the command line already there win."""
-    database = PETSc.Options()
-    for name, value in options.items():
-        if not database.hasName(PREFIX + name):
-            database.setValue(PREFIX + name, value)
+def petsc_version() -> str:
+    """Version of the PETSc library in use."""
+    return ".".join(str(part) for part in PETSc.Sys.getVersion())
 
 
-def clear_petsc_options(options: Mapping[str, str]) -> None:
-    """Take a run's options out of PETSc's database, so that the next run of the process starts clean."""
+@contextmanager
+def petsc_options(options: Mapping[str, str]) -> Iterator[None]:
+    """Hold options in PETSc's database under the program's prefix while the block runs.
+
+    At the end of the process PETSc itself names the options that nothing asked for.
+    """
     database = PETSc.Options()
-    for name in options:
+    for name in _options_in_use:
         database.delValue(PREFIX + name)
+    _options_in_use[:] = list(options)
+    for name, value in options.items():
+        database.setValue(PREFIX + name, value)
+    if options:
+        database.setValue("options_left", "true")
+    yield
+
+
+_options_in_use: list[str] = []
 
 
 class LinearSolver:

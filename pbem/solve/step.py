@@ -79,3 +79,22 @@ class Reporter(Protocol):
 
     def reject(self, reason: str, detail: str) -> None:
         """A step has failed and will be halved."""
+
+
+class SilentReporter:
+    """A reporter that says nothing."""
+
+    def note(self, text: str) -> None:
+        """Nothing."""
+
+    def start_step(self, stage: int, reached: float, target: float) -> None:
+        """Nothing."""
+
+    def iterate(self, iteration: Iteration) -> None:
+        """Nothing."""
+
+    def accept(self, step: Step) -> None:
+        """Nothing."""
+
+    def reject(self, reason: str, detail: str) -> None:
+        """Nothing."""

@@ -1,0 +1,83 @@
+"""A run from the case file to the finished results, on the ranks of the present MPI world."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from pbem.case import parse_case, read_case_text
+from pbem.errors import PbemError
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.build import build_model
+from pbem.model.model import Model
+from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
+from pbem.results.output import check_output_path
+from pbem.results.reader import Results, open_results
+from pbem.results.writer import ResultWriter
+from pbem.solve.linear import petsc_options, petsc_version
+from pbem.solve.march import march, start_from
+from pbem.solve.problem import assemble_problem
+from pbem.solve.step import Reporter, SilentReporter, Step
+
+
+def run(
+    case: str | os.PathLike[str],
+    output: str | os.PathLike[str] | None = None,
+    *,
+    resume: bool = False,
+    petsc: Mapping[str, str] | None = None,
+    reporter: Reporter | None = None,
+) -> Results:
+    """Read a case file, solve it, and return its results.
+
+    case: path of the TOML file. output: path of the result file; by default the case's name with .h5, in the working
+    directory. resume: go on after the last step that the file holds. petsc: PETSc options without prefix, which win over the
+    case's [petsc] table. reporter: told of the progress, on the first rank only.
+    Every rank of an MPI run calls this and gets the results.
+
+    Raises CaseError (all faults of the case), ResultFileError (the output cannot be written, or does not belong to the
+    case), ConvergenceError (the file then holds every step reached). Any other exception on one rank ends all ranks.
+    """
+    with abort_if_unexpected(world, PbemError):
+        path = Path(case)
+        text = do_on_first(world, PbemError, lambda: read_case_text(path))
+        model = build_model(parse_case(text, str(path)))
+        target = Path(output) if output is not None else Path(path.stem + ".h5")
+        do_on_first(world, PbemError, lambda: check_output_path(target))
+        mesh = generate_mesh(model)
+        listener = reporter if reporter is not None and world.rank == 0 else SilentReporter()
+        for note in (*model.notes, *mesh.notes):
+            listener.note(note)
+        options = {**model.solver.petsc, **(petsc or {})}
+        with petsc_options(options):
+            _solve(model, mesh, target, resume, options, listener)
+        return open_results(target)
+
+
+def _solve(
+    model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter
+) -> None:
+    """March through the load history; the first rank writes."""
+
+    def open_writer() -> ResultWriter | None:
+        create = ResultWriter.resume if resume else ResultWriter
+        flat = [f"{name}={value}" for name, value in options.items()]
+        return create(target, model, mesh, world.size, petsc_version(), flat)
+
+    writer = do_on_first(world, PbemError, open_writer, share=False)
+    last: Step | None = broadcast(world, writer.last_step if writer else None)
+    start = None if last is None else start_from(last.number, last.stage, last.factor, last.contact)
+    try:
+        problem = assemble_problem(model, mesh, world)
+        for step in march(problem, listener, start):
+            if writer:
+                writer.append(step)
+    except BaseException as error:
+        if writer:
+            writer.__exit__(type(error), error, error.__traceback__)
+        raise
+    if writer:
+        writer.finish()
+    world.Barrier()

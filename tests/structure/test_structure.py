@@ -1,0 +1,158 @@
+"""The package obeys its rules of structure; each rule is also seen to fail, on a small tree that breaks it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import pbem
+from tests.structure import checks
+from tests.structure.checks import Module
+
+MODULES = checks.read_modules(Path(pbem.__file__).parent)
+each_module = pytest.mark.parametrize("module", MODULES.values(), ids=MODULES.keys())
+
+# Whoever only reads cases and results waits for no MPI, and needs none.
+WITHOUT_MPI = [name for name, module in MODULES.items() if module.part not in ("parallel", "solve", "run", "__main__")]
+
+
+def expect_none(faults: list[str]) -> None:
+    """Fail with all the faults, a line each."""
+    assert not faults, "\n".join(faults)
+
+
+def test_all_parts_are_read() -> None:
+    # Else the tests below could pass because they look at nothing.
+    assert {"pbem", "pbem.errors", "pbem.model.model", "pbem.mesh.mesh", "pbem.solve.step"} <= MODULES.keys()
+
+
+@each_module
+def test_imports_go_along_the_path_of_the_data(module: Module) -> None:
+    expect_none(checks.check_order(module, MODULES))
+
+
+def test_no_cycle_of_imports() -> None:
+    expect_none(checks.check_cycles(MODULES))
+
+
+@each_module
+def test_libraries_come_in_by_their_own_part(module: Module) -> None:
+    expect_none(checks.check_doors(module))
+
+
+@each_module
+def test_names_say_one_thing(module: Module) -> None:
+    expect_none(checks.check_names(module))
+
+
+@each_module
+def test_docstrings_are_there(module: Module) -> None:
+    expect_none(checks.check_docstrings(module))
+
+
+@each_module
+def test_modules_are_short(module: Module) -> None:
+    expect_none(checks.check_length(module))
+
+
+def test_mechanics_and_results_load_no_mpi() -> None:
+    code = """
+import importlib, sys
+for name in sys.argv[1:]:
+    importlib.import_module(name)
+    for library in ("mpi4py", "petsc4py"):
+        if library in sys.modules:
+            sys.exit(f"{name} loads {library}")
+"""
+    run = subprocess.run([sys.executable, "-c", code, *WITHOUT_MPI], capture_output=True, text=True, timeout=60)
+    assert run.returncode == 0, run.stderr
+
+
+def make_tree(folder: Path, sources: dict[str, str]) -> dict[str, Module]:
+    """Write a small package named pbem; `sources` is by path in it."""
+    for name, text in sources.items():
+        path = folder / "pbem" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return checks.read_modules(folder / "pbem")
+
+
+# A tree that is in order, importing in all the ways that are allowed.
+SOUND = {
+    "__init__.py": '"""The package."""',
+    "errors.py": '"""Errors."""',
+    "parallel.py": '"""Parallel."""\nfrom mpi4py import MPI',
+    "case/__init__.py": '"""Cases."""\nfrom pbem.case.reader import read',
+    "case/reader.py": '"""Reader."""\nimport tomllib\nfrom ..errors import Fault\ndef read():\n    """Read."""',
+    "mesh/__init__.py": '"""Meshes."""',
+    "mesh/mesh.py": '"""Mesh."""\nfrom pbem.case import read\nimport pbem.errors\nmusic = 1',
+    "solve/__init__.py": '"""Solving."""\nfrom . import newton',
+    "solve/newton.py": '"""Newton."""\nfrom petsc4py import PETSc\nfrom pbem.mesh import mesh\nimport pbem.parallel',
+    "cli.py": '"""Command line."""\ndef main():\n    """Run."""\n    from pbem.solve.newton import mesh',
+}
+
+
+def list_faults(modules: dict[str, Module]) -> list[str]:
+    """Apply all checks to all modules."""
+    each: list[Callable[[Module], list[str]]] = [
+        lambda module: checks.check_order(module, modules),
+        checks.check_doors,
+        checks.check_names,
+        checks.check_docstrings,
+        checks.check_length,
+    ]
+    return [fault for module in modules.values() for check in each for fault in check(module)] + checks.check_cycles(
+        modules
+    )
+
+
+def test_a_sound_tree_has_no_fault(tmp_path: Path) -> None:
+    assert list_faults(make_tree(tmp_path, SOUND)) == []
+
+
+BREACHES = {
+    "upwards": ("case/reader.py", "import pbem.mesh.mesh", "case may not import pbem.mesh.mesh"),
+    "upwards, relative": ("case/reader.py", "from ..mesh.mesh import a", "case may not import pbem.mesh.mesh"),
+    "upwards, module from its folder": ("case/reader.py", "from ..mesh import mesh", "may not import pbem.mesh.mesh"),
+    "upwards, folder": ("case/reader.py", "from pbem.mesh import Mesh", "case may not import pbem.mesh"),
+    "upwards, in a function": ("mesh/mesh.py", "def _f():\n    import pbem.cli", "mesh may not import pbem.cli"),
+    "upwards, from a package": ("mesh/__init__.py", "from .. import cli", "mesh may not import pbem.cli"),
+    "base imports a part": ("errors.py", "from pbem.mesh import mesh", "errors may not import pbem.mesh.mesh"),
+    "mechanics is parallel": ("mesh/mesh.py", "import pbem.parallel", "mesh may not import pbem.parallel"),
+    "unknown part": ("extra.py", "", "part 'extra' has no place in the order"),
+    "cycle": ("case/reader.py", "from . import read", "cycle of imports: pbem.case <- pbem.case.reader <- pbem.case"),
+    "petsc4py": ("mesh/mesh.py", "import petsc4py.PETSc", "petsc4py.PETSc may be imported in solve only"),
+    "mpi4py": ("cli.py", "from mpi4py import MPI", "mpi4py.MPI may be imported in parallel and solve only"),
+    "h5py": ("cli.py", "import h5py", "h5py may be imported in results only"),
+    "tomllib": ("mesh/mesh.py", "import tomllib", "tomllib may be imported in case only"),
+    "matplotlib": ("cli.py", "import matplotlib.pyplot as plt", "matplotlib.pyplot may be imported in results only"),
+    "name, variable": ("mesh/mesh.py", "mu = 0.5", "'mu' means several things"),
+    "name, parameter": ("mesh/mesh.py", "def _f(mu): ...", "'mu' means several things"),
+    "name, keyword": ("mesh/mesh.py", "_f(mu=1)", "'mu' means several things"),
+    "name, attribute": ("mesh/mesh.py", "_f.mu", "'mu' means several things"),
+    "name, import": ("mesh/mesh.py", "import numpy as mu", "'mu' means several things"),
+    "vague module": ("mesh/io_utils.py", "", "pbem.mesh.io_utils does not say what it is"),
+    "vague class": ("mesh/mesh.py", "class _MeshManager: ...", "_MeshManager does not say what it is"),
+    "vague function": ("mesh/mesh.py", "def _helper(): ...", "_helper does not say what it is"),
+    "undocumented function": ("mesh/mesh.py", "def make(): ...", "make has no docstring"),
+    "undocumented class": ("mesh/mesh.py", "class Mesh: ...", "Mesh has no docstring"),
+    "long module": ("mesh/mesh.py", "\n" * 400, "402 lines, more than 400"),
+}
+
+
+@pytest.mark.parametrize("breach", BREACHES)
+def test_a_breach_is_found(breach: str, tmp_path: Path) -> None:
+    file, code, expected = BREACHES[breach]
+    text = SOUND.get(file, '"""Another module."""').replace("from pbem.case import read\nimport pbem.errors\n", "")
+    faults = list_faults(make_tree(tmp_path, SOUND | {file: f"{text}\n{code}"}))
+    assert any(expected in fault for fault in faults), faults
+    assert all(file in fault or "cycle" in fault for fault in faults), faults
+
+
+def test_a_missing_module_docstring_is_found(tmp_path: Path) -> None:
+    faults = list_faults(make_tree(tmp_path, SOUND | {"mesh/mesh.py": "size = 1"}))
+    assert faults == [f"{tmp_path}/pbem/mesh/mesh.py:1: the module has no docstring"]

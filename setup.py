@@ -11,13 +11,15 @@ from setuptools import Extension, find_packages, setup
 
 # The parts of -ffast-math that let logarithm and arc tangent be vectorised. NaN and infinity keep their meaning, and
 # nothing of it reaches the linker, where -ffast-math would change the arithmetic of the whole process.
-# __FAST_MATH__ makes the C library declare its vector functions.
+# __FAST_MATH__ makes the C library declare its vector functions. With the limited range a complex product is four real
+# ones, without the test that tells infinity from NaN: 10 to 20 % of the time of the kernels.
 MATH_FLAGS = [
     "-fno-math-errno",
     "-fno-trapping-math",
     "-fassociative-math",
     "-fno-signed-zeros",
     "-freciprocal-math",
+    "-fcx-limited-range",
     "-D__FAST_MATH__",
 ]
 
@@ -34,7 +36,7 @@ def select_processor_flags() -> list[str]:
 setup(
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
     package_dir={"pbem.cases": "cases"},
-    package_data={"pbem.cases": ["*.toml"]},
+    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"]},
     ext_modules=[
         Extension(
             "pbem.bem._kernels",

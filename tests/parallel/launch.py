@@ -35,6 +35,8 @@ MPI_SETTINGS = {
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
     "MPLBACKEND": "Agg",
+    # As in pytest itself.
+    "PYTHONWARNINGS": "error",
 }
 
 # What the launcher of an outer MPI job leaves behind would be taken for our own.

@@ -14,5 +14,4 @@ export OMP_NUM_THREADS=1
 mkdir -p demo
 mpirun -n 2 .venv/bin/pbem run cases/two_blocks.toml -o demo/two_blocks.h5
 .venv/bin/pbem info demo/two_blocks.h5
-.venv/bin/pbem plot demo/two_blocks.h5 -o demo/two_blocks.png
-echo "picture: $root/demo/two_blocks.png"
+.venv/bin/pbem plot demo/two_blocks.h5 -o "$root/demo/two_blocks.png" # and says where the picture is

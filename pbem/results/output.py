@@ -1,4 +1,4 @@
-"""Where a result file may be written: checked before anything is computed."""
+"""Where a result file or a picture may be written: checked before anything is computed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 
 from pbem.errors import ResultFileError
+
+PICTURE_FORMATS = (".png", ".pdf", ".svg")
 
 
 def check_output_path(path: str | os.PathLike[str]) -> Path:
@@ -32,3 +34,10 @@ def check_output_path(path: str | os.PathLike[str]) -> Path:
     except OSError as error:
         raise ResultFileError(str(path), f"is there already and is not writable ({error.strerror})") from error
     return target
+
+
+def check_picture_path(path: str | os.PathLike[str]) -> Path:
+    """As `check_output_path`, for a picture; its ending says the format."""
+    if Path(path).suffix.lower() not in PICTURE_FORMATS:
+        raise ResultFileError(str(path), f"is no picture; its name should end with {', '.join(PICTURE_FORMATS)}")
+    return check_output_path(path)

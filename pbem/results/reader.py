@@ -169,6 +169,14 @@ class Results:
         with _open(self.path) as file:
             return file["fields/displacement"][range(len(self.steps))[step]]
 
+    def find_step(self, number: int) -> int:
+        """Where the load step of this number is stored. Raises ResultFileError if it is not."""
+        found = np.flatnonzero(self.steps.number == number)
+        if not len(found):
+            stored = ", ".join(map(str, self.steps.number[:20])) + (", ..." if len(self.steps) > 20 else "")
+            raise ResultFileError(str(self.path), f"holds no load step {number}; it holds: {stored or 'none'}")
+        return int(found[0])
+
     def _load(self, name: str) -> Real:
         with _open(self.path) as file:
             return _freeze(file[name][: len(self.steps)])

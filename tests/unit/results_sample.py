@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,15 +11,31 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.curve import Curve, Leg
 from pbem.model.material import Material
-from pbem.model.model import Analysis, Condition, Interface, Law, Loop, Model, Region, Side, SolverOptions, Stage
+from pbem.model.model import (
+    Analysis,
+    Condition,
+    Interface,
+    Law,
+    Loop,
+    Model,
+    Quantity,
+    Region,
+    Side,
+    SolverOptions,
+    Stage,
+)
 from pbem.solve.step import OPEN, SLIP, STICK, ContactState, Iteration, Step
 
 SOURCE = 'title = "Made-up blocks"\n'
 
 
 def polyline(name: str, *points: complex, elements: int = 6, refine: bool = False) -> Curve:
-    legs = [Leg(a, b, elements, refine, refine) for a, b in zip(points[:-1], points[1:], strict=True)]
+    legs = [Leg(a, b, elements, refine, refine) for a, b in pairwise(points)]
     return Curve(name, tuple(legs))
+
+
+def make_outline(*sides: str) -> Loop:
+    return Loop(tuple(Side(side.lstrip("-"), not side.startswith("-")) for side in sides), outer=True)
 
 
 def make_model(every: int = 1, source: str = SOURCE, cracks: int = 1) -> Model:
@@ -37,14 +54,14 @@ def make_model(every: int = 1, source: str = SOURCE, cracks: int = 1) -> Model:
         *(polyline(name, 0.3 + 0.3j + 0.05j * i, 1.5 + 0.01 * i + 0.6j + 0.01j * i) for i, name in enumerate(names)),
     ]
     soft, hard = Material("soft", 2e3, 0.3), Material("hard", 2e4, 0.2)
-    lower = Loop((Side("bottom", True), Side("right_lower", True), Side("joint", False), Side("left_lower", True)), True)
-    upper = Loop((Side("joint", True), Side("right_upper", True), Side("top", True), Side("left_upper", True)), True)
+    lower = make_outline("bottom", "right_lower", "-joint", "left_lower")
+    upper = make_outline("joint", "right_upper", "top", "left_upper")
     regions = (
         Region("lower", soft, (lower,), tuple(names)),
         Region("upper", hard, (upper, Loop((Side("hole", False),), False))),
     )
     outer = ["bottom", "right_lower", "left_lower", "right_upper", "top", "left_upper", "hole"]
-    held = ("displacement", "displacement")
+    held: tuple[Quantity, Quantity] = ("displacement", "displacement")
     conditions = {name: Condition(name) for name in outer} | {name: Condition(name, known=held) for name in outer[:1]}
     conditions["top"] = Condition("top", known=("traction", "displacement"))
     conditions["hole"] = Condition("hole", "local")
@@ -91,6 +108,6 @@ def make_step(mesh: Mesh, number: int, stage: int, factor: float, load: float) -
         traction_n=np.where(closed, -load * (4 - along), 0.0),
         traction_s=np.where(closed, load * (1 + 0.2 * along), 0.0),
     )
-    counts = [int((mode == which).sum()) for which in (STICK, SLIP, OPEN)]
-    iterations = tuple(Iteration(i + 1, 10.0 ** (-5 * i), 7 - 3 * i, *counts, seconds=0.01) for i in range(3))
+    stick, slip, parted = (int((mode == which).sum()) for which in (STICK, SLIP, OPEN))
+    iterations = tuple(Iteration(i + 1, 10.0 ** (-5 * i), 7 - 3 * i, stick, slip, parted, 0.01) for i in range(3))
     return Step(number, stage, factor, iterations, 1e-10, displacement, traction, contact)

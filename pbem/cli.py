@@ -1,0 +1,311 @@
+"""The command line: check, run, info, plot. Only `run` needs MPI and PETSc."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import difflib
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pbem import __version__
+from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
+
+if TYPE_CHECKING:
+    from pbem.results.reader import Steps
+    from pbem.solve.step import Reporter
+
+# numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
+# threads has to be set before.
+
+PREFIX = "-pbem_"
+UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
+COMMANDS = ("check", "run", "info", "plot")
+
+DESCRIPTION = """\
+Boundary elements for frictional contact in two-dimensional elasticity.
+
+  pbem check CASE            is the case right, and what will be computed?
+  pbem run CASE              compute; `pbem CASE` does the same
+  pbem info FILE.h5          what a result file holds
+  pbem plot FILE.h5          draw a result file
+
+CASE is a TOML file, or the name of a case that comes with the program.
+On several ranks: mpirun -n 4 pbem run CASE"""
+
+RUN_NOTES = """\
+PETSc: any option of PETSc's is taken with the prefix pbem_ and wins over the case's [petsc] table, e.g.
+  pbem run CASE -pbem_ksp_rtol 1e-10 -pbem_ksp_monitor
+
+exit code: 0 finished; 1 unexpected error; 2 the case or the command line is wrong, nothing was written;
+3 not converged at the smallest step, the file holds every step reached"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the program with the given arguments (default: those of the process); returns the exit code."""
+    rank, ranks = find_launch_rank()
+    if ranks > 1:
+        # One thread a rank, unless the user wants otherwise: the ranks are the threads.
+        os.environ.setdefault("OMP_NUM_THREADS", "1")
+    if rank > 0:
+        # What all ranks would say alike is said by the first.
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    petsc, plain = split_petsc_options(sys.argv[1:] if arguments is None else arguments)
+    code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank)
+    if code and rank > 0:
+        # A launcher that sees one rank end with an error ends the others: the first must have spoken by then.
+        time.sleep(1.0)
+    return code
+
+
+def _report_errors(action: Callable[[], int], rank: int) -> int:
+    """The exit code of the action, with what went wrong said once."""
+    try:
+        return action()
+    except KeyboardInterrupt:
+        _say("pbem: interrupted", rank)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of a pipe (`| head`) has gone; nothing is wrong.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except PbemError as error:
+        _say(f"pbem: {error}", rank)
+        return WRONG_INPUT
+    except Exception:
+        if rank > 0:
+            # If the first rank has failed in the same way, it has ended this one before the pause is over.
+            time.sleep(1.0)
+        _say(traceback.format_exc().rstrip(), 0)
+        return UNEXPECTED
+
+
+def find_launch_rank() -> tuple[int, int]:
+    """Rank and number of ranks as the launcher says, without starting MPI; (0, 1) outside of a launcher."""
+    for rank, ranks in (
+        ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"), ("MV2_COMM_WORLD_RANK",
+        "MV2_COMM_WORLD_SIZE"), ("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"),
+    ):
+        if os.environ.get(rank, "").isdigit() and os.environ.get(ranks, "").isdigit():
+            return int(os.environ[rank]), int(os.environ[ranks])
+    return 0, 1
+
+
+def split_petsc_options(arguments: Sequence[str]) -> tuple[dict[str, str], list[str]]:
+    """PETSc options without their prefix, and the other arguments.
+
+    An option's value is the next argument unless that is an option itself (a negative number is none) or a case file.
+    """
+    petsc: dict[str, str] = {}
+    plain: list[str] = []
+    waiting = list(arguments)
+    while waiting:
+        argument = waiting.pop(0)
+        if not argument.startswith(PREFIX):
+            plain.append(argument)
+            continue
+        name, equals, value = argument.removeprefix(PREFIX).partition("=")
+        if not equals and waiting and not _starts_an_option(waiting[0]):
+            value = waiting.pop(0)
+        petsc[name] = value
+    return petsc, plain
+
+
+def _starts_an_option(argument: str) -> bool:
+    if argument.endswith(".toml"):
+        return True
+    return argument.startswith("-") and not argument[1:2].isdigit() and argument[1:2] != "."
+
+
+def find_case(name: str) -> Path:
+    """The path of a case: a file, or the name of one that comes with the program (with or without .toml).
+
+    Raises CaseError if there is neither, with the names of those that there are.
+    """
+    if Path(name).is_file():
+        return Path(name)
+    bundled = list_bundled_cases()
+    stem = name.removesuffix(".toml")
+    if stem in bundled:
+        return bundled[stem]
+    near = difflib.get_close_matches(stem, bundled, n=1, cutoff=0.6)
+    hint = f" (did you mean '{near[0]}'?)" if near else ""
+    expected = f"a case file or one of the cases of the program: {', '.join(bundled)}" if bundled else "a case file"
+    raise CaseError(name, (Fault("CASE", f"'{name}', which is no file", expected + hint),))
+
+
+def list_bundled_cases() -> dict[str, Path]:
+    """The cases that come with the program, by name: in the package, or beside it in a checkout."""
+    package = Path(__file__).resolve().parent
+    for folder in (package / "cases", package.parent / "cases"):
+        cases = {path.stem: path for path in sorted(folder.glob("*.toml"))}
+        if cases:
+            return cases
+    return {}
+
+
+def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
+    if arguments and _names_a_case(arguments[0]):
+        arguments = ["run", *arguments]
+    parser = make_parser()
+    try:
+        with contextlib.redirect_stderr(sys.stderr if rank == 0 else sys.stdout):
+            options = parser.parse_args(arguments)
+        if petsc and options.command != "run":
+            parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run`")
+    except SystemExit as end:
+        return int(end.code or 0)
+    if options.command == "run":
+        return _run(options, petsc)
+    # The other commands are not parallel: under a launcher the first rank does them alone.
+    return options.action(options) if rank == 0 else 0
+
+
+def _names_a_case(argument: str) -> bool:
+    """Whether the first argument is a case, not a command, nor one with a slip of the pen."""
+    if argument.startswith("-") or argument in COMMANDS:
+        return False
+    return Path(argument).exists() or not difflib.get_close_matches(argument, COMMANDS, cutoff=0.7)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="pbem", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--version", action="version", version=f"pbem {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def add(name: str, action: Callable[[argparse.Namespace], int] | None, text: str, notes: str = "",
+            ) -> argparse.ArgumentParser:
+        command = commands.add_parser(
+            name, help=text, description=text, epilog=notes, formatter_class=argparse.RawDescriptionHelpFormatter
+        )
+        command.set_defaults(action=action)
+        return command
+
+    check = add("check", _check, "validate a case and tell what would be computed")
+    check.add_argument("case", metavar="CASE")
+    check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
+    run = add("run", None, "compute a case and write its results", RUN_NOTES)
+    run.add_argument("case", metavar="CASE")
+    run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
+    run.add_argument("--resume", action="store_true", help="go on after the last step that the result file holds")
+    run.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    info = add("info", _info, "tell what a result file holds")
+    info.add_argument("file", metavar="FILE.h5")
+    plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips")
+    plot.add_argument("file", metavar="FILE.h5")
+    plot.add_argument("-o", "--output", metavar="FILE.png", help="picture (default: beside the result file)")
+    plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
+    plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
+    return parser
+
+
+def _check(options: argparse.Namespace) -> int:
+    from pbem.case import read_case
+    from pbem.mesh.generate import generate_mesh
+    from pbem.model.build import build_model
+    from pbem.results.describe import describe_model
+    from pbem.results.output import check_picture_path
+
+    model = build_model(read_case(find_case(options.case)))
+    if options.plot:
+        check_picture_path(options.plot)
+    mesh = generate_mesh(model)
+    print(describe_model(model, mesh))
+    if options.plot:
+        from pbem.results.plots import plot_model
+
+        plot_model(model, mesh, options.plot)
+        print(f"\npicture: {options.plot}")
+    return 0
+
+
+def _info(options: argparse.Namespace) -> int:
+    from pbem.results.describe import describe_results
+    from pbem.results.reader import open_results
+
+    print(describe_results(open_results(options.file)))
+    return 0
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from pbem.results.output import check_picture_path
+    from pbem.results.plots import plot_results
+    from pbem.results.reader import open_results
+
+    results = open_results(options.file)
+    target = check_picture_path(options.output or Path(options.file).with_suffix(".png"))
+    step = -1 if options.step is None else results.find_step(options.step)
+    plot_results(results, target, step, options.magnify)
+    print(f"picture: {target}")
+    return 0
+
+
+def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
+    case = find_case(options.case)
+    target = Path(options.output or case.stem + ".h5")
+
+    from pbem.parallel import abort_if_unexpected, world
+    from pbem.run import run
+
+    reporter: Reporter | None = None
+    begun = time.perf_counter()
+    code = 0
+    try:
+        with abort_if_unexpected(world, PbemError):
+            reporter = _make_reporter(case, options.quiet) if world.rank == 0 else None
+        results = run(case, target, resume=options.resume, petsc=petsc, reporter=reporter)
+        if world.rank == 0 and not options.quiet:
+            _close(reporter)
+            _say_finished(results.steps, target, time.perf_counter() - begun)
+    except ConvergenceError as error:
+        _close(reporter)
+        _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)
+        code = NOT_CONVERGED
+    except KeyboardInterrupt:
+        _close(reporter)
+        _say(f"pbem: interrupted; if {target} was begun, --resume goes on after its last step", world.rank)
+        return INTERRUPTED
+    except PbemError as error:
+        _close(reporter)
+        _say(f"pbem: {error}", world.rank)
+        code = WRONG_INPUT
+    # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
+    world.Barrier()
+    return code
+
+
+def _make_reporter(case: Path, quiet: bool) -> Reporter | None:
+    """The progress needs the stages, and what is wrong with the case is better said by the run, on all ranks."""
+    from pbem.case import read_case
+    from pbem.model.build import build_model
+    from pbem.progress import make_reporter
+
+    try:
+        return make_reporter(build_model(read_case(case)).stages, quiet)
+    except PbemError:
+        return None
+
+
+def _say_finished(steps: Steps, target: Path, seconds: float) -> None:
+    number = int(steps.number[-1]) if len(steps) else 0
+    print(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}", flush=True)
+
+
+def _close(reporter: Reporter | None) -> None:
+    close = getattr(reporter, "close", None)
+    if close is not None:
+        close()
+
+
+def _say(text: str, rank: int) -> None:
+    """Print to standard error, on the first rank."""
+    if rank == 0:
+        sys.stdout.flush()
+        print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,223 @@
+"""Short texts about a model before it is computed and about a result file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from pbem.mesh.mesh import Mesh
+from pbem.model.curve import Curve
+from pbem.model.model import Condition, Law, Model, Region
+from pbem.results.reader import Contact, Results
+from pbem.solve.step import OPEN, SLIP, STICK
+
+MOST_ROWS = 40
+
+
+def describe_model(model: Model, mesh: Mesh) -> str:
+    """What `pbem check` prints: regions, curves with their grading, conditions, interfaces, size, notes."""
+    parts = [
+        model.title,
+        _section("regions", [_describe_region(region) for region in model.regions]),
+        _section("curves", _table(["curve", "legs", "elements", "length", "refined towards"],
+                                  [_curve_row(curve) for curve in model.curves.values()])),
+        _section("conditions", _table(["curve", *_direction_titles(model)],
+                                      [_condition_row(model, each) for each in model.conditions.values()])),
+        _section("interfaces", _table(["interface", "first side", "second side", "pairs", "law"],
+                                      _interface_rows(model, mesh))),
+        _section("load", [f"{stage.name}: {_count(stage.steps, 'step')}" for stage in model.stages]),
+        _section("size", _describe_size(model, mesh)),
+        _section("notes", _shorten([*model.notes, *mesh.notes])),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def describe_results(results: Results) -> str:
+    """What `pbem info` prints: where the file comes from, how far the run got, and the last step in numbers."""
+    k = len(results.steps)
+    units = f"length {results.units.length or '-'}, stress {results.units.stress or '-'}"
+    elements = len(results.elements.vertices)
+    lines = [
+        ("title", results.title),
+        ("status", results.status + (f" ({results.failure})" if results.failure else "")),
+        ("written by", f"pbem {results.pbem_version}, PETSc {results.petsc_version}, "
+                       f"{_count(results.ranks, 'rank')}"),
+        ("units", units),
+        ("size", f"{len(results.nodes.position)} nodes, {elements} elements, "
+                 f"{_count(len(results.contact), 'interface')}, {_count(len(results.reactions), 'outer curve')}"),
+        ("steps stored", _describe_steps(results)),
+        ("iterations", _describe_iterations(results)),
+    ]
+    parts = ["\n".join(f"{key + ':':14s}{value}" for key, value in lines)]
+    if k:
+        parts.append(_section("contact at the last step", _table(
+            ["interface", "pairs", "stick", "slip", "open", "max opening", "max |slip|"],
+            [_contact_row(each) for each in _first(results.contact.values())]) + _left_out(len(results.contact))))
+        parts.append(_section("reactions at the last step", _table(
+            ["curve", "x", "y"],
+            [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
+    return "\n\n".join(part for part in parts if part)
+
+
+def estimate_memory(model: Model, mesh: Mesh) -> tuple[float, float]:
+    """Bytes of the operator B = [H, -G] and of the tangent operator K, over all ranks.
+
+    B is dense per region; a crack's nodes have no columns in G. K is dense with one region, and with several it is
+    stored by rows with the unknowns of both sides where an interface meets the region (4 bytes an index more).
+    """
+    nodes = np.bincount(mesh.node_region, minlength=len(model.regions)).astype(float)
+    cracks = np.bincount(mesh.node_region[mesh.node_crack], minlength=len(model.regions))
+    shared = np.zeros(mesh.nodes, dtype=bool)
+    shared[mesh.pairs.first[~mesh.pairs.crack]] = True
+    shared[mesh.pairs.second[~mesh.pairs.crack]] = True
+    interface = np.bincount(mesh.node_region[shared], minlength=len(model.regions))
+    operator = 8.0 * float((2 * nodes * (4 * nodes - 2 * cracks)).sum())
+    entries = float((2 * nodes * (2 * nodes + 2 * interface)).sum())
+    return operator, 8.0 * entries if len(model.regions) == 1 else 12.0 * entries
+
+
+def _describe_region(region: Region) -> str:
+    material = region.material
+    loops = [
+        ("outer loop: " if loop.outer else "inner loop: ")
+        + ", ".join(side.curve if side.forward else f"{side.curve} (reversed)" for side in loop.sides)
+        for loop in region.loops
+    ]
+    cracks = [f"cracks: {', '.join(_shorten(region.cracks, 12))}"] if region.cracks else []
+    kind = "infinite region" if region.infinite else "region"
+    head = (f"{kind} {region.name}: {material.name}, Young's modulus {material.young:g}, "
+            f"Poisson's ratio {material.poisson:g}, plane {material.plane}")
+    return "\n    ".join([head, *_shorten(loops), *cracks])
+
+
+def _curve_row(curve: Curve) -> list[str]:
+    ends = {(False, False): "none", (True, False): "start", (False, True): "end", (True, True): "both"}
+    refined = [ends[leg.refine_start, leg.refine_end] for leg in curve.legs]
+    power = sorted({f"{leg.power:g}" for leg in curve.legs if leg.refine_start or leg.refine_end})
+    text = refined[0] if len(set(refined)) == 1 else ", ".join(_shorten(refined, 8))
+    return [curve.name, str(len(curve.legs)), str(sum(leg.elements for leg in curve.legs)), f"{curve.length:.4g}",
+            text + (f" (power {'/'.join(power)})" if power else "")]
+
+
+def _direction_titles(model: Model) -> list[str]:
+    frames = {condition.frame for condition in model.conditions.values()}
+    return ["x", "y"] if frames <= {"global"} else ["x or normal", "y or tangential"]
+
+
+def _condition_row(model: Model, condition: Condition) -> list[str]:
+    """What is prescribed: one value if it is the same at the end of every stage, else the values in turn."""
+    names = ("n", "s") if condition.frame == "local" else ("x", "y")
+    values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
+    if condition.known == ("traction", "traction") and not any(map(any, values)):
+        return [condition.curve, "free", "free"]
+    row = [condition.curve]
+    for i, quantity in enumerate(condition.known):
+        given = [f"{value[i]:g}" for value in values]
+        given = given[:1] if len(set(given)) == 1 else _shorten(given, 6)
+        row.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}")
+    return row
+
+
+def _interface_rows(model: Model, mesh: Mesh) -> list[list[str]]:
+    pairs = np.bincount(mesh.pairs.interface, minlength=len(mesh.interface_names))
+    return [[each.name, each.first, each.second or "(crack)", str(pairs[mesh.interface_names.index(each.name)]),
+             describe_law(each.law)] for each in model.interfaces.values()]
+
+
+def describe_law(law: Law) -> str:
+    """The kind of the law with every strength that is not zero."""
+    if law.kind != "coulomb":
+        return law.kind
+    strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
+    given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
+    return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
+
+
+def _describe_size(model: Model, mesh: Mesh) -> list[str]:
+    operator, tangent = estimate_memory(model, mesh)
+    dense = "dense" if len(model.regions) == 1 else "sparse, by regions"
+    return [
+        f"{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, {2 * mesh.nodes} unknowns, "
+        f"{mesh.pairs.count} contact pairs, scheme {model.analysis.scheme}",
+        f"memory over all ranks: operator {_bytes(operator)}, tangent operator ({dense}) {_bytes(tangent)}, "
+        "and its factors once more or a few times that",
+    ]
+
+
+def _describe_steps(results: Results) -> str:
+    steps = results.steps
+    if not len(steps):
+        return "none"
+    stage = int(steps.stage[-1])
+    name = steps.stage_names[stage] if stage < len(steps.stage_names) else str(stage)
+    return f"{len(steps)} (last: number {steps.number[-1]}, stage {name}, factor {steps.factor[-1]:.6g})"
+
+
+def _describe_iterations(results: Results) -> str:
+    table = results.convergence
+    if not len(table):
+        return "none"
+    each = np.unique(table["step"], return_counts=True)[1]
+    return (f"{len(table)} in {_count(len(each), 'step')} ({each.mean():.1f} a step, at most {each.max()}), "
+            f"{table['seconds'].sum():.3g} s")
+
+
+def _contact_row(contact: Contact) -> list[str]:
+    mode = contact.mode[-1]
+    counts = [str(int((mode == which).sum())) for which in (STICK, SLIP, OPEN)]
+    return [contact.name, str(contact.pairs), *counts, _number(contact.opening[-1].max()),
+            _number(np.abs(contact.slip[-1]).max())]
+
+
+def _section(title: str, lines: Iterable[str]) -> str:
+    listed = list(lines)
+    return "\n".join([title, *(f"  {line}" for line in listed)]) if listed else ""
+
+
+def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Aligned lines, numbers to the right; at most MOST_ROWS of them."""
+    if not rows:
+        return []
+    shown = [titles, *rows[:MOST_ROWS]]
+    widths = [max(len(row[i]) for row in shown) for i in range(len(titles))]
+    right = [all(_is_number(row[i]) for row in rows) for i in range(len(titles))]
+    lines = ["  ".join(cell.rjust(width) if flush else cell.ljust(width)
+                       for cell, width, flush in zip(row, widths, right, strict=True)).rstrip() for row in shown]
+    return lines + _left_out(len(rows))
+
+
+def _left_out(count: int) -> list[str]:
+    return [f"... and {count - MOST_ROWS} more"] if count > MOST_ROWS else []
+
+
+def _first(items: Iterable[Contact]) -> list[Contact]:
+    return [item for item, _ in zip(items, range(MOST_ROWS), strict=False)]
+
+
+def _shorten(texts: Sequence[str], most: int = MOST_ROWS) -> list[str]:
+    return [*texts[:most], *([f"... and {len(texts) - most} more"] if len(texts) > most else [])]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(value: float) -> str:
+    return f"{value:.5g}"
+
+
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def _bytes(size: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"

@@ -75,7 +75,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Curve:
-    """A named chain of legs, each starting where the one before ends; `closed` if the last ends where the first starts."""
+    """A named chain of legs, each starting where the one before ends; `closed` if it ends where it starts."""
 
     name: str
     legs: tuple[Leg, ...]

@@ -22,7 +22,7 @@ class Side:
 
 @dataclass(frozen=True)
 class Loop:
-    """A closed chain of sides, travelled with the region on the left. `outer`: counter-clockwise, encloses the region."""
+    """A closed chain of sides, travelled with the region on the left. `outer`: counter-clockwise, around the region."""
 
     sides: tuple[Side, ...]
     outer: bool

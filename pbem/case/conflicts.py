@@ -1,0 +1,163 @@
+"""Rules on several keys of one table, checked on the file's own tables whatever else is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pbem.case.finding import Finding, show
+from pbem.case.places import Loc
+
+GLOBAL_KEYS = ("ux", "uy", "tx", "ty")
+LOCAL_KEYS = ("un", "us", "tn", "ts", "pressure")
+# Pairs of keys that both say what happens in one direction.
+EXCLUSIVE = (
+    ("ux", "tx"), ("uy", "ty"), ("un", "tn"), ("us", "ts"),
+    ("un", "pressure"), ("us", "pressure"), ("tn", "pressure"), ("ts", "pressure"),
+)
+ONE_FAMILY = f"either global ({', '.join(GLOBAL_KEYS)}) or local ({', '.join(LOCAL_KEYS)}) conditions on one curve"
+
+
+def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
+    """Every rule broken by keys that are each right by themselves."""
+    findings: list[Finding] = []
+    for loc, table in _tables(raw, ("curves",)):
+        findings += _check_curve(loc, table)
+    for loc, table in _tables(raw, ("regions",)):
+        findings += _check_region(loc, table)
+    for loc, table in _tables(raw, ("boundary",)):
+        findings += _check_condition(loc, table)
+    for name in ("interfaces", "contacts"):
+        for loc, table in _tables(raw, (name,)):
+            findings += _check_law(loc, table)
+    findings += _check_stages(raw)
+    findings += _check_options(raw)
+    for name in ("materials", "curves", "regions"):
+        findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc)]
+    return findings
+
+
+def _tables(parent: Mapping[str, Any], loc: Loc) -> Iterator[tuple[Loc, Mapping[str, Any]]]:
+    """The tables of a table of tables, past anything that is none (the schema reports that)."""
+    entries = parent.get(str(loc[-1]))
+    if isinstance(entries, dict):
+        for name, table in entries.items():
+            if isinstance(table, dict):
+                yield (*loc, name), table
+
+
+def _check_name(loc: Loc) -> list[Finding]:
+    name = str(loc[-1])
+    if name.strip() == name and name not in ("", ".", "..") and "/" not in name and name.isprintable():
+        return []
+    expected = "a name of printable characters without '/' and without spaces around it"
+    return [Finding(loc, f"the name {show(name)}", expected)]
+
+
+def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    findings = []
+    shapes = "points, or center and radius (with angles for an arc), or expression"
+    given = [key for key in ("points", "center", "expression") if key in table]
+    if len(given) != 1 and not (not given and ("radius" in table or "angles" in table)):
+        found = "no shape" if not given else " and ".join(given)
+        findings.append(Finding(loc, found, f"one shape: {shapes}"))
+    elif not given or "center" in given:
+        findings += [
+            Finding(loc, f"no {key}", "center and radius, and angles for an arc")
+            for key in ("center", "radius") if key not in table
+        ]
+    else:
+        findings += [
+            Finding((*loc, key), f"{key} with {given[0]}", f"one shape: {shapes}")
+            for key in ("radius", "angles") if key in table
+        ]
+    if "elements" in table and "size" in table:
+        findings.append(Finding((*loc, "size"), "both elements and size", "only one of them"))
+    elif "elements" not in table and "size" not in table:
+        findings.append(Finding(loc, "neither elements nor size", "elements = a number, or size = a length"))
+    return findings + _check_shape(loc, table)
+
+
+def _check_shape(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    findings = []
+    points, elements, angles = table.get("points"), table.get("elements"), table.get("angles")
+    if isinstance(elements, list) and elements:
+        if isinstance(points, list) and len(points) >= 2 and len(elements) != len(points) - 1:
+            found = f"{len(elements)} numbers of elements for {len(points) - 1} legs"
+            findings.append(Finding((*loc, "elements"), found, "one number for each leg, or one total"))
+        if "center" in table and len(elements) != 1:
+            found = f"{len(elements)} numbers of elements"
+            findings.append(Finding((*loc, "elements"), found, "one number: a circle or an arc is one leg"))
+    if isinstance(elements, int) and isinstance(points, list) and 0 < elements < len(points) - 1:
+        found = f"{elements} elements for {len(points) - 1} legs"
+        findings.append(Finding((*loc, "elements"), found, "at least one element for each leg"))
+    if isinstance(angles, list) and len(angles) == 2 and all(type(angle) in (int, float) for angle in angles):
+        sweep = abs(angles[1] - angles[0])
+        if sweep == 0 or sweep > 360:
+            found = f"an arc of {sweep:g} degrees"
+            findings.append(Finding((*loc, "angles"), found, "two angles that differ by more than 0 and at most 360"))
+    return findings
+
+
+def _check_region(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    if table.get("infinite") is True or table.get("boundary"):
+        return []
+    expected = "boundary = [...], the names of the curves around the region"
+    return [Finding((*loc, "boundary") if "boundary" in table else loc, "no boundary", expected)]
+
+
+def _check_condition(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    findings = [
+        Finding((*loc, second), f"both {first} and {second}", "one condition in one direction")
+        for first, second in EXCLUSIVE if first in table and second in table
+    ]
+    in_axes = [key for key in GLOBAL_KEYS if key in table]
+    local = [key for key in LOCAL_KEYS if key in table]
+    if in_axes and local:
+        findings.append(Finding((*loc, local[0]), f"{in_axes[0]} together with {local[0]}", ONE_FAMILY))
+    return findings
+
+
+def _check_law(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    findings = []
+    if "friction" in table and "friction_angle" in table:
+        findings.append(Finding((*loc, "friction_angle"), "both friction and friction_angle", "only one of them"))
+    if ("friction_dynamic" in table) != ("slip_distance" in table):
+        given = "friction_dynamic" if "friction_dynamic" in table else "slip_distance"
+        findings.append(Finding((*loc, given), f"only {given}", "friction_dynamic and slip_distance together"))
+    if table.get("law") == "frictionless":
+        findings += [
+            Finding((*loc, key), f"{key} = {show(table[key])} with law \"frictionless\"", 'law = "coulomb", or 0')
+            for key in ("friction", "friction_angle", "cohesion") if table.get(key)
+        ]
+    return findings
+
+
+def _check_stages(raw: Mapping[str, Any]) -> list[Finding]:
+    stages = raw.get("stages")
+    if not isinstance(stages, list):
+        return []
+    findings: list[Finding] = []
+    names: dict[str, int] = {}
+    for number, stage in enumerate(stages):
+        if not isinstance(stage, dict):
+            continue
+        for loc, table in _tables(stage, ("stages", number, "boundary")):
+            findings += _check_condition(loc, table)
+        name = stage.get("name")
+        if isinstance(name, str) and name in names:
+            found = f"the name {show(name)} of stage {names[name] + 1} again"
+            findings.append(Finding(("stages", number, "name"), found, "a name of its own for each stage"))
+        elif isinstance(name, str):
+            names[name] = number
+    return findings
+
+
+def _check_options(raw: Mapping[str, Any]) -> list[Finding]:
+    options = raw.get("petsc")
+    expected = "the option's name without the leading dash, without spaces"
+    names: Sequence[str] = list(options) if isinstance(options, dict) else []
+    return [
+        Finding(("petsc", name), f"the option {show(name)}", expected)
+        for name in names if name.startswith("-") or not name or any(c.isspace() for c in name)
+    ]

@@ -1,0 +1,51 @@
+"""A fault before it has its line number."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from pbem.case.places import Loc
+
+
+@dataclass(frozen=True)
+class Finding:
+    """loc: path of the key (list entries from 0); found and expected as in `pbem.errors.Fault`."""
+
+    loc: Loc
+    found: str
+    expected: str
+
+
+def show(value: object) -> str:
+    """A value in the file's notation, shortened."""
+    if isinstance(value, bool):
+        text = "true" if value else "false"
+    elif isinstance(value, str):
+        text = f'"{value}"'
+    elif isinstance(value, (list, tuple)):
+        text = "[" + ", ".join(show(entry) for entry in value[:6]) + (", ..." if len(value) > 6 else "") + "]"
+    elif isinstance(value, dict):
+        text = "a table" if value else "an empty table"
+    else:
+        text = _show_plain(value)
+    return text if len(text) <= 80 else text[:76] + " ..."
+
+
+def _show_plain(value: object) -> str:
+    if isinstance(value, int) and abs(value) > 10**30:
+        return "a number of more than 30 digits"
+    return str(value) if isinstance(value, (int, float)) else f"{value} (a date or time)"
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """``; did you mean 'friction'?`` or nothing."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def list_names(names: Iterable[str], most: int = 20) -> str:
+    """Names for a message, shortened."""
+    listed = list(names)
+    return ", ".join(listed[:most]) + (", ..." if len(listed) > most else "")

@@ -1,0 +1,230 @@
+"""The tables and keys of a case file, with their types, ranges and defaults (the meaning is in the descriptions).
+
+What involves several keys at once (two conditions in one direction, friction and friction_angle, ...) is checked on
+the file's own tables in `pbem.case.conflicts`, so that one wrong value does not hide other faults of the same table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+MOST_ELEMENTS = 100_000
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _check_number(value: object) -> object:
+    """An integer of any length passes pydantic's float; one too long for a float is no number to compute with."""
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**300:
+        raise PydanticCustomError("expected", "{expected}", {"expected": "a number of at most 300 digits"})
+    return value
+
+
+def _check_elements(value: object) -> object:
+    """One error in place of one for each member of the union int | list of int."""
+    counts = value if isinstance(value, list) else [value]
+    expected = f"a whole number from 1 to {MOST_ELEMENTS}, or a list with one such number for each leg"
+    if not counts:
+        raise PydanticCustomError("expected", "{expected}", {"expected": expected})
+    for count in counts:
+        if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= MOST_ELEMENTS:
+            raise PydanticCustomError("expected", "{expected}", {"expected": expected})
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _check_gap(value: object) -> object:
+    if isinstance(value, dict):
+        return value
+    if not _is_number(value) or not 0 <= value < float("inf"):  # type: ignore[operator]
+        expected = "a finite number >= 0, or { expression = \"...\" }"
+        raise PydanticCustomError("expected", "{expected}", {"expected": expected})
+    return value
+
+
+def _check_option(value: object) -> object:
+    """A PETSc option's value; the library takes text only."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int):
+        return str(value)
+    if isinstance(value, float) and abs(value) < float("inf"):
+        return repr(value)
+    raise PydanticCustomError("expected", "{expected}", {"expected": "a text, a finite number, true or false"})
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_check_number)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+Text = Annotated[str, Field(strict=True)]
+Flag = Annotated[bool, Field(strict=True)]
+Point = tuple[Number, Number]
+Elements = Annotated[int | tuple[int, ...], BeforeValidator(_check_elements)]
+
+
+class Table(BaseModel):
+    """A table of the case file: frozen, and without keys beyond its own."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class UnitsTable(Table):
+    length: Text = Field("", description="label of the unit of length")
+    stress: Text = Field("", description="label of the unit of stress")
+
+
+class MaterialTable(Table):
+    young: Positive = Field(description="Young's modulus, stress")
+    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
+    plane: Literal["strain", "stress"] = "strain"
+    density: NotNegative = Field(0.0, description="mass per volume, used with [gravity]")
+
+
+class CurveTable(Table):
+    points: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(None, description="vertices of a polyline")
+    center: Point | None = Field(None, description="center of a circle or arc")
+    radius: Positive | None = Field(None, description="radius of a circle or arc, length")
+    angles: tuple[Number, Number] | None = Field(
+        None, description="degrees at which an arc starts and ends; counter-clockwise if the second is larger"
+    )
+    expression: tuple[Text, Text] | None = Field(None, description="x and y as functions of t from 0 to 1")
+    elements: Elements | None = Field(None, description="number of elements: a total, or one number for each leg")
+    size: Positive | None = Field(None, description="target length of an element, in place of `elements`")
+    grading: Literal["auto", "start", "end", "both", "none"] = "auto"
+    power: Annotated[Number, Field(ge=1, le=10)] = Field(3.0, description="element ends at t^power from a refined end")
+
+
+class RegionTable(Table):
+    material: Text
+    boundary: tuple[Text, ...] = Field((), description="names of the curves that bound the region, in any order")
+    cracks: tuple[Text, ...] = Field((), description="names of curves inside the region, two faces each")
+    infinite: Flag = Field(False, description="the region is the outside of its loops")
+
+
+class SpringTable(Table):
+    kn: NotNegative = 0.0
+    ks: NotNegative = 0.0
+
+
+class ConditionTable(Table):
+    """Displacement or traction in two directions; what is not given is free of traction."""
+
+    ux: Number | None = None
+    uy: Number | None = None
+    tx: Number | None = None
+    ty: Number | None = None
+    un: Number | None = Field(None, description="displacement along the outward normal")
+    us: Number | None = Field(None, description="displacement along the normal turned by +90 degrees")
+    tn: Number | None = None
+    ts: Number | None = None
+    pressure: Number | None = Field(None, description="tn = -pressure, ts = 0")
+    spring: SpringTable | None = None
+
+
+class ExpressionTable(Table):
+    expression: Text
+
+
+class LawTable(Table):
+    """What the two faces of an interface, crack or contact do. Strengths and pressure are stresses."""
+
+    law: Literal["bonded", "coulomb", "open", "frictionless"] | None = None
+    friction: NotNegative | None = Field(None, description="friction coefficient")
+    friction_angle: Annotated[Number, Field(ge=0, lt=90)] | None = Field(None, description="degrees")
+    cohesion: NotNegative = 0.0
+    tensile_strength: NotNegative = Field(0.0, description="normal tension carried before the faces part")
+    cohesion_lost: Flag = False
+    friction_dynamic: NotNegative | None = None
+    slip_distance: Positive | None = None
+    normal_stiffness: Positive | None = None
+    tangential_stiffness: Positive | None = None
+    gap: Annotated[float | ExpressionTable, BeforeValidator(_check_gap)] = Field(0.0, description="initial opening")
+    pressure: Number = Field(0.0, description="fluid pressure on the open faces")
+    pressurised: Literal["open", "all"] = "open"
+
+
+class ContactTable(LawTable):
+    between: tuple[Text, Text]
+
+
+class StressTable(Table):
+    sxx: Number = 0.0
+    syy: Number = 0.0
+    sxy: Number = 0.0
+
+
+class GravityTable(Table):
+    gx: Number = 0.0
+    gy: Number = 0.0
+
+
+class AnalysisTable(Table):
+    scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
+    order: Annotated[int, Field(strict=True, ge=0, le=3)] = 2
+    tips: Flag | None = Field(None, description="crack-tip elements with the square-root shape")
+    steps: Count = Field(10, description="load steps; ignored when [[stages]] is given")
+
+
+class StageInterfaceTable(Table):
+    pressure: Number
+
+
+class StageTable(Table):
+    name: Text | None = None
+    steps: Count = 10
+    boundary: Mapping[str, ConditionTable] = {}
+    interfaces: Mapping[str, StageInterfaceTable] = {}
+    remote: StressTable | None = None
+    gravity: GravityTable | None = None
+
+
+class SolverTable(Table):
+    linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
+    newton_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    newton_max_iterations: Count = 50
+    min_step: Annotated[Number, Field(gt=0, le=1)] = 1e-4
+
+
+class InteriorTable(Table):
+    box: tuple[Number, Number, Number, Number] = Field(description="x and y of two opposite corners")
+    shape: tuple[Count, Count] = Field(description="numbers of points along x and y")
+
+
+class OutputTable(Table):
+    interior: InteriorTable | None = None
+    points: tuple[Point, ...] = ()
+    every: Count = Field(1, description="every n-th load step is stored, and the last of each stage")
+
+
+class CaseFile(Table):
+    """All tables of a case file."""
+
+    title: Text = ""
+    units: UnitsTable = UnitsTable()
+    materials: Annotated[Mapping[str, MaterialTable], Field(min_length=1)]
+    curves: Annotated[Mapping[str, CurveTable], Field(min_length=1)]
+    regions: Annotated[Mapping[str, RegionTable], Field(min_length=1)]
+    boundary: Mapping[str, ConditionTable] = {}
+    interfaces: Mapping[str, LawTable] = {}
+    contacts: Mapping[str, ContactTable] = {}
+    remote: StressTable | None = None
+    gravity: GravityTable | None = None
+    initial_stress: Mapping[str, StressTable] = {}
+    analysis: AnalysisTable = AnalysisTable()
+    stages: tuple[StageTable, ...] = ()
+    solver: SolverTable = SolverTable()
+    petsc: Mapping[str, Annotated[str, BeforeValidator(_check_option)]] = {}
+    output: OutputTable = OutputTable()
+
+
+def json_schema() -> dict[str, Any]:
+    """The schema of a case file as JSON Schema, for editors that complete and check TOML."""
+    return CaseFile.model_json_schema()

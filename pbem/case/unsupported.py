@@ -1,0 +1,86 @@
+"""Keys of the case file that the program knows and cannot compute yet; each is lifted by removing its line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pbem.case.finding import Finding
+from pbem.case.places import Loc
+
+# Crack-tip elements if the file does not say.
+TIPS_BY_DEFAULT = False
+# Finite bodies under balanced tractions alone (their rigid motion has to be fixed by the solver).
+FREE_BODIES = False
+
+
+def _given(value: object) -> bool:
+    return True
+
+
+def _true(value: object) -> bool:
+    return value is True
+
+
+def _table(value: object) -> bool:
+    return isinstance(value, dict)
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A key (``*`` stands for any name) that is refused when its value is as `when` says.
+
+    separable: the rest of the file can be judged as if the key were not there.
+    """
+
+    path: str
+    what: str
+    when: Callable[[object], bool] = _given
+    separable: bool = True
+
+
+REFUSALS = (
+    Refusal("regions.*.infinite", "an infinite region", _true, separable=False),
+    Refusal("remote", "remote stress"),
+    Refusal("gravity", "gravity"),
+    Refusal("initial_stress", "initial stress"),
+    Refusal("contacts", "contact between different curves", separable=False),
+    Refusal("curves.*.expression", "a curve given by an expression", separable=False),
+    Refusal("boundary.*.spring", "a spring support", separable=False),
+    Refusal("interfaces.*.gap", "a gap given by an expression", _table),
+    Refusal("interfaces.*.cohesion_lost", "a bond that is lost", _true),
+    Refusal("interfaces.*.friction_dynamic", "slip-weakening friction"),
+    Refusal("interfaces.*.slip_distance", "slip-weakening friction"),
+    Refusal("interfaces.*.normal_stiffness", "an elastic joint"),
+    Refusal("interfaces.*.tangential_stiffness", "an elastic joint"),
+    Refusal("analysis.tips", "crack-tip elements", _true),
+    Refusal("stages.*.remote", "remote stress"),
+    Refusal("stages.*.gravity", "gravity"),
+    Refusal("stages.*.boundary.*.spring", "a spring support", separable=False),
+    Refusal("output.interior", "output at interior points"),
+    Refusal("output.points", "output at interior points"),
+)
+
+
+def find_refusals(raw: Mapping[str, Any]) -> list[tuple[Refusal, Finding]]:
+    """One finding for every key of the file that is not yet supported."""
+    return [
+        (refusal, Finding(loc, refusal.what, f"a file without `{loc[-1]}` here: not yet supported"))
+        for refusal in REFUSALS
+        for loc, value in _match(raw, refusal.path.split("."), ())
+        if refusal.when(value)
+    ]
+
+
+def _match(value: Any, path: list[str], loc: Loc) -> Iterator[tuple[Loc, Any]]:
+    if not path:
+        yield loc, value
+        return
+    entries: list[tuple[str | int, Any]] = []
+    if isinstance(value, dict):
+        entries = [(key, entry) for key, entry in value.items() if path[0] in ("*", key)]
+    elif isinstance(value, list) and path[0] == "*":
+        entries = list(enumerate(value))
+    for key, entry in entries:
+        yield from _match(entry, path[1:], (*loc, key))

@@ -1,0 +1,134 @@
+"""From the case file to the model: every name resolved, every loop closed, every fault found."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pbem.case import Case, read_draft
+from pbem.case.finding import list_names
+from pbem.case.unsupported import TIPS_BY_DEFAULT
+from pbem.errors import CaseError, Fault
+from pbem.model.crack import check_closing, check_inside, find_tips
+from pbem.model.curve import Curve
+from pbem.model.grading import grade_curves
+from pbem.model.junction import find_crossings, split_at_junctions
+from pbem.model.loading import Loading, read_loading
+from pbem.model.loop import Loops, find_loops, find_overlaps
+from pbem.model.material import Material
+from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.roles import Roles, resolve_roles
+from pbem.model.shape import shape_curves
+from pbem.model.support import find_free_motions
+
+
+@dataclass(frozen=True)
+class _Topology:
+    curves: Mapping[str, Curve]
+    breaks: Mapping[str, tuple[complex, ...]]
+    loops: Loops
+    tips: Mapping[str, tuple[bool, bool]]
+    size: float
+    notes: tuple[str, ...]
+    faults: tuple[Fault, ...]
+
+
+def build_model(case: Case) -> Model:
+    """Resolve and check a case. Raises CaseError with every fault of names, topology, laws, loads and support."""
+    model, faults = _examine(case, conditions_known=True)
+    if model is None or faults:
+        raise CaseError(case.source, tuple(faults))
+    return model
+
+
+def read_model(path: str | Path) -> tuple[Case, Model]:
+    """`read_case` and `build_model` in one: raises CaseError with the faults of both together."""
+    draft = read_draft(path)
+    model, faults = _examine(draft.case, draft.conditions_known) if draft.case else (None, [])
+    faults = [*draft.faults, *faults]
+    if draft.case is None or model is None or faults:
+        raise CaseError(str(path), tuple(faults))
+    return draft.case, model
+
+
+def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:
+    roles = resolve_roles(case)
+    loading = read_loading(case, roles)
+    topology = _find_topology(case, roles)
+    faults = [*roles.faults, *topology.faults, *loading.faults]
+    if faults:
+        return None, faults
+    model = _compose(case, roles, loading, topology)
+    return model, _check_support(case, model) if conditions_known else []
+
+
+def _find_topology(case: Case, roles: Roles) -> _Topology:
+    shapes = shape_curves(case)
+    split = split_at_junctions(shapes.curves, shapes.tolerance)
+    curves = split.curves
+    cracks = {name: region for name, region in roles.cracks.items() if name in curves}
+    crossings = find_crossings(case, curves, cracks, shapes.tolerance)
+    loops, wrong = find_loops(case, curves, shapes.tolerance, check_nesting=not crossings)
+    faults = [*shapes.faults, *crossings, *wrong]
+    notes = list(split.notes)
+    if not crossings:
+        faults += find_overlaps(case, curves, loops)
+        faults += check_inside(case, curves, cracks, loops)
+        closing, cuts = check_closing(case, curves, cracks, loops)
+        faults += closing
+        notes += cuts
+    tips = find_tips(curves, cracks)
+    return _Topology(curves, split.breaks, loops, tips, shapes.size, tuple(notes), tuple(faults))
+
+
+def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> Model:
+    tip_shape = TIPS_BY_DEFAULT if case.analysis.tips is None else case.analysis.tips
+    behaviour: dict[str, Hashable] = {
+        name: (roles.outer[name], condition.frame, condition.known) for name, condition in loading.conditions.items()
+    }
+    behaviour |= {
+        name: (interface.first, interface.second, interface.law) for name, interface in loading.interfaces.items()
+    }
+    with_tips = frozenset(roles.cracks) if tip_shape else frozenset()
+    curves, grading = grade_curves(case, topology.curves, topology.breaks, behaviour, with_tips)
+    materials = {
+        name: Material(name, table.young, table.poisson, table.plane, table.density)
+        for name, table in case.materials.items()
+    }
+    regions = tuple(
+        Region(name, materials[table.material], topology.loops[name], tuple(table.cracks))
+        for name, table in case.regions.items()
+    )
+    return Model(
+        title=case.title, units_length=case.units.length, units_stress=case.units.stress, source=case.text,
+        regions=regions, curves=curves, interfaces=loading.interfaces, conditions=loading.conditions,
+        crack_tips=topology.tips, stages=loading.stages,
+        analysis=Analysis(case.analysis.scheme, case.analysis.order, tip_shape),
+        solver=SolverOptions(
+            case.solver.linear, case.solver.newton_tolerance, case.solver.newton_max_iterations, case.solver.min_step,
+            dict(case.petsc),
+        ),
+        output_every=case.output.every, size=topology.size,
+        notes=(*topology.notes, *grading, *_note_choices(case, roles)),
+    )
+
+
+def _note_choices(case: Case, roles: Roles) -> list[str]:
+    notes = []
+    used = {table.material for table in case.regions.values()}
+    unused = [f"'{name}'" for name in case.materials if name not in used]
+    if unused:
+        notes.append(f"Materials that no region uses: {list_names(unused)}.")
+    if roles.cracks and case.analysis.tips is None and not TIPS_BY_DEFAULT:
+        notes.append("Crack tips have ordinary elements (tips = false), as the file does not say.")
+    return notes
+
+
+def _check_support(case: Case, model: Model) -> list[Fault]:
+    """Every body must be held by displacement conditions or by neighbours that are held."""
+    expected = "displacement conditions, or bonded or touching neighbours, that prevent it"
+    return [
+        case.fault(("regions", motion.regions[0]), f"a free rigid motion: {motion.text}", expected)
+        for motion in find_free_motions(model)
+    ]

@@ -1,0 +1,98 @@
+"""Cracks: inside their region, meeting other curves with their ends only, and which of their ends are tips."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+
+from pbem.case import Case
+from pbem.errors import Fault
+from pbem.model.curve import Curve
+from pbem.model.intersection import inner_points, winding_number
+from pbem.model.junction import format_point
+from pbem.model.loop import Loops, loop_legs
+from pbem.model.model import Loop
+
+
+class _Groups:
+    """Points joined into groups (disjoint sets)."""
+
+    def __init__(self) -> None:
+        self.parent: dict[complex, complex] = {}
+
+    def find(self, point: complex) -> complex:
+        self.parent.setdefault(point, point)
+        while self.parent[point] != point:
+            self.parent[point] = self.parent[self.parent[point]]
+            point = self.parent[point]
+        return point
+
+    def join(self, first: complex, second: complex) -> bool:
+        """False if both were in one group before."""
+        first, second = self.find(first), self.find(second)
+        self.parent[first] = second
+        return first != second
+
+
+def find_tips(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> dict[str, tuple[bool, bool]]:
+    """Per crack whether its start and its end are tips: points that no other leg reaches."""
+    visits = count_leg_ends(curves)
+    return {name: (visits[curves[name].start] == 1, visits[curves[name].end] == 1) for name in cracks}
+
+
+def count_leg_ends(curves: Mapping[str, Curve]) -> Counter[complex]:
+    """How many legs end at each point."""
+    return Counter(end for curve in curves.values() for leg in curve.legs for end in (leg.start, leg.end))
+
+
+def check_inside(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops) -> list[Fault]:
+    """A fault for every crack with a leg outside its region (legs do not cross, so one outside point tells)."""
+    faults = []
+    for name, region in cracks.items():
+        if region not in loops:
+            continue
+        points = np.concatenate([inner_points(leg) for leg in curves[name].legs])
+        outside = points[winding_number(loop_legs(curves, loops[region]), points) != 1]
+        if len(outside):
+            loc = ("regions", region, "cracks", case.regions[region].cracks.index(name))
+            found = f"crack '{name}' outside region '{region}', at {format_point(complex(outside[0]))}"
+            faults.append(case.fault(loc, found, "a crack inside its region, which it may touch with its ends"))
+    return faults
+
+
+def check_closing(
+    case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops
+) -> tuple[list[Fault], list[str]]:
+    """Faults for cracks that enclose a part of their region, notes for those that cut it together with its boundary.
+
+    A part enclosed by cracks alone has no displacement equation of its own, so that its rigid motion would be
+    undetermined; a part cut off with a piece of the boundary has.
+    """
+    faults, notes = [], []
+    closing: set[str] = set()
+    groups = _Groups()
+    for name, region in cracks.items():
+        joined = [groups.join(leg.start, leg.end) for leg in curves[name].legs]
+        if not all(joined):
+            closing.add(name)
+            found = f"crack '{name}' closing a ring of cracks, which cuts region '{region}' in two"
+            expected = "cracks that enclose nothing: make the enclosed part a region, and the ring its interface"
+            faults.append(case.fault(("curves", name), found, expected))
+    for region in loops:
+        own = [name for name, of in cracks.items() if of == region and name not in closing]
+        cutting = _find_cutting(curves, own, loops[region])
+        notes += [
+            f"Crack '{name}' cuts region '{region}' in two; its parts are held together only by what the crack carries."
+            for name in cutting
+        ]
+    return faults, notes
+
+
+def _find_cutting(curves: Mapping[str, Curve], cracks: list[str], loops: tuple[Loop, ...]) -> list[str]:
+    groups = _Groups()
+    for loop in loops:
+        for leg in loop_legs(curves, (loop,)):
+            groups.join(leg.start, leg.end)
+    return [name for name in cracks if not all([groups.join(leg.start, leg.end) for leg in curves[name].legs])]

@@ -1,0 +1,112 @@
+"""Towards which ends of a leg its elements are refined."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
+
+from pbem.case import Case
+from pbem.case.finding import list_names
+from pbem.model.curve import Curve, turning_angle
+from pbem.model.junction import Places
+
+# A curve that turns by less than this goes on smoothly.
+SMOOTH = math.radians(1.0)
+
+
+@dataclass(frozen=True)
+class _LegEnd:
+    """An end of a leg at a point: `ray` is the unit direction from the point into the leg."""
+
+    curve: str
+    ray: complex
+
+
+def grade_curves(
+    case: Case,
+    curves: Mapping[str, Curve],
+    breaks: Places,
+    behaviour: Mapping[str, Hashable],
+    tip_elements: frozenset[str],
+) -> tuple[dict[str, Curve], tuple[str, ...]]:
+    """Set the refined ends of every leg, and say in sentences which were chosen.
+
+    behaviour: what a curve does, equal for two curves if the solution may go on smoothly from one to the other;
+    tip_elements: cracks whose tips have elements of their own shape and need no refinement.
+    """
+    meetings = _collect(curves)
+    result = {}
+    for name, curve in curves.items():
+        grading = case.curves[name].grading
+        if grading == "auto":
+            wanted = [
+                (
+                    _is_singular(meetings[leg.start], behaviour, tip_elements),
+                    _is_singular(meetings[leg.end], behaviour, tip_elements),
+                )
+                for leg in curve.legs
+            ]
+        else:
+            wanted = _explicit(curve, grading, breaks.get(name, ()), case.curves[name].center is not None)
+        legs = [
+            replace(leg, refine_start=start, refine_end=end)
+            for leg, (start, end) in zip(curve.legs, wanted, strict=True)
+        ]
+        result[name] = Curve(name, tuple(legs))
+    return result, _describe(case, result)
+
+
+def _collect(curves: Mapping[str, Curve]) -> dict[complex, list[_LegEnd]]:
+    meetings: dict[complex, list[_LegEnd]] = defaultdict(list)
+    for name, curve in curves.items():
+        for leg in curve.legs:
+            meetings[leg.start].append(_LegEnd(name, leg.tangent(at_end=False)))
+            meetings[leg.end].append(_LegEnd(name, -leg.tangent(at_end=True)))
+    return meetings
+
+
+def _is_singular(
+    meeting: list[_LegEnd], behaviour: Mapping[str, Hashable], tip_elements: frozenset[str]
+) -> bool:
+    if len(meeting) == 1:
+        return meeting[0].curve not in tip_elements
+    if len(meeting) > 2:
+        return True
+    first, second = meeting
+    turns = abs(turning_angle(-first.ray, second.ray)) > SMOOTH
+    return turns or behaviour[first.curve] != behaviour[second.curve]
+
+
+def _explicit(curve: Curve, grading: str, breaks: tuple[complex, ...], circular: bool) -> list[tuple[bool, bool]]:
+    """`start` and `end` are those of the whole curve; `both` is every leg of a polyline, and every break is refined."""
+    if grading == "none":
+        return [(False, False)] * len(curve.legs)
+    everywhere = grading == "both" and not circular
+    wanted = [
+        [everywhere or leg.start in breaks, everywhere or leg.end in breaks] for leg in curve.legs
+    ]
+    if grading in ("start", "both"):
+        wanted[0][0] = True
+    if grading in ("end", "both"):
+        wanted[-1][1] = True
+    return [(start, end) for start, end in wanted]
+
+
+def _describe(case: Case, curves: Mapping[str, Curve]) -> tuple[str, ...]:
+    """One sentence for all curves with the same refinement."""
+    groups: dict[str, list[str]] = defaultdict(list)
+    for name, curve in curves.items():
+        if case.curves[name].grading == "auto":
+            groups[_describe_legs(curve)].append(f"'{name}'")
+    return tuple(f"Grading, chosen: {text}: {list_names(names, 12)}." for text, names in groups.items())
+
+
+def _describe_legs(curve: Curve) -> str:
+    words = {(False, False): "uniform", (True, False): "towards the start", (False, True): "towards the end",
+             (True, True): "towards both ends"}
+    patterns = [words[leg.refine_start, leg.refine_end] for leg in curve.legs]
+    if len(set(patterns)) == 1:
+        return patterns[0] + (" of every leg" if len(patterns) > 1 and patterns[0] != "uniform" else "")
+    return "; ".join(f"leg {number} {pattern}" for number, pattern in enumerate(patterns, start=1))

@@ -1,0 +1,169 @@
+"""Legs that meet: ends on other legs split them, and every other meeting is a fault."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from pbem.case import Case
+from pbem.errors import Fault
+from pbem.model.curve import Curve, Leg
+from pbem.model.intersection import coincide, extremes, meeting_points, project
+from pbem.model.shape import share
+
+Places = Mapping[str, tuple[complex, ...]]
+
+
+@dataclass(frozen=True)
+class SplitCurves:
+    """curves: with legs that end at every junction; breaks: the points per curve at which legs were split."""
+
+    curves: Mapping[str, Curve]
+    breaks: Places
+    notes: tuple[str, ...]
+
+
+def format_point(point: complex) -> str:
+    return f"({point.real:.6g}, {point.imag:.6g})"
+
+
+class _Boxes:
+    """Bounding boxes of legs, to find the few that can meet."""
+
+    def __init__(self, legs: list[Leg], tolerance: float) -> None:
+        points = [extremes(leg) for leg in legs]
+        self.low = np.array([(p.real.min() - tolerance, p.imag.min() - tolerance) for p in points]).reshape(-1, 2)
+        self.high = np.array([(p.real.max() + tolerance, p.imag.max() + tolerance) for p in points]).reshape(-1, 2)
+
+    def around(self, point: complex) -> list[int]:
+        at = (point.real, point.imag)
+        return [int(i) for i in np.flatnonzero(((self.low <= at) & (self.high >= at)).all(axis=1))]
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        for i in range(len(self.low)):
+            later = (self.low[i + 1:] <= self.high[i]) & (self.high[i + 1:] >= self.low[i])
+            for j in np.flatnonzero(later.all(axis=1)):
+                yield i, i + 1 + int(j)
+
+
+def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCurves:
+    """Split every leg in whose interior an end of another curve lies; the break is exactly that end."""
+    legs = [(name, index, leg) for name, curve in curves.items() for index, leg in enumerate(curve.legs)]
+    boxes = _Boxes([leg for _, _, leg in legs], tolerance)
+    breaks: dict[tuple[str, int], dict[complex, float]] = defaultdict(dict)
+    notes = []
+    for name, curve in curves.items():
+        for end in [] if curve.closed else dict.fromkeys((curve.start, curve.end)):
+            for number in boxes.around(end):
+                other, index, leg = legs[number]
+                t, distance = project(leg, end)
+                if other == name or end in (leg.start, leg.end) or distance > tolerance or not 0 < t < 1:
+                    continue
+                if end not in breaks[other, index]:
+                    notes.append(f"'{other}' is split at {format_point(end)}, where '{name}' ends.")
+                breaks[other, index][end] = t
+    result = {}
+    for name, curve in curves.items():
+        pieces = [piece for i, leg in enumerate(curve.legs) for piece in _split_leg(leg, breaks.get((name, i), {}))]
+        result[name] = Curve(name, tuple(pieces))
+    places = {
+        name: tuple(point for i in range(len(curve.legs)) for point in breaks.get((name, i), {}))
+        for name, curve in curves.items()
+    }
+    return SplitCurves(result, places, tuple(notes))
+
+
+def _split_leg(leg: Leg, points: Mapping[complex, float]) -> list[Leg]:
+    """Pieces between the points (with their fractions); elements in proportion to length, at least one each."""
+    cuts = sorted(points.items(), key=lambda item: item[1])
+    fractions = [0.0, *(t for _, t in cuts), 1.0]
+    ends = [leg.start, *(point for point, _ in cuts), leg.end]
+    parts = [b - a for a, b in pairwise(fractions)]
+    counts = share(leg.elements, parts)
+    return [
+        replace(leg, start=ends[i], end=ends[i + 1], elements=counts[i], sweep=leg.sweep * parts[i])
+        for i in range(len(parts))
+    ]
+
+
+def find_crossings(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], tolerance: float) -> list[Fault]:
+    """Every place where legs cross, touch or coincide other than at points where curves may meet."""
+    legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
+    found: dict[tuple[str, str], Fault] = {}
+    boxes = _Boxes([leg for _, leg in legs], tolerance)
+    for i, j in boxes.pairs():
+        (name, leg), (other, other_leg) = legs[i], legs[j]
+        if (name, other) in found:
+            continue
+        if coincide(leg, other_leg, tolerance):
+            found[name, other] = _overlap(case, name, other, leg)
+            continue
+        points = meeting_points(leg, other_leg, tolerance) or _touching_ends(leg, other_leg, tolerance)
+        if points:
+            found[name, other] = _crossing(case, name, other, points[0], cracks)
+    for pair, point in _meeting_vertices(curves, cracks).items():
+        found.setdefault(pair, _crossing(case, *pair, point, cracks))
+    return list(found.values())
+
+
+def _touching_ends(first: Leg, second: Leg, tolerance: float) -> list[complex]:
+    """Ends of one leg in the interior of the other."""
+    points = []
+    for leg, other in ((first, second), (second, first)):
+        for end in (other.start, other.end):
+            if end not in (leg.start, leg.end):
+                t, distance = project(leg, end)
+                if distance <= tolerance and 0 < t < 1:
+                    points.append(end)
+    return points
+
+
+def _meeting_vertices(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> dict[tuple[str, str], complex]:
+    """Pairs of curves that meet in a vertex where neither ends (a crack must end where it meets a boundary)."""
+    at: dict[complex, list[tuple[str, bool]]] = defaultdict(list)
+    for name, curve in curves.items():
+        ends = set() if curve.closed else {curve.start, curve.end}
+        for leg in curve.legs:
+            at[leg.start].append((name, leg.start in ends))
+        if not curve.closed:
+            at[curve.end].append((name, True))
+    pairs: dict[tuple[str, str], complex] = {}
+    for point, visits in at.items():
+        for i, (name, ends_here) in enumerate(visits):
+            for other, other_ends in visits[i + 1:]:
+                crack, other_crack = name in cracks, other in cracks
+                if name == other:
+                    allowed = False
+                elif crack != other_crack:
+                    allowed = ends_here if crack else other_ends
+                else:
+                    allowed = ends_here or other_ends
+                if not allowed:
+                    pairs.setdefault((name, other), point)
+    return pairs
+
+
+def _overlap(case: Case, name: str, other: str, leg: Leg) -> Fault:
+    found = f"curve '{other}' running over curve '{name}' from {format_point(leg.start)} to {format_point(leg.end)}"
+    if name == other:
+        found = f"a curve that runs over itself from {format_point(leg.start)} to {format_point(leg.end)}"
+    expected = "each piece once: a piece that two regions share is one curve, named in the boundary of both"
+    return case.fault(("curves", other), found, expected)
+
+
+def _crossing(case: Case, name: str, other: str, point: complex, cracks: Mapping[str, str]) -> Fault:
+    if name == other:
+        found = f"a curve that crosses or touches itself at {format_point(point)}"
+        expected = "a curve without crossings: split it into curves that meet at a point"
+        return case.fault(("curves", name), found, expected)
+    kinds = ["crack" if one in cracks else "curve" for one in (name, other)]
+    found = f"{kinds[1]} '{other}' crossing or touching {kinds[0]} '{name}' at {format_point(point)}"
+    if any(one in cracks for one in (name, other)):
+        expected = "cracks that meet other curves only with their ends: split into curves that meet at a point"
+    else:
+        expected = "boundaries that meet only at ends: split into curves that meet at a point, or move them apart"
+    return case.fault(("curves", other), found, expected)

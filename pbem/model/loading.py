@@ -1,0 +1,198 @@
+"""Conditions on the outer curves and the history of their values, and the laws of interfaces and cracks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pbem.case import Case
+from pbem.case.schema import ConditionTable, LawTable
+from pbem.errors import Fault
+from pbem.model.model import Condition, Interface, Law, Quantity, Stage
+from pbem.model.roles import Roles, unknown_name
+
+Loc = tuple[str | int, ...]
+# Key to frame, direction and quantity.
+_KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {
+    "ux": ("global", 0, "displacement"), "uy": ("global", 1, "displacement"),
+    "tx": ("global", 0, "traction"), "ty": ("global", 1, "traction"),
+    "un": ("local", 0, "displacement"), "us": ("local", 1, "displacement"),
+    "tn": ("local", 0, "traction"), "ts": ("local", 1, "traction"),
+}
+
+
+@dataclass(frozen=True)
+class Loading:
+    conditions: Mapping[str, Condition]
+    interfaces: Mapping[str, Interface]
+    stages: tuple[Stage, ...]
+    faults: tuple[Fault, ...]
+
+
+def read_loading(case: Case, roles: Roles) -> Loading:
+    """Conditions of every outer curve, laws of every interface and crack, and complete values for every stage."""
+    faults = _check_names(case, roles)
+    conditions = {}
+    for name in roles.outer:
+        condition, wrong = _find_condition(case, name)
+        conditions[name] = condition
+        faults += wrong
+    interfaces: dict[str, Interface] = {}
+    for name in [*roles.shared, *roles.cracks]:
+        sides = roles.shared[name] if name in roles.shared else (roles.cracks[name], None)
+        law, wrong = _find_law(case, name, shared=name in roles.shared)
+        interfaces[name] = Interface(name, sides[0], sides[1], law)
+        faults += wrong
+    stages = _find_stages(case, conditions, interfaces)
+    return Loading(conditions, interfaces, stages, tuple(faults))
+
+
+def _given(table: ConditionTable) -> dict[str, float]:
+    """Values by the keys ux ... ts, with pressure written out."""
+    values = {key: getattr(table, key) for key in _KEYS if getattr(table, key) is not None}
+    if table.pressure is not None:
+        values |= {"tn": -table.pressure, "ts": 0.0}
+    return values
+
+
+def _tables(case: Case, curve: str) -> list[tuple[Loc, ConditionTable]]:
+    """The condition tables of a curve in the order in which they act: base, then stages."""
+    tables: list[tuple[Loc, ConditionTable]] = []
+    if curve in case.boundary:
+        tables.append((("boundary", curve), case.boundary[curve]))
+    for number, stage in enumerate(case.stages):
+        if curve in stage.boundary:
+            tables.append((("stages", number, "boundary", curve), stage.boundary[curve]))
+    return tables
+
+
+def _check_names(case: Case, roles: Roles) -> list[Fault]:
+    faults = []
+    two_sided = [*roles.shared, *roles.cracks]
+    places: list[tuple[Loc, Iterable[str]]] = [((), case.boundary)]
+    places += [(("stages", number), stage.boundary) for number, stage in enumerate(case.stages)]
+    for prefix, names in places:
+        for name in names:
+            loc = (*prefix, "boundary", name)
+            if name in two_sided:
+                kind = "an interface" if name in roles.shared else "a crack"
+                expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
+                faults.append(case.fault(loc, f"conditions on '{name}', {kind}", expected))
+            elif name not in case.curves:
+                faults.append(unknown_name(case, loc, name, "curve", roles.outer or case.curves))
+    places = [((), case.interfaces)]
+    places += [(("stages", number), stage.interfaces) for number, stage in enumerate(case.stages)]
+    for prefix, names in places:
+        for name in names:
+            loc = (*prefix, "interfaces", name)
+            if name in roles.outer:
+                found = f"a law for '{name}', an outer curve of region '{roles.outer[name]}'"
+                faults.append(case.fault(loc, found, "a curve shared by two regions, or a crack"))
+            elif name not in case.curves:
+                faults.append(unknown_name(case, loc, name, "interface or crack", two_sided))
+    return faults
+
+
+def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
+    """The kinds of known quantities, which must be the same in the base table and in all stages."""
+    faults: list[Fault] = []
+    frame: Literal["global", "local"] | None = None
+    known: list[Quantity | None] = [None, None]
+    where = ["", ""]
+    for order, (loc, table) in enumerate(_tables(case, curve)):
+        for key in _given(table):
+            key_frame, direction, quantity = _KEYS[key]
+            written = (*loc, "pressure" if table.pressure is not None and key in ("tn", "ts") else key)
+            if frame not in (None, key_frame):
+                expected = f"{frame} components as before: one kind of components on a curve in all stages"
+                fault = case.fault(written, f"'{written[-1]}', a {key_frame} component", expected)
+                faults.append(fault)
+                break
+            frame = key_frame
+            if known[direction] not in (None, quantity):
+                found = f"'{written[-1]}' where '{where[direction]}' was given before"
+                expected = f"the same kind of condition in all stages ({known[direction]} in this direction)"
+                faults.append(case.fault(written, found, expected))
+            elif quantity == "displacement" and known[direction] is None and _is_late(case, curve, order):
+                found = f"'{key}' for the first time in a later stage"
+                expected = f"its value in [boundary.{curve}] or in the first stage too (0 holds the curve)"
+                faults.append(case.fault(written, found, expected))
+            if known[direction] is None:
+                known[direction], where[direction] = quantity, str(written[-1])
+    return Condition(curve, frame or "global", (known[0] or "traction", known[1] or "traction")), faults
+
+
+def _is_late(case: Case, curve: str, order: int) -> bool:
+    """The curve's table number `order` is neither the base nor that of the first stage."""
+    loc = _tables(case, curve)[order][0]
+    return loc[0] == "stages" and loc[1] != 0
+
+
+def _find_stages(
+    case: Case, conditions: Mapping[str, Condition], interfaces: Mapping[str, Interface]
+) -> tuple[Stage, ...]:
+    values = {name: [0.0, 0.0] for name in conditions}
+    pressure = {name: 0.0 for name in interfaces}
+    for name in conditions:
+        _update(values[name], case.boundary.get(name))
+    for name in interfaces:
+        if name in case.interfaces:
+            pressure[name] = case.interfaces[name].pressure
+    if not case.stages:
+        return (_freeze("load", case.analysis.steps, values, pressure),)
+    stages = []
+    for number, stage in enumerate(case.stages, start=1):
+        for name in conditions:
+            _update(values[name], stage.boundary.get(name))
+        for name in interfaces:
+            if name in stage.interfaces:
+                pressure[name] = stage.interfaces[name].pressure
+        stages.append(_freeze(stage.name or f"stage {number}", stage.steps, values, pressure))
+    return tuple(stages)
+
+
+def _update(values: list[float], table: ConditionTable | None) -> None:
+    for key, value in _given(table).items() if table else ():
+        values[_KEYS[key][1]] = value
+
+
+def _freeze(name: str, steps: int, values: Mapping[str, list[float]], pressure: Mapping[str, float]) -> Stage:
+    return Stage(name, steps, {curve: (pair[0], pair[1]) for curve, pair in values.items()}, dict(pressure))
+
+
+def _find_law(case: Case, name: str, shared: bool) -> tuple[Law, list[Fault]]:
+    table = case.interfaces.get(name, LawTable())
+    kind = table.law or ("bonded" if shared else "coulomb")
+    faults = _check_meaning(case, name, table, kind)
+    friction = table.friction or 0.0
+    if table.friction_angle is not None:
+        friction = math.tan(math.radians(table.friction_angle))
+    gap = table.gap if isinstance(table.gap, float) else 0.0
+    if kind == "bonded":
+        return Law("bonded"), faults
+    if kind == "open":
+        return Law("open", gap=gap), faults
+    cohesion = 0.0 if kind == "frictionless" else table.cohesion
+    friction = 0.0 if kind == "frictionless" else friction
+    return Law("coulomb", friction, cohesion, table.tensile_strength, gap, table.pressurised), faults
+
+
+def _check_meaning(case: Case, name: str, table: LawTable, kind: str) -> list[Fault]:
+    """Keys without effect under the law would be a misunderstanding: refuse them unless they are zero."""
+    strengths = ("friction", "friction_angle", "cohesion", "tensile_strength")
+    without = {"bonded": (*strengths, "gap", "pressure"), "open": strengths}.get(kind, ())
+    chosen = f'law = "{kind}"' if table.law else f'law = "{kind}", the default here'
+    expected = f'law = "coulomb" with it, or no such key: it has no effect with {chosen}'
+    faults = [
+        case.fault(("interfaces", name, key), f"{key} = {getattr(table, key):g} on '{name}'", expected)
+        for key in without if getattr(table, key)
+    ]
+    if kind == "bonded":
+        faults += [
+            case.fault(("stages", number, "interfaces", name), f"a pressure in '{name}'", expected)
+            for number, stage in enumerate(case.stages)
+            if name in stage.interfaces and stage.interfaces[name].pressure
+        ]
+    return faults

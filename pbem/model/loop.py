@@ -1,0 +1,233 @@
+"""Closed loops around the regions: chained from curves in any order and direction, oriented, and nested."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.case import Case
+from pbem.case.finding import list_names
+from pbem.errors import Fault
+from pbem.model.curve import Curve, Leg
+from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, winding_number
+from pbem.model.junction import format_point
+from pbem.model.model import Loop, Side
+
+Loops = dict[str, tuple[Loop, ...]]
+HalfEdge = tuple[str, bool]
+
+
+@dataclass(frozen=True)
+class _Chain:
+    sides: tuple[Side, ...]
+    legs: list[Leg]
+
+    def reverse(self) -> _Chain:
+        sides = tuple(Side(side.curve, not side.forward) for side in reversed(self.sides))
+        return _Chain(sides, [leg.reverse() for leg in reversed(self.legs)])
+
+
+def side_legs(curves: Mapping[str, Curve], side: Side) -> tuple[Leg, ...]:
+    """The legs of a side in its direction of travel (region on the left)."""
+    return curves[side.curve].legs if side.forward else curves[side.curve].reverse().legs
+
+
+def loop_legs(curves: Mapping[str, Curve], loops: tuple[Loop, ...]) -> list[Leg]:
+    """All legs of some loops in their direction of travel."""
+    return [leg for loop in loops for side in loop.sides for leg in side_legs(curves, side)]
+
+
+def find_loops(
+    case: Case, curves: Mapping[str, Curve], tolerance: float, check_nesting: bool
+) -> tuple[Loops, list[Fault]]:
+    """Loops of every region all of whose curves are known; regions with faults are left out.
+
+    check_nesting: False if curves cross, when it is not settled which loop lies in which.
+    """
+    result: Loops = {}
+    faults: list[Fault] = []
+    for region, table in case.regions.items():
+        names = list(dict.fromkeys(table.boundary))
+        if not names or any(name not in curves for name in names):
+            continue
+        chains, wrong = _chain(case, region, {name: curves[name] for name in names}, tolerance)
+        if not wrong:
+            loops, wrong = _nest(case, region, chains)
+            wrong = wrong if check_nesting else []
+        if wrong:
+            faults += wrong
+        else:
+            result[region] = loops
+    return result, faults
+
+
+def _chain(
+    case: Case, region: str, curves: Mapping[str, Curve], tolerance: float
+) -> tuple[list[_Chain], list[Fault]]:
+    """Walk from end to end; where more than two ends meet, take the turn that keeps one sector of the region."""
+    leaving: dict[complex, list[HalfEdge]] = defaultdict(list)
+    for name, curve in curves.items():
+        if not curve.closed:
+            leaving[curve.start].append((name, True))
+            leaving[curve.end].append((name, False))
+    faults = [
+        _open_end(case, region, point, edges, curves, tolerance)
+        for point, edges in leaving.items() if len(edges) % 2
+    ]
+    if faults:
+        return [], faults
+    following: dict[HalfEdge, HalfEdge] = {}
+    legs = [leg for curve in curves.values() for leg in curve.legs]
+    for point, edges in leaving.items():
+        pairs = [(edges[0], edges[1])] if len(edges) == 2 else _pair_sectors(point, edges, curves, legs)
+        if pairs is None:
+            found = f"{len(edges)} curve ends that touch at {format_point(point)}, and which go together is unclear"
+            expected = "loops that touch at most at single points, under angles that differ"
+            faults.append(case.fault(("regions", region, "boundary"), found, expected))
+            continue
+        for one, two in pairs:  # arriving against `one` one leaves along `two`, and the other way round
+            following[one[0], not one[1]] = two
+            following[two[0], not two[1]] = one
+    if faults:
+        return [], faults
+    chains = []
+    used: set[str] = set()
+    for name in curves:
+        if name in used:
+            continue
+        sides, edge = [], (name, True)
+        while edge[0] not in used:
+            used.add(edge[0])
+            sides.append(Side(*edge))
+            edge = edge if curves[edge[0]].closed else following[edge]
+        chains.append(_Chain(tuple(sides), [leg for side in sides for leg in side_legs(curves, side)]))
+    return chains, []
+
+
+def _open_end(
+    case: Case, region: str, point: complex, edges: list[HalfEdge], curves: Mapping[str, Curve], tolerance: float
+) -> Fault:
+    """Name the curve, the end without a partner, and what is nearest to it."""
+    names = list(dict.fromkeys(name for name, _ in edges))
+    where = "starts" if edges[0][1] else "ends"
+    found = f"an open loop: curve '{names[0]}' {where} at {format_point(point)}, where no other curve goes on"
+    if len(edges) > 1:
+        found = f"an open loop: an odd number of curve ends ({list_names(names)}) at {format_point(point)}"
+    expected = "curves that close into loops"
+    near = _nearest_end(point, names, curves)
+    touched = [
+        name for name, curve in curves.items() if name not in names
+        for leg in curve.legs if project(leg, point)[1] <= tolerance
+    ]
+    if touched:
+        expected += f" (the point lies on curve '{touched[0]}': split that one there)"
+    elif near:
+        expected += f" (the nearest end is that of '{near[1]}' at {format_point(near[2])}, {near[0]:.3g} away)"
+    return case.fault(("regions", region, "boundary"), found, expected)
+
+
+def _nearest_end(point: complex, own: list[str], curves: Mapping[str, Curve]) -> tuple[float, str, complex] | None:
+    ends = [
+        (abs(end - point), name, end)
+        for name, curve in curves.items() if not curve.closed
+        for end in (curve.start, curve.end) if end != point and not (name in own and len(curves) > 1)
+    ]
+    return min(ends, key=lambda entry: entry[0], default=None)
+
+
+def _ray(curve: Curve, forward: bool) -> complex:
+    return curve.legs[0].tangent(at_end=False) if forward else -curve.legs[-1].tangent(at_end=True)
+
+
+def _pair_sectors(
+    point: complex, edges: list[HalfEdge], curves: Mapping[str, Curve], legs: list[Leg]
+) -> list[tuple[HalfEdge, HalfEdge]] | None:
+    """Pairs of ends that bound one sector of the region (sectors alternate between in and out); None if unclear."""
+    rays = sorted((cmath.phase(_ray(curves[name], forward)), (name, forward)) for name, forward in edges)
+    phases = [phase for phase, _ in rays] + [rays[0][0] + 2 * math.pi]
+    if min(b - a for a, b in pairwise(phases)) < 1e-6:
+        return None
+    reach = 1e-4 * min(curves[name].legs[0 if forward else -1].length for name, forward in edges)
+    middles = np.array([
+        point + reach * cmath.exp(0.5j * (a + b)) for a, b in pairwise(phases)
+    ])
+    inside = _is_enclosed_oddly(legs, middles)
+    if any(inside[i] == inside[i - 1] for i in range(len(inside))):
+        return None
+    ends = [edge for _, edge in rays]
+    return [(ends[i], ends[(i + 1) % len(ends)]) for i in range(len(ends)) if inside[i]]
+
+
+def _is_enclosed_oddly(legs: list[Leg], points: NDArray[np.complex128]) -> list[bool]:
+    """Even-odd rule for legs whose directions are not yet sorted out: count the cuts with a ray to the left."""
+    far = 10 * max(abs(leg.start - points[0]) + leg.length for leg in legs)
+    # An odd direction, so that the ray passes no vertex.
+    direction = cmath.exp(2.39996j)
+    rays = [Leg(complex(p), complex(p) + far * direction, 1) for p in points]
+    return [sum(len(meeting_points(ray, leg, 0.0)) for leg in legs) % 2 == 1 for ray in rays]
+
+
+def _nest(case: Case, region: str, chains: list[_Chain]) -> tuple[tuple[Loop, ...], list[Fault]]:
+    """The loop of the largest area is outer, counter-clockwise; all others lie in it side by side, clockwise."""
+    areas = [enclosed_area(chain.legs) for chain in chains]
+    outer = max(range(len(chains)), key=lambda i: abs(areas[i]))
+    turned = [
+        chain if (area > 0) == (i == outer) else chain.reverse()
+        for i, (chain, area) in enumerate(zip(chains, areas, strict=True))
+    ]
+    faults = []
+    loc = ("regions", region, "boundary")
+    for i, chain in enumerate(turned):
+        names = list_names([side.curve for side in chain.sides], 4)
+        points = np.concatenate([inner_points(leg, 3) for leg in chain.legs])
+        for j, other in enumerate(turned):
+            if i == j:
+                continue
+            around = list_names([side.curve for side in other.sides], 4)
+            inside = winding_number(other.legs, points) != 0
+            if j == outer and not inside.all():
+                found = f"the loop of {names} outside the loop of {around}"
+                expected = "one connected region inside one outer loop: make separate parts separate regions"
+                faults.append(case.fault(loc, found, expected))
+            elif j != outer and i != outer and inside.any():
+                found = f"the loop of {names} inside the inner loop of {around}"
+                expected = "inner loops side by side: what lies inside a hole is another region"
+                faults.append(case.fault(loc, found, expected))
+    return tuple(Loop(chain.sides, i == outer) for i, chain in enumerate(turned)), faults
+
+
+def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops) -> list[Fault]:
+    """Regions that lie on the same side of a shared curve, or one inside another that does not have it as a hole."""
+    faults = []
+    names = list(loops)
+    for number, first in enumerate(names):
+        for second in names[number + 1:]:
+            found = _overlap(curves, loops[first], loops[second])
+            if found:
+                expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
+                loc = ("regions", second, "boundary")
+                faults.append(case.fault(loc, f"region '{second}' overlapping region '{first}' ({found})", expected))
+    return faults
+
+
+def _overlap(curves: Mapping[str, Curve], first: tuple[Loop, ...], second: tuple[Loop, ...]) -> str:
+    sides = [{side.curve: side.forward for loop in loops for side in loop.sides} for loops in (first, second)]
+    common = [curve for curve in sides[0] if curve in sides[1]]
+    for curve in common:
+        if sides[0][curve] == sides[1][curve]:
+            return f"both lie on the same side of '{curve}'"
+    for one, other in ((0, 1), (1, 0)):
+        legs = loop_legs(curves, (first, second)[one])
+        for curve in sides[other]:
+            if curve not in common:
+                points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
+                if (winding_number(legs, points) == 1).any():
+                    return f"'{curve}' lies inside"
+    return ""

@@ -1,0 +1,170 @@
+"""From the curves of the case file to chains of legs whose common ends are exactly equal."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from pbem.case import Case
+from pbem.case.schema import MOST_ELEMENTS, CurveTable
+from pbem.errors import Fault
+from pbem.model.curve import Curve, Leg
+from pbem.model.intersection import extremes
+
+# Points nearer to each other than this part of the model's size are the same point.
+SAME_POINT = 1e-9
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """curves: in the order of the file, without those that have faults; tolerance: length below which points agree."""
+
+    curves: Mapping[str, Curve]
+    size: float
+    tolerance: float
+    faults: tuple[Fault, ...]
+
+
+def shape_curves(case: Case) -> Shapes:
+    """Build every curve; joined ends are made exactly equal. Elements are counted per leg, nothing is graded yet."""
+    faults: list[Fault] = []
+    curves: dict[str, Curve] = {}
+    for name, table in case.curves.items():
+        legs = _circular_legs(table) if table.center is not None else _straight_legs(table)
+        if isinstance(legs, str):
+            faults.append(case.fault(("curves", name), legs, "at least 4 elements around a circle"))
+            continue
+        curves[name] = Curve(name, legs)
+    size, tolerance = measure(curves)
+    curves, short = _join(curves, tolerance)
+    for name, number in short:
+        loc = ("curves", name, "points", number) if case.curves[name].points else ("curves", name)
+        faults.append(case.fault(loc, "a leg without length (the same point twice)", "points that differ"))
+        del curves[name]
+    for name, curve in list(curves.items()):
+        total = sum(leg.elements for leg in curve.legs)
+        if total > MOST_ELEMENTS:
+            key = "size" if case.curves[name].size else "elements"
+            expected = f"at most {MOST_ELEMENTS} on one curve"
+            faults.append(case.fault(("curves", name, key), f"{total} elements", expected))
+            del curves[name]
+    return Shapes(curves, size, tolerance, tuple(faults))
+
+
+def measure(curves: Mapping[str, Curve]) -> tuple[float, float]:
+    """Largest extent of all curves, and the distance below which two points are one."""
+    if not curves:
+        return 0.0, 0.0
+    points = np.concatenate([extremes(leg) for curve in curves.values() for leg in curve.legs])
+    extents = points.real.max() - points.real.min(), points.imag.max() - points.imag.min()
+    size = float(max(extents))
+    # Far from the origin the coordinates themselves are rounded.
+    rounding = 16 * np.finfo(float).eps * float(np.abs(points).max())
+    return size, max(SAME_POINT * size, rounding)
+
+
+def share(total: int, lengths: Sequence[float]) -> list[int]:
+    """Split a number of elements in proportion to lengths, at least one each (more than the total only for that)."""
+    whole = sum(lengths)
+    wanted = [total * length / whole for length in lengths]
+    counts = [max(1, math.floor(want + 1e-9)) for want in wanted]
+    while sum(counts) < total:
+        worst = max(range(len(counts)), key=lambda i: (wanted[i] - counts[i], -i))
+        counts[worst] += 1
+    while sum(counts) > max(total, len(counts)):
+        worst = max((i for i in range(len(counts)) if counts[i] > 1), key=lambda i: (counts[i] - wanted[i], i))
+        counts[worst] -= 1
+    return counts
+
+
+def _count_elements(table: CurveTable, lengths: Sequence[float]) -> list[int]:
+    if table.size is not None:
+        return [max(1, math.ceil(min(length / table.size, 1e9) - 1e-9)) for length in lengths]
+    if isinstance(table.elements, tuple):
+        return list(table.elements)
+    assert table.elements is not None
+    return share(table.elements, lengths)
+
+
+def _straight_legs(table: CurveTable) -> tuple[Leg, ...]:
+    assert table.points is not None
+    points = [complex(*point) for point in table.points]
+    lengths = [abs(b - a) for a, b in pairwise(points)]
+    if sum(lengths) == 0:
+        return tuple(Leg(a, b, 1) for a, b in pairwise(points))
+    counts = _count_elements(table, lengths)
+    return tuple(
+        Leg(a, b, count, power=table.power)
+        for a, b, count in zip(points, points[1:], counts, strict=False)
+    )
+
+
+def _circular_legs(table: CurveTable) -> tuple[Leg, ...] | str:
+    """An arc is one leg; a full circle four, cut between elements so that these are all equal."""
+    assert table.center is not None and table.radius is not None
+    angles = table.angles or (0.0, 360.0)
+    center, begin, sweep = complex(*table.center), math.radians(angles[0]), math.radians(angles[1] - angles[0])
+    count = _count_elements(table, [table.radius * abs(sweep)])[0]
+    start = _point_on_circle(center, table.radius, angles[0])
+    if abs(angles[1] - angles[0]) < 360:
+        end = _point_on_circle(center, table.radius, angles[1])
+        return (Leg(start, end, count, power=table.power, center=center, sweep=sweep),)
+    if table.size is not None:
+        count = max(4, count)
+    if count < 4:
+        return f"{count} elements around a circle"
+    legs, done, here = [], 0, start
+    for number in share(count, [1.0] * 4):
+        done += number
+        there = start if done == count else center + table.radius * cmath.exp(1j * (begin + sweep * done / count))
+        part = sweep * number / count
+        legs.append(Leg(here, there, number, power=table.power, center=center, sweep=part))
+        here = there
+    return tuple(legs)
+
+
+def _point_on_circle(center: complex, radius: float, degrees: float) -> complex:
+    """Exact at multiples of 90 degrees, where users write the same point by hand."""
+    quarter, rest = divmod(degrees, 90.0)
+    direction = (1, 1j, -1, -1j)[int(quarter) % 4] * cmath.exp(1j * math.radians(rest))
+    return center + radius * direction
+
+
+def _join(curves: Mapping[str, Curve], tolerance: float) -> tuple[dict[str, Curve], list[tuple[str, int]]]:
+    """Replace every end by the first point of the file that is the same; also name legs that shrink to a point."""
+    points = np.array([point for curve in curves.values() for leg in curve.legs for point in (leg.start, leg.end)])
+    joined, number = _first_equal(points, tolerance), 0
+    result, short = {}, []
+    for name, curve in curves.items():
+        legs = []
+        for index, leg in enumerate(curve.legs):
+            start, end = complex(joined[number]), complex(joined[number + 1])
+            number += 2
+            whole = leg.center is not None and abs(leg.sweep) > math.pi
+            if start == end and not whole:
+                short.append((name, index + 1))
+            legs.append(replace(leg, start=start, end=end))
+        result[name] = Curve(name, tuple(legs))
+    return result, list({name: (name, index) for name, index in reversed(short)}.values())
+
+
+def _first_equal(points: np.ndarray, tolerance: float) -> np.ndarray:
+    """For each point the first of the list within the tolerance (of those that are themselves first)."""
+    result = points.copy()
+    order = np.argsort(points.real, kind="stable")
+    sorted_x = points.real[order]
+    taken = np.zeros(len(points), dtype=bool)
+    for index in range(len(points)):
+        if taken[index]:
+            continue
+        low, high = np.searchsorted(sorted_x, (points[index].real - tolerance, points[index].real + tolerance * 1.0001))
+        near = order[low:high]
+        near = near[(np.abs(points[near] - points[index]) <= tolerance) & ~taken[near]]
+        result[near], taken[near] = points[index], True
+        taken[index] = True
+    return result

@@ -77,11 +77,15 @@ class Table(BaseModel):
 
 
 class UnitsTable(Table):
+    """Labels for plots and results."""
+
     length: Text = Field("", description="label of the unit of length")
     stress: Text = Field("", description="label of the unit of stress")
 
 
 class MaterialTable(Table):
+    """A linear elastic, isotropic material."""
+
     young: Positive = Field(description="Young's modulus, stress")
     poisson: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
     plane: Literal["strain", "stress"] = "strain"
@@ -89,6 +93,8 @@ class MaterialTable(Table):
 
 
 class CurveTable(Table):
+    """A polyline, circle or arc, or a curve by expressions, and its elements."""
+
     points: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(None, description="vertices of a polyline")
     center: Point | None = Field(None, description="center of a circle or arc")
     radius: Positive | None = Field(None, description="radius of a circle or arc, length")
@@ -103,6 +109,8 @@ class CurveTable(Table):
 
 
 class RegionTable(Table):
+    """A body of one material: its boundary and its cracks, by the names of curves."""
+
     material: Text
     boundary: tuple[Text, ...] = Field((), description="names of the curves that bound the region, in any order")
     cracks: tuple[Text, ...] = Field((), description="names of curves inside the region, two faces each")
@@ -110,6 +118,8 @@ class RegionTable(Table):
 
 
 class SpringTable(Table):
+    """An elastic support: stress per displacement, along the normal and along the curve."""
+
     kn: NotNegative = 0.0
     ks: NotNegative = 0.0
 
@@ -130,6 +140,8 @@ class ConditionTable(Table):
 
 
 class ExpressionTable(Table):
+    """A quantity as a function of x and y."""
+
     expression: Text
 
 
@@ -152,21 +164,29 @@ class LawTable(Table):
 
 
 class ContactTable(LawTable):
+    """Two different curves that may touch, and their law."""
+
     between: tuple[Text, Text]
 
 
 class StressTable(Table):
+    """Components of a stress."""
+
     sxx: Number = 0.0
     syy: Number = 0.0
     sxy: Number = 0.0
 
 
 class GravityTable(Table):
+    """Acceleration."""
+
     gx: Number = 0.0
     gy: Number = 0.0
 
 
 class AnalysisTable(Table):
+    """Which equations, elements and load steps."""
+
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: Annotated[int, Field(strict=True, ge=0, le=3)] = 2
     tips: Flag | None = Field(None, description="crack-tip elements with the square-root shape")
@@ -174,10 +194,14 @@ class AnalysisTable(Table):
 
 
 class StageInterfaceTable(Table):
+    """What of an interface can change from stage to stage."""
+
     pressure: Number
 
 
 class StageTable(Table):
+    """A part of the load history: the values at its end."""
+
     name: Text | None = None
     steps: Count = 10
     boundary: Mapping[str, ConditionTable] = {}
@@ -187,6 +211,8 @@ class StageTable(Table):
 
 
 class SolverTable(Table):
+    """How the discrete equations are solved."""
+
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
     newton_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
     newton_max_iterations: Count = 50
@@ -194,11 +220,15 @@ class SolverTable(Table):
 
 
 class InteriorTable(Table):
+    """A grid of points inside the regions."""
+
     box: tuple[Number, Number, Number, Number] = Field(description="x and y of two opposite corners")
     shape: tuple[Count, Count] = Field(description="numbers of points along x and y")
 
 
 class OutputTable(Table):
+    """What is stored."""
+
     interior: InteriorTable | None = None
     points: tuple[Point, ...] = ()
     every: Count = Field(1, description="every n-th load step is stored, and the last of each stage")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pbem.case import Case, read_draft
+from pbem.case import Case, parse_draft, read_case_text
 from pbem.case.finding import list_names
-from pbem.case.unsupported import TIPS_BY_DEFAULT
+from pbem.case.unsupported import FREE_BODIES, TIPS_BY_DEFAULT
 from pbem.errors import CaseError, Fault
+from pbem.model.balance import describe_unbalance
 from pbem.model.crack import check_closing, check_inside, find_tips
 from pbem.model.curve import Curve
 from pbem.model.grading import grade_curves
@@ -43,12 +44,17 @@ def build_model(case: Case) -> Model:
 
 
 def read_model(path: str | Path) -> tuple[Case, Model]:
-    """`read_case` and `build_model` in one: raises CaseError with the faults of both together."""
-    draft = read_draft(path)
+    """Read a case file and build its model. Raises CaseError with the faults of file and topology together."""
+    return parse_model(read_case_text(path), str(path))
+
+
+def parse_model(text: str, source: str = "case") -> tuple[Case, Model]:
+    """`parse_case` and `build_model` in one: raises CaseError with the faults of both together."""
+    draft = parse_draft(text, source)
     model, faults = _examine(draft.case, draft.conditions_known) if draft.case else (None, [])
     faults = [*draft.faults, *faults]
     if draft.case is None or model is None or faults:
-        raise CaseError(str(path), tuple(faults))
+        raise CaseError(source, tuple(faults))
     return draft.case, model
 
 
@@ -60,7 +66,10 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
     if faults:
         return None, faults
     model = _compose(case, roles, loading, topology)
-    return model, _check_support(case, model) if conditions_known else []
+    if conditions_known:
+        faults, notes = _check_support(case, model)
+        model = replace(model, notes=(*model.notes, *notes))
+    return model, faults
 
 
 def _find_topology(case: Case, roles: Roles) -> _Topology:
@@ -125,10 +134,19 @@ def _note_choices(case: Case, roles: Roles) -> list[str]:
     return notes
 
 
-def _check_support(case: Case, model: Model) -> list[Fault]:
-    """Every body must be held by displacement conditions or by neighbours that are held."""
-    expected = "displacement conditions, or bonded or touching neighbours, that prevent it"
-    return [
-        case.fault(("regions", motion.regions[0]), f"a free rigid motion: {motion.text}", expected)
-        for motion in find_free_motions(model)
-    ]
+def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
+    """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
+    faults, notes = [], []
+    for motion in find_free_motions(model):
+        found = f"a free rigid motion ({motion.text})"
+        unbalance = describe_unbalance(model, motion)
+        expected = "displacement conditions, or bonded or touching neighbours, that prevent it"
+        if unbalance:
+            found += f": {unbalance}"
+        elif FREE_BODIES:
+            notes.append(f"Nothing prevents a {motion.text}; the loads balance, and its mean is set to zero.")
+            continue
+        else:
+            expected += " (a body held by the balance of its loads alone is not yet supported)"
+        faults.append(case.fault(("regions", motion.regions[0]), found, expected))
+    return faults, notes

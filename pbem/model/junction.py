@@ -28,6 +28,7 @@ class SplitCurves:
 
 
 def format_point(point: complex) -> str:
+    """A point for a message."""
     return f"({point.real:.6g}, {point.imag:.6g})"
 
 

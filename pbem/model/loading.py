@@ -25,6 +25,8 @@ _KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {
 
 @dataclass(frozen=True)
 class Loading:
+    """What acts on a model; the mappings are in the order of the file (interfaces before cracks)."""
+
     conditions: Mapping[str, Condition]
     interfaces: Mapping[str, Interface]
     stages: tuple[Stage, ...]

@@ -98,6 +98,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Analysis:
+    """scheme: which equation is collocated on which face; order: of the elements' polynomials; tips: crack-tip elements."""
+
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: int = 2
     tips: bool = True
@@ -105,6 +107,8 @@ class Analysis:
 
 @dataclass(frozen=True)
 class SolverOptions:
+    """How Newton's method and its linear systems are run; petsc: options without the leading dash."""
+
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
     newton_tolerance: float = 1e-9
     newton_max_iterations: int = 50

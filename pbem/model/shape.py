@@ -64,7 +64,7 @@ def measure(curves: Mapping[str, Curve]) -> tuple[float, float]:
     extents = points.real.max() - points.real.min(), points.imag.max() - points.imag.min()
     size = float(max(extents))
     # Far from the origin the coordinates themselves are rounded.
-    rounding = 16 * np.finfo(float).eps * float(np.abs(points).max())
+    rounding = 16 * float(np.finfo(float).eps) * float(np.abs(points).max())
     return size, max(SAME_POINT * size, rounding)
 
 

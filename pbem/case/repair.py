@@ -1,0 +1,66 @@
+"""A wrong file made harmless, so that what is right in it can still be checked."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+from pbem.case.finding import Finding
+from pbem.case.places import Loc
+from pbem.case.translation import known_keys
+
+# Values that stand in for wrong ones in a draft.
+_STAND_INS: Mapping[str, float] = {"young": 1.0, "poisson": 0.25}
+
+
+def repair(raw: Mapping[str, Any], findings: list[Finding]) -> dict[str, Any] | None:
+    """The file's tables with every wrong value left out or replaced; None if the rest cannot be judged without it."""
+    patched = copy.deepcopy(dict(raw))
+    return patched if all([_patch(patched, finding.loc) for finding in findings]) else None
+
+
+def _patch(raw: dict[str, Any], loc: Loc) -> bool:
+    """Take the wrong value out; False if the rest cannot be judged without it."""
+    if not loc or loc in (("materials",), ("curves",), ("regions",)):
+        return False
+    table, key = str(loc[0]), str(loc[2]) if len(loc) > 2 else ""
+    known = known_keys(loc[:2])
+    if table in ("curves", "regions") and len(loc) < 3:
+        return _patch_elements(raw, loc) if table == "curves" else False
+    if table == "regions" and key in known:
+        return False
+    if table == "curves" and key in ("points", "center", "radius", "angles", "expression"):
+        return False
+    if table == "curves" and key in ("elements", "size"):
+        return _patch_elements(raw, loc[:2])
+    if table == "materials" and key in _STAND_INS:
+        raw["materials"][loc[1]][key] = _STAND_INS[key]
+        return True
+    return _delete(raw, loc)
+
+
+def _patch_elements(raw: dict[str, Any], loc: Loc) -> bool:
+    """Any sufficient number of elements: topology does not depend on it."""
+    curve = raw["curves"].get(loc[1])
+    if not isinstance(curve, dict) or not ({"points", "center"} & set(curve)):
+        return False
+    curve.pop("size", None)
+    points = curve.get("points")
+    curve["elements"] = 4 + (len(points) if isinstance(points, list) else 0)
+    return True
+
+
+def _delete(raw: dict[str, Any], loc: Loc) -> bool:
+    """Remove the key, or the list around a list's entry."""
+    while isinstance(loc[-1], int) and len(loc) > 1:
+        loc = loc[:-1]
+    parent: Any = raw
+    for part in loc[:-1]:
+        try:
+            parent = parent[part]
+        except (KeyError, IndexError, TypeError):
+            return True
+    if isinstance(parent, dict):
+        parent.pop(str(loc[-1]), None)
+    return True

@@ -1,0 +1,88 @@
+"""The schema's own errors in the words of the case file."""
+
+from __future__ import annotations
+
+import re
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from pbem.case.finding import Finding, list_names, show, suggest
+from pbem.case.places import Loc, format_place
+from pbem.case.schema import CaseFile
+
+
+def find_schema_findings(raw: Mapping[str, Any]) -> list[Finding]:
+    """What the schema says against single keys and values."""
+    try:
+        CaseFile.model_validate(raw)
+    except ValidationError as error:
+        return [_translate(details) for details in error.errors(include_url=False) if not _follows(details)]
+    return []
+
+
+def _follows(details: ErrorDetails) -> bool:
+    """A list is counted as too short by its faulty entries, each of which has its own fault."""
+    value = details.get("input")
+    return details["type"] == "too_short" and isinstance(value, (list, dict)) and (
+        len(value) >= details["ctx"]["min_length"]
+    )
+
+
+_KINDS = {
+    "float_type": "a number", "int_type": "a whole number", "int_from_float": "a whole number",
+    "string_type": 'a text in quotes "..."', "bool_type": "true or false", "tuple_type": "a list [...]",
+    "list_type": "a list [...]", "dict_type": "a table", "mapping_type": "a table", "model_type": "a table",
+    "model_attributes_type": "a table", "finite_number": "a finite number",
+}
+_BOUNDS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "less_than": ("lt", "<"),
+           "less_than_equal": ("le", "<=")}
+
+
+def _translate(details: ErrorDetails) -> Finding:
+    loc: Loc = tuple(details["loc"])
+    kind, context, value = details["type"], details.get("ctx", {}), details.get("input")
+    if kind == "extra_forbidden":
+        known = known_keys(loc[:-1])
+        found = f"unknown key '{loc[-1]}'{suggest(str(loc[-1]), known)}"
+        return Finding(loc, found, f"one of: {list_names(sorted(known), 40)}")
+    if kind == "missing":
+        if isinstance(loc[-1], int):
+            return Finding(loc[:-1], show(value), f"at least {loc[-1] + 1} entries")
+        what = "[table]" if len(loc) == 1 else "key"
+        return Finding(loc, f"no {loc[-1]}", f"the {what} `{format_place(loc)}`")
+    if kind in _BOUNDS:
+        key, sign = _BOUNDS[kind]
+        return Finding(loc, show(value), f"a number {sign} {context[key]:g}{_other_bound(loc)}")
+    if kind == "literal_error":
+        near = suggest(value, re.findall(r"'([^']*)'", context["expected"])) if isinstance(value, str) else ""
+        return Finding(loc, f"{show(value)}{near}", context["expected"].replace("'", '"'))
+    if kind in ("too_short", "too_long"):
+        count = context.get("min_length", context.get("max_length"))
+        bound = "at least" if kind == "too_short" else "at most"
+        return Finding(loc, show(value), f"{bound} {count} {'entry' if count == 1 else 'entries'}")
+    return Finding(loc, show(value), _KINDS.get(kind, context.get("expected", details["msg"])))
+
+
+def _other_bound(loc: Loc) -> str:
+    """Ranges with two ends, in words, so that one message tells both."""
+    return {"poisson": " (-1 < poisson < 0.5)", "order": " (0, 1, 2 or 3)"}.get(str(loc[-1]), "")
+
+
+def known_keys(loc: Loc) -> set[str]:
+    """Keys of the table at `loc` (none if it has no fixed keys), found by walking down the schema."""
+    table: Any = CaseFile
+    for part in loc:
+        if isinstance(table, type) and issubclass(table, BaseModel):
+            field = table.model_fields.get(str(part))
+            table = field.annotation if field else None
+        else:
+            table = (*(a for a in typing.get_args(table) if a is not str and a is not Ellipsis), None)[0]
+        while typing.get_origin(table) in (typing.Annotated, typing.Union, types.UnionType):
+            options = [a for a in typing.get_args(table) if isinstance(a, type) and issubclass(a, BaseModel)]
+            table = (options or [*typing.get_args(table)])[0]
+    return set(table.model_fields) if isinstance(table, type) and issubclass(table, BaseModel) else set()

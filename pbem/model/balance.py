@@ -1,0 +1,63 @@
+"""Resultants of the prescribed tractions on bodies that nothing holds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pbem.model.junction import format_point
+from pbem.model.loop import side_legs
+from pbem.model.model import Condition, Model, Stage
+from pbem.model.support import FreeMotion
+
+# Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
+BALANCED = 1e-9
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+
+
+def describe_unbalance(model: Model, motion: FreeMotion) -> str | None:
+    """What drives a free motion: the first stage whose tractions do work on it, with their resultant; None if none."""
+    for stage in model.stages:
+        force, moment, power, scale = _sum_tractions(model, motion, stage)
+        if abs(power) > BALANCED * scale:
+            about = format_point(0j)
+            return (
+                f"the tractions of stage '{stage.name}' drive it, with resultant ({force.real:.6g}, {force.imag:.6g}) "
+                f"and moment {moment:.6g} about {about}"
+            )
+    return None
+
+
+def _sum_tractions(model: Model, motion: FreeMotion, stage: Stage) -> tuple[complex, float, float, float]:
+    """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs."""
+    force, moment, power, scale = 0j, 0.0, 0.0, 0.0
+    for region in model.regions:
+        if region.name not in motion.velocities:
+            continue
+        a, spin = motion.velocities[region.name]
+        for side in (side for loop in region.loops for side in loop.sides if side.curve in model.conditions):
+            condition = model.conditions[side.curve]
+            for leg in side_legs(model.curves, side):
+                points = leg.point(0.5 * (_NODES + 1))
+                if leg.center is None:
+                    normals = np.full(points.shape, -1j * leg.tangent(at_end=False))
+                else:
+                    normals = (points - leg.center) / np.abs(points - leg.center) * math.copysign(1.0, leg.sweep)
+                weights = 0.5 * _WEIGHTS * leg.length
+                tractions = _tractions(condition, stage.boundary[side.curve], normals) * weights
+                rates = (np.conj(tractions) * (a + 1j * spin * points)).real
+                force += complex(tractions.sum())
+                moment += float((np.conj(points) * tractions).imag.sum())
+                power += float(rates.sum())
+                scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
+    return force, moment, power, scale
+
+
+def _tractions(condition: Condition, values: tuple[float, float], normals: np.ndarray) -> np.ndarray:
+    """Known tractions at points with these outward normals; what is unknown counts as zero."""
+    first, second = (
+        value if quantity == "traction" else 0.0 for value, quantity in zip(values, condition.known, strict=True)
+    )
+    frame = normals if condition.frame == "local" else np.ones_like(normals)
+    return (first + 1j * second) * frame

@@ -104,9 +104,14 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
 
 
 def start_modes(laws: PairLaws) -> ModeState:
-    """Modes before any load: closed pairs stick, pairs with a gap are open."""
+    """Modes before any load: closed pairs stick, or slip if nothing resists; pairs with a gap are open."""
     is_open = laws.parted | (laws.gap > 0)
-    return ModeState(np.where(is_open, OPEN, STICK).astype(np.int8), np.ones(len(laws.gap)))
+    closed = np.where(_resists_slip(laws) | laws.bonded, STICK, SLIP)
+    return ModeState(np.where(is_open, OPEN, closed).astype(np.int8), np.ones(len(laws.gap)))
+
+
+def _resists_slip(laws: PairLaws) -> Bool:
+    return (laws.friction > 0) | (laws.cohesion > 0)
 
 
 def friction_bound(laws: PairLaws, p_n: Real, pressure: Real) -> tuple[Real, Real]:
@@ -183,8 +188,8 @@ def propose_modes(
     opens = np.where(modes.mode == OPEN, parting > -margin, parting > margin)
     bound, _ = friction_bound(laws, np.minimum(normal, laws.tensile_strength - pressure), pressure)
     excess = np.abs(tangential) - bound
-    same_sign = (modes.mode == SLIP) & (np.sign(tangential) * modes.sign >= 0)
-    slips = np.where(same_sign, excess > -margin, excess > margin)
+    same_sign = (modes.mode == SLIP) & ((np.sign(tangential) * modes.sign >= 0) | ~_resists_slip(laws))
+    slips = np.where(same_sign, excess > -margin, excess > margin) | ~_resists_slip(laws)
     opens = (opens | laws.parted) & ~laws.bonded
     slips &= ~laws.bonded & ~opens
     mode = np.where(opens, OPEN, np.where(slips, SLIP, STICK)).astype(np.int8)

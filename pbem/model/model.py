@@ -75,11 +75,14 @@ class Condition:
     """What is known on an outer curve, in two directions: x, y (global) or normal (outward), tangential (local).
 
     known: per direction the quantity whose values the stages give; the other one is unknown.
+    stiffness: Winkler springs per direction (stress/length): the traction is the known one minus stiffness times
+    displacement; zero where the displacement is known.
     """
 
     curve: str
     frame: Literal["global", "local"] = "global"
     known: tuple[Quantity, Quantity] = ("traction", "traction")
+    stiffness: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -87,13 +90,16 @@ class Stage:
     """A part of the load history: the values at its end, linear from those at the end of the stage before (0 at first).
 
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
-    file leaves out are carried over); pressure: fluid pressure of every interface.
+    file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
+    infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities.
     """
 
     name: str
     steps: int
     boundary: Mapping[str, tuple[float, float]]
     pressure: Mapping[str, float]
+    remote: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gravity: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -122,6 +128,7 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
+    initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -140,3 +147,4 @@ class Model:
     output_every: int
     size: float
     notes: tuple[str, ...] = ()
+    initial_stress: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)

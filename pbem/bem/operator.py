@@ -91,7 +91,7 @@ def assemble_rows(
     length: multiplies the traction equations, over the region's shear modulus.
     """
     nodes = np.arange(first_node, last_node)
-    scale = np.where(mesh.traction_equation, length / _shear_moduli(mesh, materials), 1.0)
+    scale = scale_equations(mesh, materials, length)
     sources = collect_sources(mesh, materials)
     node_region = mesh.node_region
     blocks = []
@@ -125,8 +125,10 @@ def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes:
     return blocks
 
 
-def _shear_moduli(mesh: Mesh, materials: Sequence[Material]) -> Real:
-    return np.array([material.shear_modulus for material in materials])[mesh.node_region]
+def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) -> Real:
+    """Factor (nodes,) of every node's equations: length/shear modulus for traction equations, 1 for the others."""
+    shear_modulus = np.array([material.shear_modulus for material in materials])[mesh.node_region]
+    return np.where(mesh.traction_equation, length / shear_modulus, 1.0)
 
 
 def _collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:

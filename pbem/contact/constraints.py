@@ -79,6 +79,9 @@ def _constrain_outer_nodes(
         unknown = 2 * outer.node + k
         for field, taken, scale in ((DISPLACEMENT, ~known, 1.0), (TRACTION, known, traction_scale)):
             entries.add(field, outer.node[taken], unknown[taken], scale * direction[taken])
+        sprung = outer.stiffness[:, k] > 0
+        spring = -outer.stiffness[sprung, k] * direction[sprung]
+        entries.add(TRACTION, outer.node[sprung], unknown[sprung], spring)
         for field, taken in ((DISPLACEMENT, known), (TRACTION, ~known)):
             offset[field, outer.node[taken]] += load.values[taken, k] * direction[taken]
 

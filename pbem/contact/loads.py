@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.bem.background import Background
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model
+from pbem.model.model import Model, Region, Stage
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -26,14 +29,23 @@ class OuterNodes:
     direction: NDArray[np.complex128]
     displacement_known: Bool
     condition: Integer
+    stiffness: Real
 
 
 @dataclass(frozen=True)
 class Load:
-    """values (k, 2): known displacement or traction of the outer nodes; pressure (m,): fluid pressure of the pairs."""
+    """values (k, 2): known displacement or traction of the outer nodes; pressure (m,): fluid pressure of the pairs.
+
+    known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
+    integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
+    background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
+    """
 
     values: Real
     pressure: Real
+    known: Real
+    far: Complex
+    background: Complex
 
 
 def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
@@ -43,35 +55,75 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     curve = mesh.node_curve
     node = np.flatnonzero(np.isin(curve, list(number)))
     which = np.array([number[c] for c in curve[node]], dtype=np.int64)
-    local = np.array([condition.frame == "local" for condition in conditions])[which] if conditions else which > 0
+    local = np.array([condition.frame == "local" for condition in conditions], dtype=bool)[which]
     first = np.where(local, mesh.normal[node], 1.0)
-    known = np.array([[quantity == "displacement" for quantity in c.known] for c in conditions]).reshape(-1, 2)
-    return OuterNodes(node, np.stack([first, 1j * first], axis=1), known[which], which)
+    known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
+    stiffness = np.array([value for c in conditions for value in c.stiffness], dtype=float)
+    return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
+                      stiffness.reshape(-1, 2)[which])
 
 
 def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, factor: float) -> Load:
     """Values at the fraction `factor` of a stage, linear between the ends of the stages (zero before the first)."""
     after = model.stages[stage]
-    before = model.stages[stage - 1] if stage > 0 else None
-    values = np.zeros((len(model.conditions), 2))
-    for row, name in enumerate(model.conditions):
-        old = np.array(before.boundary.get(name, (0.0, 0.0))) if before else np.zeros(2)
-        values[row] = old + factor * (np.array(after.boundary.get(name, (0.0, 0.0))) - old)
-    pressure = np.zeros(len(mesh.interface_names))
-    for row, name in enumerate(mesh.interface_names):
-        reached = before.pressure.get(name, 0.0) if before else 0.0
-        pressure[row] = reached + factor * (after.pressure.get(name, 0.0) - reached)
-    return Load(values[outer.condition], pressure[mesh.pairs.interface])
+    before = model.stages[stage - 1] if stage > 0 else Stage("rest", 1, {}, {})
+
+    def interpolate(old: Sequence[float], new: Sequence[float]) -> Real:
+        return np.array(old) + factor * (np.array(new) - np.array(old))
+
+    none = (0.0, 0.0)
+    values = [interpolate(before.boundary.get(name, none), after.boundary.get(name, none)) for name in model.conditions]
+    pressure = [
+        interpolate([before.pressure.get(name, 0.0)], [after.pressure.get(name, 0.0)]) for name in mesh.interface_names
+    ]
+    gravity = complex(*interpolate(before.gravity, after.gravity))
+    remote = interpolate(before.remote, after.remote)
+    balanced = _sample(mesh, [balanced_background(model, region, gravity) for region in model.regions])
+    far = _sample(mesh, [far_background(region, remote) for region in model.regions])
+    known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
+    return Load(
+        values=np.reshape(values, (-1, 2))[outer.condition],
+        pressure=np.reshape(pressure, -1)[mesh.pairs.interface],
+        known=np.stack([known.real, known.imag], axis=2).ravel(),
+        far=far,
+        background=balanced[0] + far[0],
+    )
+
+
+def _sample(mesh: Mesh, backgrounds: Sequence[Background]) -> Complex:
+    """Displacement and traction (2, nodes) of the regions' background fields at all nodes."""
+    fields = np.zeros((2, mesh.nodes), dtype=complex)
+    for region, background in enumerate(backgrounds):
+        if not background.is_zero:
+            own = mesh.node_region == region
+            fields[0, own] = background.displacement(mesh.position[own])
+            fields[1, own] = background.traction(mesh.position[own], mesh.normal[own])
+    return fields
+
+
+def balanced_background(model: Model, region: Region, gravity: complex) -> Background:
+    """In-situ stress and weight of a region."""
+    initial = model.initial_stress.get(region.material.name, (0.0, 0.0, 0.0))
+    return Background(region.material, initial=initial, force=region.material.density * gravity)
+
+
+def far_background(region: Region, remote: Real) -> Background:
+    """The field to which an infinite region tends; none in a finite region."""
+    sxx, syy, sxy = remote if region.infinite else (0.0, 0.0, 0.0)
+    return Background(region.material, remote=(float(sxx), float(syy), float(sxy)))
 
 
 def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:
     """Entries (4 nodes,) of v = (u, t) that can differ from zero at any time of the load history."""
     needed = np.ones(4 * mesh.nodes, dtype=bool)
     ever = np.zeros((len(outer.node), 2), dtype=bool)
+    known = np.zeros(4 * mesh.nodes, dtype=bool)
     for stage in range(len(model.stages)):
-        ever |= evaluate_load(model, mesh, outer, stage, 1.0).values != 0
+        load = evaluate_load(model, mesh, outer, stage, 1.0)
+        ever |= load.values != 0
+        known |= load.known != 0
     parts = np.stack([outer.direction.real, outer.direction.imag], axis=2) != 0  # (k, direction, component)
     for first, free in ((0, ~outer.displacement_known), (2 * mesh.nodes, outer.displacement_known)):
-        wanted = ((free | ever)[:, :, None] & parts).any(axis=1)
+        wanted = ((free | ever | (outer.stiffness > 0))[:, :, None] & parts).any(axis=1)
         needed[first + 2 * outer.node[:, None] + np.arange(2)] = wanted
-    return needed
+    return needed | known

@@ -90,7 +90,7 @@ def describe_step(problem: Problem, solution: Solution, number: int, stage: int,
     displacement, traction = values[: mesh.nodes].copy(), values[mesh.nodes :]
     cracks = problem.all_crack_nodes
     jump = displacement[cracks]
-    mean = problem.recover_crack_displacement(solution.v)
+    mean = problem.recover_crack_displacement(solution.v, problem.evaluate_load(stage, factor))
     displacement[cracks] = mean + jump / 2
     opposite = np.zeros(mesh.nodes, dtype=complex)
     opposite[cracks] = mean - jump / 2

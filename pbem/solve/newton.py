@@ -102,7 +102,7 @@ def _solve_linearised(problem: Problem, tangent: Tangent, law: Linearisation, lo
     """Unknowns and v with B v = 0 for linearised laws, and the relative residual; refined once if need be."""
     constraints = problem.constrain(law, load)
     tangent.update(constraints)
-    forced = problem.operator.apply(constraints.offset)
+    forced = problem.apply(constraints.offset, load)
     scale = problem.measure(forced)
     if scale == 0.0:
         unknowns = np.zeros(problem.unknowns)
@@ -111,7 +111,7 @@ def _solve_linearised(problem: Problem, tangent: Tangent, law: Linearisation, lo
     unknowns = tangent.solve(-forced)
     for attempt in range(2):
         v = constraints.evaluate(unknowns)
-        left = problem.operator.apply(v)
+        left = problem.apply(v, load)
         residual = problem.measure(left) / scale
         if residual <= tolerance:
             return unknowns, v, residual

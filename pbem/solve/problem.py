@@ -9,7 +9,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from pbem.bem.operator import Block, RowOperator, assemble_displacement_rows, assemble_rows
+from pbem.bem.operator import (
+    Block,
+    RowOperator,
+    assemble_displacement_rows,
+    assemble_rows,
+    scale_equations,
+)
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.laws import Linearisation, PairLaws, collect_laws
 from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
@@ -20,13 +26,16 @@ from pbem.solve.linear import LinearSolver, choose_method
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
 class Problem:
     """What stays the same through a run; equal on all ranks but for `operator`, which holds this rank's rows.
 
-    offsets (ranks + 1,): first node of every rank. traction_scale: modulus/length, the unit of traction unknowns.
+    traction_scale: modulus/length, the unit of traction unknowns. equation_scale (nodes,): factors of the equations.
+    crack_rows, crack_nodes: this rank's share of the rows that recover the mean displacement of crack faces.
+    block_columns: for every block of the operator, the unknowns on which its region depends.
     """
 
     comm: MPI.Intracomm
@@ -38,6 +47,7 @@ class Problem:
     crack_rows: tuple[Block, ...]
     crack_nodes: Integer
     traction_scale: float
+    equation_scale: Real
     block_columns: tuple[Integer, ...]
 
     @property
@@ -58,6 +68,14 @@ class Problem:
         """The constraint map for linearised laws and a load."""
         return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale)
 
+    def apply(self, v: Real, load: Load) -> Real:
+        """This rank's rows of the integral equations' left-hand side less the part that comes from far away, lengths."""
+        first, last = self.operator.first_node, self.operator.last_node
+        own = slice(first, last)
+        far = np.where(self.mesh.traction_equation[own], load.far[1, own], load.far[0, own]) * self.equation_scale[own]
+        result: Real = self.operator.apply(v - load.known) - np.stack([far.real, far.imag], axis=1).ravel()
+        return result
+
     def evaluate_load(self, stage: int, factor: float) -> Load:
         return evaluate_load(self.model, self.mesh, self.outer, stage, factor)
 
@@ -65,13 +83,14 @@ class Problem:
         """Norm of a vector spread over the ranks."""
         return norm_of_parts(self.comm, part)
 
-    def recover_crack_displacement(self, v: Real) -> NDArray[np.complex128]:
+    def recover_crack_displacement(self, v: Real, load: Load) -> Complex:
         """Mean displacement of the two faces at all crack nodes (complex, in mesh order), on every rank."""
+        elastic = v - load.known
         part = np.zeros(2 * len(self.crack_nodes))
         for block in self.crack_rows:
-            part[block.rows] = block.matrix @ v[block.columns]
+            part[block.rows] = block.matrix @ elastic[block.columns]
         whole = gather_parts(self.comm, part)
-        return whole[0::2] + 1j * whole[1::2]
+        return whole[0::2] + 1j * whole[1::2] + load.background[self.all_crack_nodes]
 
 
 def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
@@ -98,6 +117,7 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
         crack_rows=tuple(assemble_displacement_rows(mesh, materials, own_cracks, needed)),
         crack_nodes=own_cracks,
         traction_scale=modulus / model.size,
+        equation_scale=scale_equations(mesh, materials, model.size),
         block_columns=tuple(find_unknowns_of_region(mesh, outer, block.region) for block in operator.blocks),
     )
 

@@ -6,11 +6,10 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from pbem.case import parse_case, read_case_text
 from pbem.errors import PbemError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import build_model
+from pbem.model.build import read_model
 from pbem.model.model import Model
 from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.output import check_output_path
@@ -42,8 +41,7 @@ def run(
     """
     with abort_if_unexpected(world, PbemError):
         path = Path(case)
-        text = do_on_first(world, PbemError, lambda: read_case_text(path))
-        model = build_model(parse_case(text, str(path)))
+        model = do_on_first(world, PbemError, lambda: read_model(path)[1])
         target = Path(output) if output is not None else Path(path.stem + ".h5")
         do_on_first(world, PbemError, lambda: check_output_path(target))
         mesh = generate_mesh(model)

@@ -23,10 +23,11 @@ def describe_model(model: Model, mesh: Mesh) -> str:
         _section("curves", _table(["curve", "legs", "elements", "length", "refined towards"],
                                   [_curve_row(curve) for curve in model.curves.values()])),
         _section("conditions", _table(["curve", *_direction_titles(model)],
-                                      [_condition_row(model, each) for each in model.conditions.values()])),
+                                      [[each.curve, *describe_condition(model, each)]
+                                       for each in model.conditions.values()])),
         _section("interfaces", _table(["interface", "first side", "second side", "pairs", "law"],
                                       _interface_rows(model, mesh))),
-        _section("load", [f"{stage.name}: {_count(stage.steps, 'step')}" for stage in model.stages]),
+        _section("load", _describe_loads(model)),
         _section("size", _describe_size(model, mesh)),
         _section("notes", _shorten([*model.notes, *mesh.notes])),
     ]
@@ -105,18 +106,19 @@ def _direction_titles(model: Model) -> list[str]:
     return ["x", "y"] if frames <= {"global"} else ["x or normal", "y or tangential"]
 
 
-def _condition_row(model: Model, condition: Condition) -> list[str]:
-    """What is prescribed: one value if it is the same at the end of every stage, else the values in turn."""
+def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
+    """What is prescribed in each direction: one value, or those at the end of every stage where they differ."""
     names = ("n", "s") if condition.frame == "local" else ("x", "y")
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
-    if condition.known == ("traction", "traction") and not any(map(any, values)):
-        return [condition.curve, "free", "free"]
-    row = [condition.curve]
+    if condition.known == ("traction", "traction") and not any(map(any, [*values, condition.stiffness])):
+        return "free", "free"
+    texts = []
     for i, quantity in enumerate(condition.known):
         given = [f"{value[i]:g}" for value in values]
         given = given[:1] if len(set(given)) == 1 else _shorten(given, 6)
-        row.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}")
-    return row
+        spring = f", spring {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
+        texts.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}{spring}")
+    return texts[0], texts[1]
 
 
 def _interface_rows(model: Model, mesh: Mesh) -> list[list[str]]:
@@ -132,6 +134,23 @@ def describe_law(law: Law) -> str:
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
     return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
+
+
+def _describe_loads(model: Model) -> list[str]:
+    """The stages, with the loads that do not belong to a curve; then the in-situ stresses."""
+    lines = []
+    for stage in model.stages:
+        parts = [f"{stage.name}: {_count(stage.steps, 'step')}"]
+        if any(stage.remote):
+            parts.append("remote stress sxx, syy, sxy = {:g}, {:g}, {:g}".format(*stage.remote))
+        if any(stage.gravity):
+            parts.append("gravity {:g}, {:g}".format(*stage.gravity))
+        pressure = {name: value for name, value in stage.pressure.items() if value}
+        parts += _shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
+        lines.append(", ".join(parts))
+    for name, stress in model.initial_stress.items():
+        lines.append("in-situ stress of {}: sxx, syy, sxy = {:g}, {:g}, {:g}".format(name, *stress))
+    return lines
 
 
 def _describe_size(model: Model, mesh: Mesh) -> list[str]:

@@ -1,0 +1,257 @@
+"""A picture of a model before it is computed: regions, elements, conditions, contact sides, cracks."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as OutlinePath
+from numpy.typing import NDArray
+
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Condition, Model, Region
+from pbem.results.describe import describe_condition
+from pbem.results.plot_style import FORCE, MOTION, SHADES, SUPPORT, label, style
+
+Complex = NDArray[np.complex128]
+MOST_NAMES = 30
+CRACK = "#A51C30"
+
+
+def plot_model(model: Model, mesh: Mesh, path: str | os.PathLike[str]) -> None:
+    """Write the picture of a model; the ending of `path` says the format."""
+    with style():
+        draw_model(model, mesh).savefig(path, dpi=200)
+
+
+def draw_model(model: Model, mesh: Mesh) -> Figure:
+    """The figure of `plot_model`."""
+    figure = Figure(figsize=(7.2, 5.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    used = {name: np.flatnonzero(mesh.curve == i) for i, name in enumerate(mesh.curve_names)}
+    for number, region in enumerate(model.regions):
+        _draw_region(axes, number, region, mesh)
+    _draw_elements(axes, model, mesh)
+    for condition in model.conditions.values():
+        _draw_condition(axes, model, mesh, condition, used[condition.curve])
+    few = len(model.curves) <= MOST_NAMES
+    for name, elements in used.items():
+        if few and len(elements):
+            _name_curve(axes, model, mesh, name, elements)
+    for name in model.interfaces:
+        _draw_sides(axes, model, mesh, name)
+    axes.autoscale_view()
+    axes.margins(0.06)
+    axes.set_xlabel(label("$x$", model.units_length))
+    axes.set_ylabel(label("$y$", model.units_length))
+    axes.set_title(f"{model.title}\n{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, "
+                   f"{mesh.pairs.count} contact pairs", loc="left", fontsize=9)
+    axes.legend(handles=_list_handles(model, few), loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def _draw_region(axes: Axes, number: int, region: Region, mesh: Mesh) -> None:
+    """Shade a region and name it where there is most room; an infinite one is the shaded plane."""
+    loops = _list_loops(mesh, number)
+    shade = SHADES[number % len(SHADES)]
+    if region.infinite:
+        axes.set_facecolor(shade)
+        for loop in loops:
+            axes.add_patch(PathPatch(OutlinePath(_columns(loop)), facecolor="white", edgecolor="none", zorder=0))
+        text = f"{region.name} (infinite)"
+        axes.text(0.02, 0.02, text, transform=axes.transAxes, style="italic", color="0.3", zorder=6)
+        return
+    path = OutlinePath.make_compound_path(*(OutlinePath(_columns(loop), closed=True) for loop in loops))
+    axes.add_patch(PathPatch(path, facecolor=shade, edgecolor="none", zorder=0.5))
+    place = _find_room(path, np.concatenate([mesh.start, mesh.end]))
+    axes.text(place.real, place.imag, region.name, ha="center", va="center", style="italic", color="0.3", zorder=6)
+
+
+def _list_loops(mesh: Mesh, region: int) -> list[Complex]:
+    """Closed loops (first point repeated) of a region, cracks not among them."""
+    loops: list[Complex] = []
+    points: list[complex] = []
+    for e in np.flatnonzero((mesh.region == region) & ~mesh.crack):
+        points = points or [complex(mesh.start[e])]
+        points.append(complex(mesh.end[e]))
+        if points[-1] == points[0]:
+            loops.append(np.array(points))
+            points = []
+    return loops
+
+
+def _find_room(path: OutlinePath, boundary: Complex) -> complex:
+    """The point of a grid inside the path that is farthest from the boundary."""
+    low, high = path.vertices.min(axis=0), path.vertices.max(axis=0)
+    x, y = np.meshgrid(*(np.linspace(a, b, 23)[1:-1] for a, b in zip(low, high, strict=True)))
+    grid = x.ravel() + 1j * y.ravel()
+    # The winding number by the angles from point to point: holes, which run the other way, count zero.
+    inside = path.contains_points(_columns(grid))
+    grid = grid[inside] if inside.any() else grid
+    distance = np.min(np.abs(grid[:, None] - boundary[None, :: max(1, len(boundary) // 2000)]), axis=1)
+    return complex(grid[np.argmax(distance)])
+
+
+def _draw_elements(axes: Axes, model: Model, mesh: Mesh) -> None:
+    """Every element with ticks across its ends; cracks heavier."""
+    lines = np.stack([_columns(mesh.start), _columns(mesh.end)], axis=1)
+    across = 0.006 * model.size * 1j * (mesh.end - mesh.start) / np.abs(mesh.end - mesh.start)
+    ends = np.concatenate([mesh.start, mesh.end])
+    offset = np.concatenate([across, across])
+    ticks = np.stack([_columns(ends - offset), _columns(ends + offset)], axis=1)
+    axes.add_collection(LineCollection(ticks, colors="0.35", linewidths=0.5, zorder=3))
+    for crack, color, width in ((False, "0.15", 0.9), (True, CRACK, 1.3)):
+        axes.add_collection(LineCollection(lines[mesh.crack == crack], colors=color, linewidths=width, zorder=3))
+
+
+def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, elements: NDArray[np.int64]) -> None:
+    """Supports where displacements are held, arrows for displacements and tractions that are not zero."""
+    values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
+    place, normal = _spread_points(mesh, elements)
+    local = condition.frame == "local"
+    axes_of_curve = (normal, 1j * normal) if local else (np.ones_like(normal), 1j * np.ones_like(normal))
+    held = [quantity == "displacement" and not any(value[i] for value in values)
+            for i, quantity in enumerate(condition.known)]
+    if all(held):
+        _draw_clamp(axes, model, mesh, elements)
+    elif any(held):
+        direction = axes_of_curve[held.index(True)]
+        # The roller stands outside; where the held direction runs along the curve, beside its line all the same.
+        outward = np.where((direction * normal.conj()).real < -1e-9, -direction, direction)
+        _draw_rollers(axes, model, place, outward)
+    for quantity, color in (("traction", FORCE), ("displacement", MOTION)):
+        vector = sum(
+            (_pick_last([value[i] for value in values]) * axes_of_curve[i]
+             for i in range(2) if condition.known[i] == quantity),
+            start=np.zeros_like(normal),
+        )
+        _draw_arrows(axes, model.size, place, normal, vector, color)
+
+
+def _pick_last(values: list[float]) -> float:
+    """The last value of the history that is not zero."""
+    return next((value for value in reversed(values) if value), 0.0)
+
+
+def _spread_points(mesh: Mesh, elements: NDArray[np.int64], most: int = 6) -> tuple[Complex, Complex]:
+    """About `most` points spread along a curve by length, and the outward normals there."""
+    length = np.abs(mesh.end[elements] - mesh.start[elements])
+    along = np.concatenate([[0.0], np.cumsum(length)])
+    wanted = (np.arange(most) + 0.5) / most * along[-1]
+    which = np.clip(np.searchsorted(along, wanted, side="right") - 1, 0, len(elements) - 1)
+    chosen = elements[which]
+    step = (mesh.end - mesh.start)[chosen]
+    place = mesh.start[chosen] + (wanted - along[which]) / length[which] * step
+    return place, -1j * step / np.abs(step)
+
+
+def _draw_clamp(axes: Axes, model: Model, mesh: Mesh, elements: NDArray[np.int64]) -> None:
+    place, normal = _spread_points(mesh, elements, 24)
+    stroke = 0.03 * model.size * normal * np.exp(0.25j * np.pi)
+    lines = np.stack([_columns(place), _columns(place + stroke)], axis=1)
+    axes.add_collection(LineCollection(lines, colors=SUPPORT, linewidths=0.6, zorder=2))
+
+
+def _draw_rollers(axes: Axes, model: Model, place: Complex, outward: Complex) -> None:
+    """Circles on which the curve rolls, with a line behind them."""
+    radius = 0.012 * model.size
+    for point, direction in zip(place, outward, strict=True):
+        circle = OutlinePath.circle(_columns(np.array([point + radius * direction]))[0], radius)
+        axes.add_patch(PathPatch(circle, facecolor="white", edgecolor=SUPPORT, linewidth=0.7, zorder=2.5))
+        ground = point + 2 * radius * direction + 1.6 * radius * np.array([-1j, 1j]) * direction
+        axes.plot(ground.real, ground.imag, color=SUPPORT, linewidth=0.7, zorder=2.5)
+
+
+def _draw_arrows(axes: Axes, size: float, place: Complex, normal: Complex, vector: Complex, color: str) -> None:
+    """Arrows outside the body: those that press end on the curve, those that pull begin on it."""
+    largest = np.abs(vector).max(initial=0.0)
+    if largest == 0.0:
+        return
+    # In a small hole the arrows have to be small as well.
+    extent = max(float(np.ptp(place.real)), float(np.ptp(place.imag)))
+    arrows = min(0.09 * size, 0.3 * extent) * vector / largest
+    pressing = (arrows * normal.conj()).real < -1e-3 * np.abs(arrows)
+    sliding = np.abs((arrows * normal.conj()).real) <= 1e-3 * np.abs(arrows)
+    gap = min(0.02 * size, 0.07 * extent) * normal
+    tail = place + np.where(sliding, gap - arrows / 2, np.where(pressing, gap - arrows, gap))
+    axes.quiver(tail.real, tail.imag, arrows.real, arrows.imag, color=color, angles="xy", scale_units="xy", scale=1,
+                width=0.003, headwidth=4.5, headlength=5.5, zorder=5)
+    # Arrows do not count for the limits of the axes by themselves.
+    tips = np.concatenate([tail, tail + arrows])
+    axes.update_datalim(_columns(tips))
+
+
+def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: NDArray[np.int64]) -> None:
+    """The curve's name at its middle, with what is prescribed there; beside a steep curve the text runs upwards."""
+    one_side = elements[mesh.region[elements] == mesh.region[elements[0]]]
+    # Curves inside are named off their middle, where other names are likelier to be.
+    most, which = (1, 0) if name in model.conditions else (4, 3 if mesh.crack[one_side[0]] else 0)
+    place, normal = (complex(values[which]) for values in _spread_points(mesh, one_side, most))
+    text, far = name, 0.02
+    if name in model.conditions:
+        given = describe_condition(model, model.conditions[name])
+        loaded = any(any(stage.boundary.get(name, (0.0, 0.0))) for stage in model.stages)
+        if given[0] != "free":
+            text, far = f"{name}\n{given[0]}, {given[1]}", 0.14 if loaded else 0.045
+    if model.curves[name].closed:
+        # Below the curve: inside of a hole there is no room.
+        lowest = mesh.start[one_side][np.argmin(mesh.start[one_side].imag)]
+        place, normal, far = complex(lowest), -1j, 0.02
+    steep = abs(normal.real) > 0.75
+    at = place + far * model.size * normal
+    axes.text(
+        at.real, at.imag, text, rotation=90 if steep else 0, fontsize=7, color="0.2", zorder=6, linespacing=1.4,
+        ha="left" if normal.real > 0.4 else "right" if normal.real < -0.4 else "center",
+        va="center" if steep else "bottom" if normal.imag > 0 else "top",
+    )
+    room = at + 0.06 * model.size * normal * (1 + text.count("\n"))
+    axes.update_datalim(_columns(np.array([room])))
+
+
+def _draw_sides(axes: Axes, model: Model, mesh: Mesh, name: str) -> None:
+    """The normal of the first side, and the numbers of both sides; tips of cracks as dots."""
+    pairs = np.flatnonzero(mesh.pairs.interface == mesh.interface_names.index(name))
+    if name in model.crack_tips:
+        curve = model.curves[name]
+        tips = [end for end, tip in zip((curve.start, curve.end), model.crack_tips[name], strict=True) if tip]
+        size = 4.0 if len(model.crack_tips) < 10 else 2.5
+        axes.plot(np.real(tips), np.imag(tips), ".", color=CRACK, markersize=size, zorder=4)
+    if len(model.interfaces) > MOST_NAMES or not len(pairs):
+        return
+    along = mesh.pairs.arc_length[pairs]
+    pair = pairs[np.argmin(np.abs(along - (along.min() + 0.25 * np.ptp(along))))]
+    place, normal = mesh.pairs.position[pair], mesh.pairs.normal[pair]
+    axes.quiver(place.real, place.imag, normal.real, normal.imag, angles="xy", scale_units="xy",
+                scale=1 / (0.06 * model.size), width=0.003, color="#1B7837", zorder=5)
+    for number, side in (("1", -1), ("2", 1)):
+        at = place + model.size * (0.025 * side * normal + 0.02j * normal)
+        axes.text(at.real, at.imag, number, ha="center", va="center", fontsize=6.5, color="#1B7837", zorder=6)
+
+
+def _list_handles(model: Model, few: bool) -> list[Line2D]:
+    handles = [Line2D([], [], color="0.15", linewidth=0.9, marker="|", markersize=5, label="elements")]
+    if model.crack_tips:
+        handles.append(Line2D([], [], color=CRACK, linewidth=1.3, label=f"cracks ({len(model.crack_tips)})"))
+    if 0 < len(model.interfaces) <= MOST_NAMES:
+        handles.append(Line2D([], [], color="#1B7837", marker=r"$\rightarrow$", markersize=8, linestyle="none",
+                              label="normal of the first side"))
+    for quantity, color in (("traction", FORCE), ("displacement", MOTION)):
+        if any(quantity == known and any(stage.boundary.get(name, (0.0, 0.0))[i] for stage in model.stages)
+               for name, condition in model.conditions.items() for i, known in enumerate(condition.known)):
+            handles.append(Line2D([], [], color=color, marker=r"$\rightarrow$", markersize=8, linestyle="none",
+                                  label=f"{quantity}s prescribed"))
+    if not few:
+        handles.append(Line2D([], [], linestyle="none", label=f"{len(model.curves)} curves, names left out"))
+    return handles
+
+
+def _columns(points: Complex) -> NDArray[np.float64]:
+    return np.stack([points.real, points.imag], axis=-1)

@@ -1,0 +1,112 @@
+"""Outlines of regions and faces of cracks, as they were and displaced, from the nodes of a result file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.results.reader import Elements, Nodes
+
+Real = NDArray[np.float64]
+POINTS_PER_ELEMENT = 5
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A loop of a region (closed: last point = first point) or one face of a crack: points (p, 2) in order of travel.
+
+    position: as it was; displacement: at the same points.
+    """
+
+    region: int
+    crack: bool
+    position: Real
+    displacement: Real
+
+
+def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list[Outline]:
+    """All loops of all regions, then both faces of every crack; displacement (n, 2) at the nodes.
+
+    The displacement is continuous along a loop, while each element has its own polynomial: where two elements meet,
+    and where the faces of a crack meet at its tip, the outline goes through the mean.
+    """
+    t = np.linspace(-1.0, 1.0, POINTS_PER_ELEMENT)
+    values = interpolate_elements(nodes, elements, displacement, t)
+    start, end = elements.vertices[:, 0], elements.vertices[:, 1]
+    places = start[:, None] + 0.5 * (1 + t[:, None]) * (end - start)[:, None]
+    places[:, -1] = end
+    chains = find_chains(elements)
+    join_tips(elements, chains, values)
+    outlines = []
+    for chain in chains:
+        closed = not elements.crack[chain[0]] and bool((end[chain[-1]] == start[chain[0]]).all())
+        outlines.append(Outline(
+            region=int(elements.region[chain[0]]), crack=bool(elements.crack[chain[0]]),
+            position=_join(places[chain], closed), displacement=_join(values[chain], closed),
+        ))
+    return outlines
+
+
+def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t: Real) -> Real:
+    """(e, len(t), 2): displacement at local coordinates t in [-1, 1] of every element."""
+    count = len(elements.vertices)
+    middle = elements.vertices.mean(axis=1)
+    half = 0.5 * (elements.vertices[:, 1] - elements.vertices[:, 0])
+    offset = nodes.position.reshape(count, -1, 2) - middle[:, None]
+    local = (offset * half[:, None]).sum(axis=-1) / (half**2).sum(axis=-1)[:, None]
+    powers = np.arange(nodes.order + 1)
+    coefficients = np.linalg.solve(local[..., None] ** powers, displacement.reshape(count, -1, 2))
+    return np.asarray(t[:, None] ** powers @ coefficients)
+
+
+def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
+    """Elements that follow each other along a loop or along one face of a crack, in the order of travel."""
+    start, end = elements.vertices[:, 0], elements.vertices[:, 1]
+    # Second faces are stored in the order of the first ones; their travel goes the other way.
+    second = len(start) - int(elements.crack.sum()) // 2
+    order = np.concatenate([np.arange(second), np.arange(len(start) - 1, second - 1, -1)])
+    chains: list[list[int]] = []
+    for e in order:
+        last = chains[-1] if chains else []
+        follows = bool(last) and (
+            bool((start[e] == end[last[-1]]).all())
+            and elements.region[e] == elements.region[last[-1]]
+            and bool(elements.crack[e]) == bool(elements.crack[last[-1]])
+            and (not elements.crack[e] or elements.curve[e] == elements.curve[last[-1]])
+            and (bool(elements.crack[e]) or bool((end[last[-1]] != start[last[0]]).any()))
+        )
+        if follows:
+            last.append(int(e))
+        else:
+            chains.append([int(e)])
+    return [np.array(chain) for chain in chains]
+
+
+def join_tips(elements: Elements, chains: list[NDArray[np.int64]], values: Real) -> None:
+    """Let both faces of a crack have their mean displacement at the ends where nothing else meets it; in place."""
+    vertices = elements.vertices.reshape(-1, 2)
+    _, which, counts = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
+    meeting = counts[which.ravel()].reshape(-1, 2)
+    faces: dict[tuple[float, ...], list[tuple[int, int]]] = {}
+    for chain in chains:
+        if elements.crack[chain[0]]:
+            for element, side in ((int(chain[0]), 0), (int(chain[-1]), 1)):
+                if meeting[element, side] == 2:
+                    faces.setdefault(tuple(elements.vertices[element, side]), []).append((element, -side))
+    for ends in faces.values():
+        mean = np.mean([values[end] for end in ends], axis=0)
+        for end in ends:
+            values[end] = mean
+
+
+def _join(pieces: Real, closed: bool) -> Real:
+    """(elements, points, 2) to one line, with the mean where two elements meet."""
+    inner = 0.5 * (pieces[:-1, -1] + pieces[1:, 0])
+    first, last = pieces[0, 0], pieces[-1, -1]
+    if closed:
+        first = last = 0.5 * (first + last)
+    joints = np.concatenate([first[None], inner])
+    body = np.concatenate([joints[:, None], pieces[:, 1:-1]], axis=1).reshape(-1, 2)
+    return np.concatenate([body, last[None]])

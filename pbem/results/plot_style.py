@@ -1,0 +1,69 @@
+"""What the pictures share: fonts, colours that also colour-blind readers tell apart, labels with units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+
+from pbem.solve.step import OPEN, SLIP, STICK
+
+
+@dataclass(frozen=True)
+class ModeStyle:
+    """How pairs of one mode are marked: by shape as well as by colour, and by filling; as a line by its stroke."""
+
+    name: str
+    marker: str
+    face: str
+    edge: str
+    stroke: str
+
+    @property
+    def marks(self) -> dict[str, Any]:
+        """Arguments of `scatter`."""
+        return {"marker": self.marker, "facecolors": self.face, "edgecolors": self.edge, "linewidths": 0.6}
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Arguments of `Line2D`."""
+        return {"marker": self.marker, "markerfacecolor": self.face, "markeredgecolor": self.edge,
+                "markeredgewidth": 0.6, "markersize": 4.5}
+
+
+MODES = {
+    STICK: ModeStyle("stick", "o", "#0072B2", "#0072B2", "#0072B2"),
+    SLIP: ModeStyle("slip", "^", "#E69F00", "#B87D00", "#E69F00"),
+    OPEN: ModeStyle("open", "s", "white", "#333333", "black"),
+}
+SHADES = ("#DCE6EE", "#EFE6D5", "#DFEBDC", "#EADFEA", "#E4E4E4", "#F2DEDA")
+POWER, SUPERSCRIPT = r"\^(-?[0-9.]+)", r"$^{\1}$"
+FORCE, MOTION, SUPPORT = "#D55E00", "#0072B2", "#444444"
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Small type and thin lines while the block runs."""
+    with matplotlib.rc_context({
+        "font.size": 8, "axes.titlesize": 9, "axes.linewidth": 0.6, "legend.fontsize": 7.5, "legend.frameon": False,
+        "xtick.major.width": 0.6, "ytick.major.width": 0.6, "mathtext.default": "it",
+        "axes.formatter.use_mathtext": True,
+    }):
+        yield
+
+
+def label(quantity: str, unit: str) -> str:
+    """`quantity (unit)`; powers in the unit as superscripts."""
+    if not unit:
+        return quantity
+    plain = unit.replace("$", r"\$").replace("**", "^")
+    return f"{quantity} ({re.sub(POWER, SUPERSCRIPT, plain)})"
+
+
+def scale_axis(axes: Axes) -> None:
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))

@@ -55,7 +55,8 @@ static void evaluate_moments(cplx w, int on_element, int order, Moments *m)
     for (int k = 0; k <= order; k++) m->l[k] = (k % 2) ? 0.0 : 2.0 / (k + 1);
 
     if (r2 < FAR_SQUARED) {
-        const double angle = on_element ? 0.0 : atan2(2 * y, r2 - 1);
+        /* |w|^2 - 1, without cancellation near the ends */
+        const double angle = on_element ? 0.0 : atan2(2 * y, (x - 1) * (x + 1) + y * y);
         const cplx below = 1 / (w - 1), above = 1 / (w + 1);
         m->c[0] = 0.5 * log(right / left) + I * angle;
         m->d[0] = below - above;
@@ -105,16 +106,14 @@ static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Mom
     /* distance from the tip over the length: (1 + w)/2 at the start; at the end the axis is reversed, (1 - w)/2 */
     const cplx q = 0.5 * (1 + sign * (creal(w) + I * m->y));
     const double r2 = creal(q) * creal(q) + cimag(q) * cimag(q);
-    if (r2 < 16.0) {
-        const cplx root = csqrt(q);
-        cplx logarithm;
-        if (on_element)
-            logarithm = log((1 - creal(root)) / (1 + creal(root)));
-        else
-            logarithm = clog((root - 1) / (root + 1));
+    if (r2 < 4.0) {
+        const cplx root = csqrt(q), sum = root + 1;
+        /* q - 1 = (root - 1)(root + 1), without cancellation near the other end */
+        const cplx rest = 0.5 * (sign * (creal(w) + I * m->y) - 1), ratio = rest / (sum * sum);
+        const cplx logarithm = on_element ? log(-creal(ratio)) : clog(ratio);
         m->c[0] = 2 + root * logarithm;
-        m->d[0] = logarithm / (2 * root) + 1 / (q - 1);
-        m->e[0] = -logarithm / (4 * q * root) + 1 / (2 * q * (q - 1)) - 1 / ((q - 1) * (q - 1));
+        m->d[0] = logarithm / (2 * root) + 1 / rest;
+        m->e[0] = -logarithm / (4 * q * root) + 1 / (2 * q * rest) - 1 / (rest * rest);
         for (int k = 0; k < order; k++) {
             m->c[k + 1] = q * m->c[k] + 1 / (k + 1.5);
             m->d[k + 1] = q * m->d[k] + m->c[k];

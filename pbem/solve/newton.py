@@ -23,6 +23,7 @@ from pbem.contact.laws import (
     propose_modes,
 )
 from pbem.contact.loads import Load
+from pbem.contact.support import find_ties
 from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem, Tangent
 from pbem.solve.step import Iteration, Reporter
@@ -68,7 +69,7 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
 
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
     mode, so that a step in which no mode changes takes one iteration. All decisions are taken from gathered values.
-    Raises ConvergenceError: "mode cycle", "iteration limit", "singular tangent", "linear solver".
+    Raises ConvergenceError: "free motion", "mode cycle", "iteration limit", "singular tangent", "linear solver".
     """
     options = problem.model.solver
     modes, normal_traction = memory.modes, memory.normal_traction
@@ -78,7 +79,11 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
     for number in range(1, options.newton_max_iterations + 1):
         begin = time.perf_counter()
         law = linearise(problem.laws, modes, normal_traction, memory.slip, load.pressure, problem.traction_scale)
-        unknowns, v, residual = _solve_linearised(problem, tangent, law, load)
+        try:
+            unknowns, v, residual = _solve_linearised(problem, tangent, law, load)
+        except ConvergenceError:
+            _refuse_free_motion(problem, modes)
+            raise
         pairs = evaluate_pairs(problem.mesh, law, unknowns)
         caution = CAUTIONS[level]
         proposal = propose_modes(problem.laws, modes, pairs, memory.slip, load.pressure, caution.softening)
@@ -86,6 +91,7 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
         iterations.append(_record(number, residual, modes, proposal, begin))
         reporter.iterate(iterations[-1])
         if not proposal.changed.any() and law_error <= options.newton_tolerance:
+            _refuse_free_motion(problem, modes)
             return Solution(unknowns, v, pairs, modes, residual, tuple(iterations))
         modes = limit_changes(modes, proposal, caution.share)
         normal_traction = pairs.p_n
@@ -122,6 +128,14 @@ def _solve_linearised(problem: Problem, tangent: Tangent, law: Linearisation, lo
         f"the linear system is solved only to a relative residual of {residual:.1e} (asked: {tolerance:.1e}); "
         "a body is probably free to move in its present contact",
     )
+
+
+def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:
+    """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
+    ties = find_ties(problem.model, problem.mesh, modes)
+    free = problem.free_motions(tuple(ties.items()))
+    if free:
+        raise ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; hold it by a condition")
 
 
 def _record(number: int, residual: float, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:

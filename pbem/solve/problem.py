@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from mpi4py import MPI
@@ -19,8 +20,10 @@ from pbem.bem.operator import (
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.laws import Linearisation, PairLaws, collect_laws
 from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
+from pbem.contact.support import describe_free_motions
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.model.model import Model
+from pbem.model.support import Tie
 from pbem.parallel import gather_parts, norm_of_parts, share_nodes
 from pbem.solve.linear import LinearSolver, choose_method
 
@@ -63,6 +66,11 @@ class Problem:
     def second_faces(self) -> Integer:
         """Nodes of the cracks' second faces in the order in which results append them."""
         return second_face_nodes(self.mesh)
+
+    @cached_property
+    def free_motions(self) -> Callable[[tuple[tuple[str, Tie], ...]], str | None]:
+        """What can move freely for given ties of the interfaces (name and tie); remembered, as modes rarely change it."""
+        return lru_cache(lambda ties: describe_free_motions(self.model, dict(ties)))
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
         """The constraint map for linearised laws and a load."""

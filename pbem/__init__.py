@@ -9,6 +9,35 @@ first side r and a second side l; n is the outward normal of the first side and 
     traction p   = traction on the first side; p_n <= 0 in compression; the second side carries -p
 
 Inside the program a point or a vector of the plane is one complex number x + iy.
+
+    results = pbem.run("case.toml")              # solve a case; see pbem.driver.run
+    results = pbem.open_results("case.h5")       # read a result file; see pbem.results.reader.open_results
 """
 
-__version__ = "0.1.0"
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from pbem.errors import CaseError, ConvergenceError, PbemError, ResultFileError
+from pbem.version import __version__
+
+if TYPE_CHECKING:
+    from pbem.driver import run
+    from pbem.results.reader import open_results
+
+__all__ = [
+    "CaseError", "ConvergenceError", "PbemError", "ResultFileError", "__version__", "open_results", "run",
+]
+
+# Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5.
+_AT_FIRST_USE = {"run": "pbem.driver", "open_results": "pbem.results.reader"}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _AT_FIRST_USE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_AT_FIRST_USE[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_AT_FIRST_USE})

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbem import __version__
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
+from pbem.version import __version__
 
 if TYPE_CHECKING:
     from pbem.results.reader import Steps
@@ -251,8 +251,8 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     case = find_case(options.case)
     target = Path(options.output or case.stem + ".h5")
 
+    from pbem.driver import run
     from pbem.parallel import abort_if_unexpected, world
-    from pbem.run import run
 
     reporter: Reporter | None = None
     begun = time.perf_counter()

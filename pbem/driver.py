@@ -32,8 +32,8 @@ def run(
     """Read a case file, solve it, and return its results.
 
     case: path of the TOML file. output: path of the result file; by default the case's name with .h5, in the working
-    directory. resume: go on after the last step that the file holds. petsc: PETSc options without prefix, which win over the
-    case's [petsc] table. reporter: told of the progress, on the first rank only.
+    directory. resume: go on after the last step that the file holds. petsc: PETSc options without prefix, which win
+    over the case's [petsc] table. reporter: told of the progress, on the first rank only.
     Every rank of an MPI run calls this and gets the results.
 
     Raises CaseError (all faults of the case), ResultFileError (the output cannot be written, or does not belong to the

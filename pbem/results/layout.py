@@ -10,10 +10,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem import __version__
 from pbem.mesh.mesh import Faces, Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.configuration import dump_configuration
+from pbem.version import __version__
 
 ITERATION = np.dtype(
     [

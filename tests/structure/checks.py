@@ -10,11 +10,14 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 # The path of the data: a part imports those before it, never those after it.
-ORDER = ("case", "model", "mesh", "bem", "contact", "solve", "results", "progress", "run", "cli", "__main__")
+# The package itself comes last: it offers what they define.
+ORDER = (
+    "case", "model", "mesh", "bem", "contact", "solve", "results", "progress", "driver", "cli", "__main__", "__init__",
+)
 # Beside the path: they import no part of it, so that every part may import them ...
-BASE = ("__init__", "errors", "parallel", "exact")
+BASE = ("version", "errors", "parallel", "exact")
 # ... but mechanics knows nothing of processes, and results are read without them.
-MAY_BE_PARALLEL = ("solve", "run", "cli", "__main__", "parallel")
+MAY_BE_PARALLEL = ("solve", "driver", "cli", "__main__", "parallel")
 
 # Each of these comes in by one door only.
 DOORS = {

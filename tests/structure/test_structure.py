@@ -17,7 +17,8 @@ MODULES = checks.read_modules(Path(pbem.__file__).parent)
 each_module = pytest.mark.parametrize("module", MODULES.values(), ids=MODULES.keys())
 
 # Whoever only reads cases and results waits for no MPI, and needs none.
-WITHOUT_MPI = [name for name, module in MODULES.items() if module.part not in ("parallel", "solve", "run", "__main__")]
+WITH_MPI = ("parallel", "solve", "driver", "__main__")
+WITHOUT_MPI = [name for name, module in MODULES.items() if module.part not in WITH_MPI]
 
 
 def expect_none(faults: list[str]) -> None:

@@ -1,0 +1,33 @@
+"""What `import pbem` offers by itself, and what it waits with until it is asked for."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import pbem
+from pbem.driver import run
+from pbem.results.reader import open_results
+
+
+def test_the_package_offers_runs_and_results() -> None:
+    assert pbem.run is run
+    assert pbem.open_results is open_results
+    assert {"run", "open_results", "CaseError", "__version__"} <= set(dir(pbem))
+
+
+def test_what_the_package_does_not_offer_is_named() -> None:
+    with pytest.raises(AttributeError, match="'pbem' has no attribute 'solve_everything'"):
+        pbem.solve_everything  # noqa: B018
+
+
+def test_importing_the_package_loads_no_library() -> None:
+    code = """
+import sys
+import pbem
+sys.exit(" ".join({"numpy", "h5py", "mpi4py", "petsc4py", "pydantic"} & set(sys.modules)) or 0)
+"""
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert process.returncode == 0, process.stderr

@@ -37,13 +37,18 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
     if table == "materials" and key in _STAND_INS:
         raw["materials"][loc[1]][key] = _STAND_INS[key]
         return True
+    if table == "interfaces" and key == "law":
+        raw["interfaces"][loc[1]][key] = "coulomb"  # the law that all other keys go with
+        return True
     return _delete(raw, loc)
 
 
 def _patch_elements(raw: dict[str, Any], loc: Loc) -> bool:
     """Any sufficient number of elements: topology does not depend on it."""
     curve = raw["curves"].get(loc[1])
-    if not isinstance(curve, dict) or not ({"points", "center"} & set(curve)):
+    if not isinstance(curve, dict) or len({"points", "center", "expression"} & set(curve)) != 1:
+        return False
+    if "center" in curve and "radius" not in curve:
         return False
     curve.pop("size", None)
     points = curve.get("points")

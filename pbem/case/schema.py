@@ -60,9 +60,15 @@ def _check_option(value: object) -> object:
     raise PydanticCustomError("expected", "{expected}", {"expected": "a text, a finite number, true or false"})
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False), BeforeValidator(_check_number)]
-Positive = Annotated[Number, Field(gt=0)]
-NotNegative = Annotated[Number, Field(ge=0)]
+_SHORT = BeforeValidator(_check_number)
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False), _SHORT]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), _SHORT]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), _SHORT]
+Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1, lt=0.5), _SHORT]
+FrictionAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=90), _SHORT]
+Power = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=10), _SHORT]
+Tolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=1), _SHORT]
+Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1), _SHORT]
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 Text = Annotated[str, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]
@@ -87,7 +93,7 @@ class MaterialTable(Table):
     """A linear elastic, isotropic material."""
 
     young: Positive = Field(description="Young's modulus, stress")
-    poisson: Annotated[Number, Field(gt=-1, lt=0.5)] = Field(description="Poisson's ratio")
+    poisson: Poisson = Field(description="Poisson's ratio")
     plane: Literal["strain", "stress"] = "strain"
     density: NotNegative = Field(0.0, description="mass per volume, used with [gravity]")
 
@@ -105,7 +111,7 @@ class CurveTable(Table):
     elements: Elements | None = Field(None, description="number of elements: a total, or one number for each leg")
     size: Positive | None = Field(None, description="target length of an element, in place of `elements`")
     grading: Literal["auto", "start", "end", "both", "none"] = "auto"
-    power: Annotated[Number, Field(ge=1, le=10)] = Field(3.0, description="element ends at t^power from a refined end")
+    power: Power = Field(3.0, description="element ends at t^power from a refined end")
 
 
 class RegionTable(Table):
@@ -150,7 +156,7 @@ class LawTable(Table):
 
     law: Literal["bonded", "coulomb", "open", "frictionless"] | None = None
     friction: NotNegative | None = Field(None, description="friction coefficient")
-    friction_angle: Annotated[Number, Field(ge=0, lt=90)] | None = Field(None, description="degrees")
+    friction_angle: FrictionAngle | None = Field(None, description="degrees")
     cohesion: NotNegative = 0.0
     tensile_strength: NotNegative = Field(0.0, description="normal tension carried before the faces part")
     cohesion_lost: Flag = False
@@ -214,9 +220,9 @@ class SolverTable(Table):
     """How the discrete equations are solved."""
 
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
-    newton_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    newton_tolerance: Tolerance = 1e-9
     newton_max_iterations: Count = 50
-    min_step: Annotated[Number, Field(gt=0, le=1)] = 1e-4
+    min_step: Fraction = 1e-4
 
 
 class InteriorTable(Table):

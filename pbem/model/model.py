@@ -104,7 +104,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Analysis:
-    """scheme: which equation is collocated on which face; order: of the elements' polynomials; tips: crack-tip elements."""
+    """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements."""
 
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: int = 2

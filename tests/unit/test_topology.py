@@ -1,0 +1,322 @@
+"""Loops, holes, inclusions and junctions are found and oriented; what does not close or crosses is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbem.model.curve import Leg
+from pbem.model.intersection import enclosed_angle, enclosed_area, meeting_points, project
+from pbem.model.loop import loop_legs
+from pbem.model.model import Model, Region
+from pbem.model.shape import share
+from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, add_curves, build, change, find_faults, find_only_fault
+
+HOLE = ('"left"]', '"left", "hole"]')
+INCLUSION = '[regions.inclusion]\nmaterial = "soft"\nboundary = ["hole"]\n[boundary.bottom]'
+
+
+def find_region(model: Model, name: str) -> Region:
+    return next(region for region in model.regions if region.name == name)
+
+
+def find_area(model: Model, name: str) -> float:
+    return sum(enclosed_area(loop_legs(model.curves, (loop,))) for loop in find_region(model, name).loops)
+
+
+def has_region_on_the_left(model: Model) -> bool:
+    """The area enclosed by the loops of each region, outer ones positive, is positive and loops close."""
+    for region in model.regions:
+        for loop in region.loops:
+            legs = loop_legs(model.curves, (loop,))
+            ends = [leg.end for leg in legs]
+            if [leg.start for leg in legs] != [ends[-1], *ends[:-1]] or (enclosed_area(legs) > 0) != loop.outer:
+                return False
+    return True
+
+
+def test_square_in_any_order_and_direction() -> None:
+    for boundary in ('"bottom", "right", "top", "left"', '"top", "bottom", "left", "right"'):
+        for turned in ("[2, 0], [2, 2]", "[2, 2], [2, 0]"):
+            model = build(change(SQUARE, ('"bottom", "right", "top", "left"', boundary), ("[2, 0], [2, 2]", turned)))
+            assert has_region_on_the_left(model)
+            assert find_area(model, "body") == pytest.approx(4.0)
+            sides = {side.curve: side.forward for side in model.regions[0].loops[0].sides}
+            assert sides == {"bottom": True, "right": turned == "[2, 0], [2, 2]", "top": True, "left": True}
+
+
+def test_blocks_share_a_curve() -> None:
+    model = build(BLOCKS)
+    assert has_region_on_the_left(model)
+    assert list(model.interfaces) == ["interface"]
+    interface = model.interfaces["interface"]
+    assert (interface.first, interface.second) == ("lower", "upper")
+    forward = {
+        region.name: [side.forward for side in region.loops[0].sides if side.curve == "interface"]
+        for region in model.regions
+    }
+    assert forward == {"lower": [False], "upper": [True]}
+    assert list(model.conditions) == ["bottom", "right_lower", "left_lower", "right_upper", "left_upper", "top"]
+
+
+def test_first_side_is_that_of_the_first_region_of_the_file() -> None:
+    lower = BLOCKS[BLOCKS.index("[regions.lower]") : BLOCKS.index("[regions.upper]")]
+    text = change(BLOCKS, (lower, ""), ("[boundary.bottom]", lower + "[boundary.bottom]"))
+    interface = build(text).interfaces["interface"]
+    assert (interface.first, interface.second) == ("upper", "lower")
+
+
+@pytest.mark.parametrize("hole", [
+    "hole = { center = [1, 1], radius = 0.5, elements = 16 }",
+    "hole = { points = [[0.5, 0.5], [1.5, 0.5], [1, 1.5], [0.5, 0.5]], elements = 16 }",
+    "hole = { points = [[0.5, 0.5], [1, 1.5], [1.5, 0.5], [0.5, 0.5]], elements = 16 }",
+])
+def test_hole_runs_clockwise(hole: str) -> None:
+    model = build(change(add_curves(SQUARE, hole), HOLE))
+    assert [loop.outer for loop in model.regions[0].loops] == [True, False]
+    assert has_region_on_the_left(model)
+    assert find_area(model, "body") < 3.6
+    assert "hole" in model.conditions
+
+
+def test_inclusion_is_bounded_by_the_hole_of_its_host() -> None:
+    text = change(add_curves(SQUARE, "hole = { center = [1, 1], radius = 0.5, elements = 16 }"), HOLE)
+    model = build(change(text, ("[boundary.bottom]", INCLUSION)))
+    assert has_region_on_the_left(model)
+    assert find_area(model, "body") == pytest.approx(4 - np.pi / 4)
+    assert find_area(model, "inclusion") == pytest.approx(np.pi / 4)
+    assert model.interfaces["hole"].law.kind == "bonded"
+
+
+def test_circle_of_two_arcs_in_opposite_directions() -> None:
+    arcs = (
+        "low = { center = [1, 1], radius = 0.5, angles = [180, 360], elements = 9 }\n"
+        "high = { center = [1, 1], radius = 0.5, angles = [180, 0], elements = 9 }"
+    )
+    model = build(change(add_curves(SQUARE, arcs), ('"left"]', '"left", "high", "low"]')))
+    assert has_region_on_the_left(model)
+    assert find_area(model, "body") == pytest.approx(4 - np.pi / 4)
+    assert [(side.curve, side.forward) for side in model.regions[0].loops[1].sides] == [("high", True), ("low", False)]
+
+
+def test_circle_has_equal_elements_whatever_their_number() -> None:
+    for count in (4, 7, 10, 64):
+        text = change(add_curves(SQUARE, f"hole = {{ center = [1, 1], radius = 0.5, elements = {count} }}"), HOLE)
+        curve = build(text).curves["hole"]
+        ends = np.concatenate([leg.element_ends()[:-1] for leg in curve.legs])
+        assert len(ends) == count and curve.closed
+        assert np.abs(ends - (1 + 1j)) == pytest.approx(0.5)
+        assert np.abs(np.diff(ends)) == pytest.approx(np.abs(ends[1] - ends[0]))
+
+
+def test_three_regions_around_a_junction() -> None:
+    text = f"""{MATERIAL}
+[curves]
+a = {{ points = [[0, 0], [2, 0], [1, 2]], elements = 8 }}
+b = {{ points = [[1, 2], [-1, 2]], elements = 8 }}
+c = {{ points = [[0, 0], [-1, 2]], elements = 8 }}
+ab = {{ points = [[1, 2], [0.5, 1]], elements = 4 }}
+ac = {{ points = [[0, 0], [0.5, 1]], elements = 4 }}
+bc = {{ points = [[0.5, 1], [-1, 2]], elements = 4 }}
+[regions.a]
+material = "soft"
+boundary = ["a", "ac", "ab"]
+[regions.b]
+material = "soft"
+boundary = ["ab", "bc", "b"]
+[regions.c]
+material = "soft"
+boundary = ["c", "ac", "bc"]
+[boundary.a]
+ux = 0
+uy = 0
+"""
+    model = build(text)
+    assert has_region_on_the_left(model)
+    assert list(model.interfaces) == ["ab", "ac", "bc"]
+    assert sum(find_area(model, name) for name in "abc") == pytest.approx(4.0)
+
+
+# Two squares of the same region that touch the same point, and a hole that touches the boundary.
+def test_hole_that_touches_a_corner_is_part_of_the_outer_loop() -> None:
+    hole = (
+        "one = { points = [[0, 0], [1, 0.5]], elements = 4 }\n"
+        "two = { points = [[1, 0.5], [0.5, 1]], elements = 4 }\n"
+        "three = { points = [[0.5, 1], [0, 0]], elements = 4 }"
+    )
+    model = build(change(add_curves(SQUARE, hole), ('"left"]', '"left", "one", "two", "three"]')))
+    assert len(model.regions[0].loops) == 1
+    assert has_region_on_the_left(model)
+    assert find_area(model, "body") == pytest.approx(4 - 0.375)
+
+
+def test_inclusion_that_touches_a_side_with_a_corner_splits_it() -> None:
+    curves = (
+        "one = { points = [[1, 0], [1.5, 0.5]], elements = 4 }\n"
+        "two = { points = [[1, 0], [0.5, 0.5], [1.5, 0.5]], elements = 4 }"
+    )
+    inclusion = '[regions.inclusion]\nmaterial = "soft"\nboundary = ["one", "two"]\n[boundary.bottom]'
+    text = change(add_curves(SQUARE, curves), ('"left"]', '"left", "one", "two"]'), ("[boundary.bottom]", inclusion))
+    model = build(text)
+    assert [leg.elements for leg in model.curves["bottom"].legs] == [4, 4]
+    assert find_area(model, "body") == pytest.approx(4 - 0.25)
+
+
+def test_gap_in_a_loop_tells_both_ends() -> None:
+    faults = find_faults(change(SQUARE, ("[2, 2], [0, 2]", "[2, 2], [0.5, 2]")))
+    assert [fault.place for fault in faults] == ["regions.body.boundary (line 13)"] * 2
+    assert "curve 'top' ends at (0.5, 2), where no other curve goes on" in faults[0].found
+    assert "the nearest end is that of 'left' at (0, 2), 0.5 away" in faults[0].expected
+    assert "curve 'left' starts at (0, 2)" in faults[1].found
+
+
+def test_open_end_on_another_curve_asks_to_split_it() -> None:
+    text = change(BLOCKS, ("left_lower = { points = [[0, 0], [0, 1]]", "left_lower = { points = [[0, 0], [0, 2]]"))
+    assert any("overlap" in fault.found or "running over" in fault.found for fault in find_faults(text))
+    text = change(SQUARE, ("[[2, 0], [2, 2]]", "[[2, 0], [1, 2]]"))
+    assert any("lies on curve 'top': split that one there" in fault.expected for fault in find_faults(text))
+
+
+WRONG = {
+    "unknown curve": ('"right", "top"', '"rigth", "top"', "regions.body.boundary[2]", "unknown curve 'rigth'; did you mean 'right'?"),
+    "unknown material": ('material = "soft"', 'material = "sof"', "regions.body.material", "unknown material 'sof'; did you mean 'soft'?"),
+    "unknown crack": ('material = "soft"', 'material = "soft"\ncracks = ["joint"]', "regions.body.cracks[1]", "unknown curve 'joint'"),
+    "condition on an unknown curve": ("[boundary.top]", "[boundary.topp]", "boundary.topp", "did you mean 'top'?"),
+    "law of an unknown curve": ("[boundary.top]", "[interfaces.joint]\n[boundary.top]", "interfaces.joint", "unknown interface or crack"),
+    "law of an outer curve": ("[boundary.top]", "[interfaces.top]\n[boundary.top]", "interfaces.top", "an outer curve of region 'body'"),
+    "curve listed twice": ('"right", "top"', '"right", "right", "top"', "regions.body.boundary[3]", "curve 'right' a second time"),
+    "unused curve": (
+        "[regions.body]", "extra = { points = [[5, 5], [6, 6]], elements = 2 }\n[regions.body]", "curves.extra", "which no region uses",
+    ),
+    "boundary and crack": (
+        'material = "soft"', 'material = "soft"\ncracks = ["top"]', "curves.top", "in the boundary of body and as a crack in body",
+    ),
+    "loop that crosses itself": (
+        "[[0, 0], [2, 0]]", "[[0, 0], [1.5, 3], [2, 0]]", "curves.top", "curve 'top' crossing or touching curve 'bottom' at (1, 2)",
+    ),
+    "curve that crosses itself": (
+        "[[0, 0], [2, 0]]", "[[0, 0], [1, 0.5], [1, -0.5], [0.5, 0.5], [2, 0]]", "curves.bottom", "crosses or touches itself at",
+    ),
+    "curve that touches itself at a vertex": (
+        "[[0, 0], [2, 0]]", "[[0, 0], [1, 0], [1.2, 0.4], [0.8, 0.4], [1, 0], [2, 0]]", "curves.bottom", "touches itself at (1, 0)",
+    ),
+    "curve that runs back on itself": (
+        "[[0, 0], [2, 0]]", "[[0, 0], [2, 0], [3, 0], [2, 0]]", "curves.bottom", "a curve that runs over itself",
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "place", "text"), WRONG.values(), ids=WRONG.keys())
+def test_wrong_topology_is_told(old: str, new: str, place: str, text: str) -> None:
+    faults = find_faults(change(SQUARE, (old, new)))
+    assert any(fault.place.startswith(place) and text in f"{fault}" for fault in faults), "\n".join(map(str, faults))
+
+
+def test_conditions_on_an_interface() -> None:
+    fault = find_only_fault(change(BLOCKS, ("[boundary.top]", "[boundary.interface]\nux = 0\n[boundary.top]")))
+    assert "boundary.interface" in fault and "told in [interfaces.interface]" in fault
+
+
+def test_curve_of_three_regions() -> None:
+    third = '[regions.third]\nmaterial = "soft"\nboundary = ["interface"]\n[boundary.bottom]'
+    faults = find_faults(change(BLOCKS, ("[boundary.bottom]", third)))
+    text = "\n".join(map(str, faults))
+    assert "curves.interface (line 10): found curve 'interface' in the boundary of 3 regions (lower, upper, third)" in text
+
+
+def test_inner_loop_outside_the_outer_one() -> None:
+    text = change(add_curves(SQUARE, "hole = { center = [5, 5], radius = 0.5, elements = 8 }"), HOLE)
+    fault = find_only_fault(text)
+    assert "the loop of hole outside the loop of bottom, right, top, left" in fault
+    assert "make separate parts separate regions" in fault
+
+
+def test_loop_inside_a_hole() -> None:
+    curves = (
+        "hole = { center = [1, 1], radius = 0.5, elements = 8 }\n"
+        "core = { center = [1, 1], radius = 0.2, elements = 8 }"
+    )
+    text = change(add_curves(SQUARE, curves), ('"left"]', '"left", "hole", "core"]'))
+    assert "the loop of core inside the inner loop of hole" in find_only_fault(text)
+
+
+def test_loops_that_cross() -> None:
+    text = change(add_curves(SQUARE, "hole = { center = [2, 1], radius = 0.5, elements = 8 }"), HOLE)
+    fault = find_only_fault(text)
+    assert fault.startswith("curves.hole") and "curve 'hole' crossing or touching curve 'right' at (2, " in fault
+
+
+def test_region_inside_another_without_a_hole_there() -> None:
+    text = add_curves(SQUARE, "hole = { center = [1, 1], radius = 0.5, elements = 16 }")
+    held = "[boundary.hole]\nux = 0\nuy = 0\n[boundary.bottom]"
+    fault = find_only_fault(change(text, ("[boundary.bottom]", INCLUSION), ("[boundary.bottom]", held)))
+    assert fault.startswith("regions.inclusion.boundary")
+    assert "region 'inclusion' overlapping region 'body' ('hole' lies inside)" in fault
+
+
+def test_regions_on_the_same_side() -> None:
+    text = change(
+        BLOCKS, ("[2, 1], [2, 2]", "[2, 1], [1.9, 0.5]"), ("[0, 1], [0, 2]", "[0, 1], [0.1, 0.5]"),
+        ("[2, 2], [0, 2]", "[1.9, 0.5], [0.1, 0.5]"),
+    )
+    assert "both lie on the same side of 'interface'" in find_only_fault(text)
+
+
+def test_shared_piece_written_twice() -> None:
+    text = change(BLOCKS, ("[regions.lower]", "again = { points = [[0, 1], [2, 1]], elements = 4 }\n[regions.lower]"),
+        ('"top", "right_upper", "interface"', '"top", "right_upper", "again"'), ('[interfaces.interface]\nlaw = "coulomb"\nfriction = 0.5\n', ""))
+    faults = "\n".join(map(str, find_faults(text)))
+    assert "curve 'again' running over curve 'interface' from (0, 1) to (2, 1)" in faults
+    assert "named in the boundary of both" in faults
+
+
+def test_elements_are_shared_in_proportion() -> None:
+    assert share(10, [1, 1, 3]) == [2, 2, 6]
+    assert share(4, [1, 1, 1]) == [2, 1, 1]
+    assert share(3, [1e-6, 1, 1]) == [1, 1, 1]
+    assert share(5, [1e-6, 1, 1]) == [1, 2, 2]
+    assert share(2, [1, 1, 1]) == [1, 1, 1]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_split_has_one_element_each_and_keeps_the_total(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    lengths = random.uniform(0.001, 1.0, random.integers(1, 9)) ** 3
+    total = int(random.integers(1, 60))
+    counts = share(total, list(lengths))
+    assert min(counts) >= 1 and sum(counts) == max(total, len(counts))
+    # Never further than an element from proportion, but for those that need one at least.
+    wanted = total * lengths / lengths.sum()
+    assert all(count == 1 or count < want + 1 for count, want in zip(counts, wanted, strict=True))
+
+
+def test_angle_around_points_near_an_arc_is_exact() -> None:
+    arc = Leg(1 + 0j, -1 + 0j, 8, center=0j, sweep=np.pi)
+    line = Leg(-1 + 0j, 1 + 0j, 8)
+    points = np.array([0.999999j, 1.000001j, 0.3j, 0.7 + 0.7j, -1e-6j, 0.8 + 0.61j])
+    total = (enclosed_angle(arc, points) + enclosed_angle(line, points)) / (2 * np.pi)
+    assert total == pytest.approx([1, 0, 1, 1, 0, 0], abs=1e-12)
+    assert enclosed_area([arc, line]) == pytest.approx(np.pi / 2)
+    whole = Leg(1 + 0j, 1 + 0j, 8, center=0j, sweep=-2 * np.pi)
+    assert enclosed_angle(whole, points) / (2 * np.pi) == pytest.approx([-1, 0, -1, -1, -1, 0], abs=1e-12)
+
+
+def test_meeting_points_of_lines_and_arcs() -> None:
+    arc = Leg(1 + 0j, 1j, 4, center=0j, sweep=np.pi / 2)
+    assert meeting_points(Leg(0j, 1 + 1j, 1), arc, 1e-9) == pytest.approx([(0.5**0.5) * (1 + 1j)])
+    assert meeting_points(Leg(0j, -1 - 1j, 1), arc, 1e-9) == []
+    assert len(meeting_points(Leg(1.2 + 0.1j, 0.1 + 1.2j, 1), arc, 1e-9)) == 2
+    assert len(meeting_points(Leg(2**0.5 + 0j, 2**0.5 * 1j, 1), arc, 1e-9)) == 2  # touches, a double point
+    other = Leg(0.5 - 0.5j, 0.5 + 2j, 4, center=-5 + 0.75j, sweep=0.45)
+    assert len(meeting_points(arc, other, 1e-9)) == 1
+    # A fillet: the arc leaves the line along it.
+    assert meeting_points(Leg(1 - 1j, 1 + 0j, 1), arc, 1e-9) == []
+
+
+def test_projection_to_legs() -> None:
+    assert project(Leg(0j, 2 + 0j, 1), 0.5 + 1j) == pytest.approx((0.25, 1.0))
+    assert project(Leg(0j, 2 + 0j, 1), -1 + 0j) == pytest.approx((0.0, 1.0))
+    arc = Leg(1 + 0j, -1j, 4, center=0j, sweep=-np.pi / 2)
+    assert project(arc, 1.5 - 1.5j) == pytest.approx((0.5, 1.5 * 2**0.5 - 1))
+    assert project(arc, 1 + 1j) == pytest.approx((0.0, 1.0))
+    assert project(arc, -1 - 1j) == pytest.approx((1.0, 1.0))

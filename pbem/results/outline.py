@@ -27,7 +27,7 @@ class Outline:
 
 
 def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list[Outline]:
-    """All loops of all regions, then both faces of every crack; displacement (n, 2) at the nodes.
+    """The loops of all regions, then the first, then the second faces of cracks; displacement (n, 2) at the nodes.
 
     The displacement is continuous along a loop, while each element has its own polynomial: where two elements meet,
     and where the faces of a crack meet at its tip, the outline goes through the mean.
@@ -62,7 +62,7 @@ def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t
 
 
 def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
-    """Elements that follow each other along a loop or along one face of a crack, in the order of travel."""
+    """Elements that follow each other along a loop or one face of a crack, in the order of travel; cracks come last."""
     start, end = elements.vertices[:, 0], elements.vertices[:, 1]
     # Second faces are stored in the order of the first ones; their travel goes the other way.
     second = len(start) - int(elements.crack.sum()) // 2
@@ -81,6 +81,7 @@ def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
             last.append(int(e))
         else:
             chains.append([int(e)])
+    chains.sort(key=lambda chain: bool(elements.crack[chain[0]]))
     return [np.array(chain) for chain in chains]
 
 

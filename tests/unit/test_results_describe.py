@@ -1,0 +1,100 @@
+"""The texts of `pbem check` and `pbem info` hold the numbers they should, and stay short."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pbem.model.model import Condition
+from pbem.results.describe import describe_model, describe_results, estimate_memory
+from pbem.results.reader import open_results
+from pbem.results.writer import ResultWriter
+from pbem.solve.step import OPEN, SLIP, STICK
+from tests.unit.results_sample import make_mesh, make_model, make_steps
+
+MODEL = make_model()
+MESH = make_mesh(MODEL)
+STEPS = make_steps(MODEL, MESH)
+
+
+def find_row(text: str, section: str, name: str) -> str:
+    """The row of a table that begins with the name, single-spaced."""
+    body = text.split(f"{section}\n", 1)[1].split("\n\n")[0]
+    return next(" ".join(line.split()) for line in body.splitlines() if line.split()[0] == name)
+
+
+def test_a_model_is_described_with_its_parts_and_sizes() -> None:
+    text = describe_model(MODEL, MESH)
+    assert "outer loop: bottom, right_lower, joint (reversed), left_lower" in text
+    assert "inner loop: hole (reversed)" in text
+    assert find_row(text, "curves", "joint") == "joint 1 12 2 both (power 3)"
+    assert find_row(text, "conditions", "top") == "top tx = 0, 3 uy = -0.001"
+    assert find_row(text, "conditions", "right_lower") == "right_lower free free"
+    assert find_row(text, "interfaces", "joint") == "joint lower upper 36 friction 0.5, cohesion 1"
+    assert find_row(text, "interfaces", "crack") == "crack lower (crack) 18 friction 0.3"
+    assert f"{MESH.elements} elements of order 2, {MESH.nodes} nodes, {2 * MESH.nodes} unknowns" in text
+    assert MODEL.notes[0] in text
+
+
+def test_loads_that_belong_to_no_curve_are_described() -> None:
+    stage = replace(MODEL.stages[1], remote=(0.0, -1.5, 0.0), gravity=(0.0, -9.81), pressure={"crack": 0.25})
+    spring = dict(MODEL.conditions) | {"bottom": Condition("bottom", stiffness=(0.0, 70.0))}
+    model = replace(MODEL, stages=(MODEL.stages[0], stage), conditions=spring, initial_stress={"soft": (1.0, 2.0, 3.0)})
+    text = describe_model(model, MESH)
+    assert "press: 2 steps\n" in text
+    assert ("shear: 4 steps, remote stress sxx, syy, sxy = 0, -1.5, 0, gravity 0, -9.81, "
+            "fluid pressure 0.25 in crack") in text
+    assert "in-situ stress of soft: sxx, syy, sxy = 1, 2, 3" in text
+    assert find_row(text, "conditions", "bottom") == "bottom tx = 0 ty = 0, spring 70"
+
+
+def test_memory_is_that_of_the_dense_blocks() -> None:
+    operator, tangent = estimate_memory(MODEL, MESH)
+    lower = int((MESH.node_region == 0).sum())
+    upper = MESH.nodes - lower
+    cracks, shared = 18, 36
+    assert operator == 8 * (2 * lower * (4 * lower - 2 * cracks) + 2 * upper * 4 * upper)
+    assert tangent == 12 * (2 * lower * 2 * (lower + shared) + 2 * upper * 2 * (upper + shared))
+
+
+def test_hundreds_of_cracks_do_not_fill_the_screen(tmp_path: Path) -> None:
+    model = make_model(cracks=200)
+    mesh = make_mesh(model)
+    text = describe_model(model, mesh)
+    assert "... and 161 more" in text
+    assert len(text.splitlines()) < 150
+    with ResultWriter(tmp_path / "a.h5", model, mesh, 1, "3.18.5") as writer:
+        writer.append(make_steps(model, mesh)[0])
+    text = describe_results(open_results(tmp_path / "a.h5"))
+    assert "... and 161 more" in text
+    assert len(text.splitlines()) < 80
+
+
+def test_results_are_described_by_their_last_step(tmp_path: Path) -> None:
+    with ResultWriter(tmp_path / "a.h5", MODEL, MESH, 3, "3.18.5") as writer:
+        for step in STEPS:
+            writer.append(step)
+    text = describe_results(open_results(tmp_path / "a.h5"))
+    assert "status:       finished\n" in text
+    assert "pbem 0.1.0, PETSc 3.18.5, 3 ranks" in text
+    assert "steps stored: 6 (last: number 6, stage shear, factor 1)" in text
+    assert "18 in 6 steps (3.0 a step, at most 3)" in text
+    contact = STEPS[-1].contact
+    for number, name in enumerate(MESH.interface_names):
+        mine = MESH.pairs.interface == number
+        counts = [str(((contact.mode == mode) & mine).sum()) for mode in (STICK, SLIP, OPEN)]
+        row = find_row(text, "contact at the last step", name).split()
+        assert row[1:5] == [str(mine.sum()), *counts]
+        np.testing.assert_allclose(float(row[5]), contact.opening[mine].max(), rtol=1e-4)
+        np.testing.assert_allclose(float(row[6]), contact.slip[mine].max(), rtol=1e-4)
+    assert find_row(text, "reactions at the last step", "top") == "top -10 -20"
+
+
+def test_a_file_without_steps_is_described(tmp_path: Path) -> None:
+    writer = ResultWriter(tmp_path / "a.h5", MODEL, MESH, 1, "3.18.5")
+    writer.fail("linear solver", "first step of press")
+    text = describe_results(open_results(tmp_path / "a.h5"))
+    assert "failed (linear solver: first step of press)" in text
+    assert "steps stored: none" in text

@@ -48,4 +48,4 @@ def suggest(name: str, known: Iterable[str]) -> str:
 def list_names(names: Iterable[str], most: int = 20) -> str:
     """Names for a message, shortened."""
     listed = list(names)
-    return ", ".join(listed[:most]) + (", ..." if len(listed) > most else "")
+    return ", ".join(listed[:most]) + (f" and {len(listed) - most} more" if len(listed) > most else "")

@@ -11,7 +11,7 @@ from pbem.case.finding import list_names
 from pbem.case.unsupported import FREE_BODIES, TIPS_BY_DEFAULT
 from pbem.errors import CaseError, Fault
 from pbem.model.balance import describe_unbalance
-from pbem.model.crack import check_closing, check_inside, find_tips
+from pbem.model.crack import check_closing, check_inside, check_near_misses, find_tips
 from pbem.model.curve import Curve
 from pbem.model.grading import grade_curves
 from pbem.model.junction import find_crossings, split_at_junctions
@@ -84,6 +84,7 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     if not crossings:
         faults += find_overlaps(case, curves, loops)
         faults += check_inside(case, curves, cracks, loops)
+        faults += check_near_misses(case, curves, cracks, shapes.size)
         closing, cuts = check_closing(case, curves, cracks, loops)
         faults += closing
         notes += cuts

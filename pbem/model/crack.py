@@ -10,10 +10,13 @@ import numpy as np
 from pbem.case import Case
 from pbem.errors import Fault
 from pbem.model.curve import Curve
-from pbem.model.intersection import inner_points, winding_number
-from pbem.model.junction import format_point
+from pbem.model.intersection import inner_points, project, winding_number
+from pbem.model.junction import Boxes, format_point
 from pbem.model.loop import Loops, loop_legs
 from pbem.model.model import Loop
+
+# A tip nearer to another curve than this part of the model's size is taken for a slip of the pen.
+NEAR_MISS = 1e-6
 
 
 class _Groups:
@@ -45,6 +48,26 @@ def find_tips(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> dict[st
 def count_leg_ends(curves: Mapping[str, Curve]) -> Counter[complex]:
     """How many legs end at each point."""
     return Counter(end for curve in curves.values() for leg in curve.legs for end in (leg.start, leg.end))
+
+
+def check_near_misses(
+    case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], size: float
+) -> list[Fault]:
+    """A fault for every tip so near to another curve that it must have been meant to lie on it."""
+    faults = []
+    tips = find_tips(curves, cracks)
+    legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
+    boxes = Boxes([leg for _, leg in legs], NEAR_MISS * size)
+    for name, ends in tips.items():
+        for is_tip, point in zip(ends, (curves[name].start, curves[name].end), strict=True):
+            for number in boxes.around(point) if is_tip else []:
+                other, leg = legs[number]
+                distance = project(leg, point)[1]
+                if other != name and distance < NEAR_MISS * size:
+                    found = f"crack '{name}' ending at {format_point(point)}, {distance:.2g} off curve '{other}'"
+                    faults.append(case.fault(("curves", name), found, "an end on the curve, or clearly away from it"))
+                    break
+    return faults
 
 
 def check_inside(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops) -> list[Fault]:

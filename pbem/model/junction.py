@@ -32,7 +32,7 @@ def format_point(point: complex) -> str:
     return f"({point.real:.6g}, {point.imag:.6g})"
 
 
-class _Boxes:
+class Boxes:
     """Bounding boxes of legs, to find the few that can meet."""
 
     def __init__(self, legs: list[Leg], tolerance: float) -> None:
@@ -54,7 +54,7 @@ class _Boxes:
 def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCurves:
     """Split every leg in whose interior an end of another curve lies; the break is exactly that end."""
     legs = [(name, index, leg) for name, curve in curves.items() for index, leg in enumerate(curve.legs)]
-    boxes = _Boxes([leg for _, _, leg in legs], tolerance)
+    boxes = Boxes([leg for _, _, leg in legs], tolerance)
     breaks: dict[tuple[str, int], dict[complex, float]] = defaultdict(dict)
     notes = []
     for name, curve in curves.items():
@@ -95,7 +95,7 @@ def find_crossings(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str,
     """Every place where legs cross, touch or coincide other than at points where curves may meet."""
     legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
     found: dict[tuple[str, str], Fault] = {}
-    boxes = _Boxes([leg for _, leg in legs], tolerance)
+    boxes = Boxes([leg for _, leg in legs], tolerance)
     for i, j in boxes.pairs():
         (name, leg), (other, other_leg) = legs[i], legs[j]
         if (name, other) in found:
@@ -164,7 +164,7 @@ def _crossing(case: Case, name: str, other: str, point: complex, cracks: Mapping
     kinds = ["crack" if one in cracks else "curve" for one in (name, other)]
     found = f"{kinds[1]} '{other}' crossing or touching {kinds[0]} '{name}' at {format_point(point)}"
     if any(one in cracks for one in (name, other)):
-        expected = "cracks that meet other curves only with their ends: split into curves that meet at a point"
+        expected = "cracks that meet others only with their ends: split into curves that meet at a point"
     else:
         expected = "boundaries that meet only at ends: split into curves that meet at a point, or move them apart"
     return case.fault(("curves", other), found, expected)

@@ -54,7 +54,7 @@ def find_free_motions(model: Model, ties: Mapping[str, Tie] | None = None) -> tu
     center, scale = _frame(model)
     rows = _boundary_rows(model, names, center, scale) + _interface_rows(model, names, held, center, scale)
     matrix = np.concatenate([np.zeros((1, 3 * len(names))), *rows])
-    singular, right = np.linalg.svd(matrix, full_matrices=True)[1:]
+    singular, right = np.linalg.svd(np.linalg.qr(matrix, mode="r"), full_matrices=True)[1:]
     rank = int(np.sum(singular > RELATIVE_RANK * max(1.0, singular[0])))
     return tuple(_describe(vector, names, center, scale) for vector in _sparse_basis(right[rank:]))
 
@@ -69,8 +69,10 @@ def _motions(points: NDArray[np.complex128], center: complex, scale: float) -> N
     return np.stack([np.ones_like(points), np.full_like(points, 1j), 1j * (points - center) / scale], axis=1)
 
 
-def _project(motions: NDArray[np.complex128], directions: NDArray[np.complex128]) -> NDArray[np.float64]:
-    return (motions * directions.conj()[:, None]).real
+def _constrain(motions: NDArray[np.complex128], directions: list[NDArray[np.complex128]]) -> NDArray[np.float64]:
+    """At most 3 rows of 3: what prescribed components at many points demand of the unit motions."""
+    components = [(motions * direction.conj()[:, None]).real for direction in directions]
+    return np.asarray(np.linalg.qr(np.concatenate(components), mode="r"))
 
 
 def _sample(model: Model, side: Side) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
@@ -100,11 +102,15 @@ def _boundary_rows(model: Model, names: list[str], center: complex, scale: float
                 continue
             points, normals = _sample(model, side)
             first = normals if condition.frame == "local" else np.ones_like(normals)
-            for direction, quantity in zip((first, 1j * first), condition.known, strict=True):
-                if quantity == "displacement":
-                    block = np.zeros((len(points), 3 * len(names)))
-                    block[:, 3 * number:3 * number + 3] = _project(_motions(points, center, scale), direction)
-                    rows.append(block)
+            prescribed = [
+                direction for direction, quantity in zip((first, 1j * first), condition.known, strict=True)
+                if quantity == "displacement"
+            ]
+            if prescribed:
+                demands = _constrain(_motions(points, center, scale), prescribed)
+                block = np.zeros((len(demands), 3 * len(names)))
+                block[:, 3 * number:3 * number + 3] = demands
+                rows.append(block)
     return rows
 
 
@@ -118,11 +124,11 @@ def _interface_rows(
         points, normals = _sample(model, Side(name, True))
         motions = _motions(points, center, scale)
         first, second = names.index(interface.first), names.index(interface.second)
-        for direction in (normals,) if held[name] == "normal" else (normals, 1j * normals):
-            block = np.zeros((len(points), 3 * len(names)))
-            block[:, 3 * first:3 * first + 3] = _project(motions, direction)
-            block[:, 3 * second:3 * second + 3] = -block[:, 3 * first:3 * first + 3]
-            rows.append(block)
+        demands = _constrain(motions, [normals] if held[name] == "normal" else [normals, 1j * normals])
+        block = np.zeros((len(demands), 3 * len(names)))
+        block[:, 3 * first:3 * first + 3] = demands
+        block[:, 3 * second:3 * second + 3] = -demands
+        rows.append(block)
     return rows
 
 
@@ -157,6 +163,7 @@ def _describe(vector: NDArray[np.float64], names: list[str], center: complex, sc
         velocities[name] = (complex(x, y) - 1j * spin * center, spin)
         if abs(turn) > 1e-6:
             pole = center + 1j * complex(x, y) / spin
+            pole = complex(*(0.0 if abs(part) < 1e-9 * scale else part for part in (pole.real, pole.imag)))
             text = f"rotation about {format_point(pole)}"
         elif abs(y) < 1e-6 * abs(x):
             text = "translation along x"

@@ -80,7 +80,10 @@ def test_every_key_reaches_the_model() -> None:
     assert (model.solver.linear, model.solver.newton_tolerance) == ("lu", 1e-8)
     assert (model.solver.newton_max_iterations, model.solver.min_step) == (20, 1e-3)
     assert dict(model.solver.petsc) == {
-        "ksp_rtol": "1e-12", "ksp_monitor": "true", "ksp_max_it": "30", "pc_type": "lu",
+        "ksp_rtol": "1e-12",
+        "ksp_monitor": "true",
+        "ksp_max_it": "30",
+        "pc_type": "lu",
     }
     assert model.output_every == 2
     assert model.stages[0].steps == 4 and model.stages[0].name == "load"

@@ -66,11 +66,14 @@ def test_first_side_is_that_of_the_first_region_of_the_file() -> None:
     assert (interface.first, interface.second) == ("upper", "lower")
 
 
-@pytest.mark.parametrize("hole", [
-    "hole = { center = [1, 1], radius = 0.5, elements = 16 }",
-    "hole = { points = [[0.5, 0.5], [1.5, 0.5], [1, 1.5], [0.5, 0.5]], elements = 16 }",
-    "hole = { points = [[0.5, 0.5], [1, 1.5], [1.5, 0.5], [0.5, 0.5]], elements = 16 }",
-])
+@pytest.mark.parametrize(
+    "hole",
+    [
+        "hole = { center = [1, 1], radius = 0.5, elements = 16 }",
+        "hole = { points = [[0.5, 0.5], [1.5, 0.5], [1, 1.5], [0.5, 0.5]], elements = 16 }",
+        "hole = { points = [[0.5, 0.5], [1, 1.5], [1.5, 0.5], [0.5, 0.5]], elements = 16 }",
+    ],
+)
 def test_hole_runs_clockwise(hole: str) -> None:
     model = build(change(add_curves(SQUARE, hole), HOLE))
     assert [loop.outer for loop in model.regions[0].loops] == [True, False]
@@ -178,30 +181,78 @@ def test_open_end_on_another_curve_asks_to_split_it() -> None:
 
 
 WRONG = {
-    "unknown curve": ('"right", "top"', '"rigth", "top"', "regions.body.boundary[2]", "unknown curve 'rigth'; did you mean 'right'?"),
-    "unknown material": ('material = "soft"', 'material = "sof"', "regions.body.material", "unknown material 'sof'; did you mean 'soft'?"),
-    "unknown crack": ('material = "soft"', 'material = "soft"\ncracks = ["joint"]', "regions.body.cracks[1]", "unknown curve 'joint'"),
+    "unknown curve": (
+        '"right", "top"',
+        '"rigth", "top"',
+        "regions.body.boundary[2]",
+        "unknown curve 'rigth'; did you mean 'right'?",
+    ),
+    "unknown material": (
+        'material = "soft"',
+        'material = "sof"',
+        "regions.body.material",
+        "unknown material 'sof'; did you mean 'soft'?",
+    ),
+    "unknown crack": (
+        'material = "soft"',
+        'material = "soft"\ncracks = ["joint"]',
+        "regions.body.cracks[1]",
+        "unknown curve 'joint'",
+    ),
     "condition on an unknown curve": ("[boundary.top]", "[boundary.topp]", "boundary.topp", "did you mean 'top'?"),
-    "law of an unknown curve": ("[boundary.top]", "[interfaces.joint]\n[boundary.top]", "interfaces.joint", "unknown interface or crack"),
-    "law of an outer curve": ("[boundary.top]", "[interfaces.top]\n[boundary.top]", "interfaces.top", "an outer curve of region 'body'"),
-    "curve listed twice": ('"right", "top"', '"right", "right", "top"', "regions.body.boundary[3]", "curve 'right' a second time"),
+    "law of an unknown curve": (
+        "[boundary.top]",
+        "[interfaces.joint]\n[boundary.top]",
+        "interfaces.joint",
+        "unknown interface or crack",
+    ),
+    "law of an outer curve": (
+        "[boundary.top]",
+        "[interfaces.top]\n[boundary.top]",
+        "interfaces.top",
+        "an outer curve of region 'body'",
+    ),
+    "curve listed twice": (
+        '"right", "top"',
+        '"right", "right", "top"',
+        "regions.body.boundary[3]",
+        "curve 'right' a second time",
+    ),
     "unused curve": (
-        "[regions.body]", "extra = { points = [[5, 5], [6, 6]], elements = 2 }\n[regions.body]", "curves.extra", "which no region uses",
+        "[regions.body]",
+        "extra = { points = [[5, 5], [6, 6]], elements = 2 }\n[regions.body]",
+        "curves.extra",
+        "which no region uses",
     ),
     "boundary and crack": (
-        'material = "soft"', 'material = "soft"\ncracks = ["top"]', "curves.top", "in the boundary of body and as a crack in body",
+        'material = "soft"',
+        'material = "soft"\ncracks = ["top"]',
+        "curves.top",
+        "in the boundary of body and as a crack in body",
     ),
     "loop that crosses itself": (
-        "[[0, 0], [2, 0]]", "[[0, 0], [1.5, 3], [2, 0]]", "curves.top", "curve 'top' crossing or touching curve 'bottom' at (1, 2)",
+        "[[0, 0], [2, 0]]",
+        "[[0, 0], [1.5, 3], [2, 0]]",
+        "curves.top",
+        "curve 'top' crossing or touching curve 'bottom' at (1, 2)",
     ),
     "curve that crosses itself": (
-        "[[0, 0], [2, 0]]", "[[0, 0], [1, 0.5], [1, -0.5], [0.5, 0.5], [2, 0]]", "curves.bottom", "crosses or touches itself at",
+        "[[0, 0], [2, 0]]",
+        "[[0, 0], [1, 0.5], [1, -0.5], [0.5, 0.5], [2, 0]]",
+        "curves.bottom",
+        "crosses or touches itself at",
     ),
     "curve that touches itself at a vertex": (
-        "[[0, 0], [2, 0]]", "[[0, 0], [1, 0], [1.2, 0.4], [0.8, 0.4], [1, 0], [2, 0]]", "curves.bottom", "touches itself at (1, 0)",
+        "[[0, 0], [2, 0]]",
+        "[[0, 0], [1, 0], [1.2, 0.4], [0.8, 0.4], [1, 0], [2, 0]]",
+        "curves.bottom",
+        "touches itself at (1, 0)",
     ),
     "curve that runs back on itself": (
-        "[[0, 0], [2, 0]]", "[[0, 0], [2, 0], [3, 0], [2, 0]]", "curves.bottom", "a curve that runs over itself",
+        "[[0, 0], [2, 0]]",
+        "[[0, 0], [2, 0], [3, 0], [2, 0]]",
+        "curves.bottom",
+        "a curve that runs over itself",
     ),
 }
 
@@ -221,7 +272,9 @@ def test_curve_of_three_regions() -> None:
     third = '[regions.third]\nmaterial = "soft"\nboundary = ["interface"]\n[boundary.bottom]'
     faults = find_faults(change(BLOCKS, ("[boundary.bottom]", third)))
     text = "\n".join(map(str, faults))
-    assert "curves.interface (line 10): found curve 'interface' in the boundary of 3 regions (lower, upper, third)" in text
+    assert (
+        "curves.interface (line 10): found curve 'interface' in the boundary of 3 regions (lower, upper, third)" in text
+    )
 
 
 def test_inner_loop_outside_the_outer_one() -> None:
@@ -233,8 +286,7 @@ def test_inner_loop_outside_the_outer_one() -> None:
 
 def test_loop_inside_a_hole() -> None:
     curves = (
-        "hole = { center = [1, 1], radius = 0.5, elements = 8 }\n"
-        "core = { center = [1, 1], radius = 0.2, elements = 8 }"
+        "hole = { center = [1, 1], radius = 0.5, elements = 8 }\ncore = { center = [1, 1], radius = 0.2, elements = 8 }"
     )
     text = change(add_curves(SQUARE, curves), ('"left"]', '"left", "hole", "core"]'))
     assert "the loop of core inside the inner loop of hole" in find_only_fault(text)
@@ -256,15 +308,21 @@ def test_region_inside_another_without_a_hole_there() -> None:
 
 def test_regions_on_the_same_side() -> None:
     text = change(
-        BLOCKS, ("[2, 1], [2, 2]", "[2, 1], [1.9, 0.5]"), ("[0, 1], [0, 2]", "[0, 1], [0.1, 0.5]"),
+        BLOCKS,
+        ("[2, 1], [2, 2]", "[2, 1], [1.9, 0.5]"),
+        ("[0, 1], [0, 2]", "[0, 1], [0.1, 0.5]"),
         ("[2, 2], [0, 2]", "[1.9, 0.5], [0.1, 0.5]"),
     )
     assert "both lie on the same side of 'interface'" in find_only_fault(text)
 
 
 def test_shared_piece_written_twice() -> None:
-    text = change(BLOCKS, ("[regions.lower]", "again = { points = [[0, 1], [2, 1]], elements = 4 }\n[regions.lower]"),
-        ('"top", "right_upper", "interface"', '"top", "right_upper", "again"'), ('[interfaces.interface]\nlaw = "coulomb"\nfriction = 0.5\n', ""))
+    text = change(
+        BLOCKS,
+        ("[regions.lower]", "again = { points = [[0, 1], [2, 1]], elements = 4 }\n[regions.lower]"),
+        ('"top", "right_upper", "interface"', '"top", "right_upper", "again"'),
+        ('[interfaces.interface]\nlaw = "coulomb"\nfriction = 0.5\n', ""),
+    )
     faults = "\n".join(map(str, find_faults(text)))
     assert "curve 'again' running over curve 'interface' from (0, 1) to (2, 1)" in faults
     assert "named in the boundary of both" in faults

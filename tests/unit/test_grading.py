@@ -1,0 +1,127 @@
+"""Elements are refined where the solution is singular, or where the user says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbem.model.model import Model
+from tests.unit.case_sample import BLOCKS, SQUARE, add_curves, build, change
+
+
+def refined(model: Model, name: str) -> list[tuple[bool, bool]]:
+    return [(leg.refine_start, leg.refine_end) for leg in model.curves[name].legs]
+
+
+NEITHER, START, END, BOTH = (False, False), (True, False), (False, True), (True, True)
+
+
+def test_corners_are_refined() -> None:
+    model = build(SQUARE)
+    assert all(refined(model, name) == [BOTH] for name in model.curves)
+    assert any("towards both ends: 'bottom', 'right', 'top', 'left'" in note for note in model.notes)
+
+
+def test_smooth_continuation_is_left_alone() -> None:
+    text = change(SQUARE, ("top = { points = [[2, 2], [0, 2]]", "top = { points = [[2, 2], [1, 2], [0, 2]]"))
+    assert refined(build(text), "top") == [START, END]
+
+
+def test_smooth_continuation_of_two_curves_with_one_kind_of_condition() -> None:
+    curves = "top2 = { points = [[1, 2], [0, 2]], elements = 4 }"
+    text = change(add_curves(SQUARE, curves), ("[[2, 2], [0, 2]]", "[[2, 2], [1, 2]]"), ('"left"]', '"left", "top2"]'))
+    model = build(text)
+    assert refined(model, "top") == [START] and refined(model, "top2") == [END]
+    held = build(text + "[boundary.top2]\nux = 0\n")
+    assert refined(held, "top") == [BOTH] and refined(held, "top2") == [BOTH]
+
+
+@pytest.mark.parametrize(("degrees", "expected"), [(0.5, NEITHER), (2.0, BOTH)])
+def test_turns_of_more_than_a_degree_are_corners(degrees: float, expected: tuple[bool, bool]) -> None:
+    height = 2 + np.tan(np.radians(degrees / 2))
+    text = change(SQUARE, ("[[2, 2], [0, 2]]", f"[[2, 2], [1, {height}], [0, 2]]"))
+    first, second = refined(build(text), "top")
+    assert (first[1], second[0]) == expected
+
+
+def test_line_that_goes_over_into_an_arc_is_smooth() -> None:
+    text = change(
+        SQUARE,
+        ("right = { points = [[2, 0], [2, 2]]", "right = { points = [[2, 0], [2, 1]]"),
+        ("top = { points = [[2, 2], [0, 2]]", "top = { points = [[1, 2], [0, 2]]"),
+        ('"left"]', '"left", "fillet"]'),
+    )
+    model = build(add_curves(text, "fillet = { center = [1, 1], radius = 1, angles = [0, 90], elements = 8 }"))
+    assert (
+        refined(model, "right") == [START] and refined(model, "top") == [END] and refined(model, "fillet") == [NEITHER]
+    )
+
+
+def test_circle_is_uniform() -> None:
+    text = change(
+        add_curves(SQUARE, "hole = { center = [1, 1], radius = 0.5, elements = 16 }"), ('"left"]', '"left", "hole"]')
+    )
+    assert refined(build(text), "hole") == [NEITHER] * 4
+
+
+def test_interface_and_its_neighbours_are_refined_at_its_ends() -> None:
+    model = build(BLOCKS)
+    assert refined(model, "interface") == [BOTH]
+    assert refined(model, "right_lower") == [BOTH]
+
+
+def test_crack_tips_and_mouths_are_refined() -> None:
+    curves = "crack = { points = [[0.5, 0], [0.5, 1]], elements = 8 }"
+    text = add_curves(SQUARE, curves, 'cracks = ["crack"]')
+    model = build(text)
+    assert refined(model, "crack") == [BOTH]
+    assert refined(model, "bottom") == [BOTH, BOTH]
+
+
+def test_straight_continuation_of_a_crack_is_smooth_under_one_law() -> None:
+    curves = "a = { points = [[0.5, 1], [1, 1]], elements = 8 }\nb = { points = [[1, 1], [1.5, 1]], elements = 8 }"
+    text = add_curves(SQUARE, curves, 'cracks = ["a", "b"]')
+    model = build(text)
+    assert refined(model, "a") == [START] and refined(model, "b") == [END]
+    model = build(text + "[interfaces.a]\nfriction = 0.5\n")
+    assert refined(model, "a") == [BOTH] and refined(model, "b") == [BOTH]
+
+
+EXPLICIT = {
+    "start": [START, NEITHER, NEITHER],
+    "end": [NEITHER, NEITHER, END],
+    "both": [BOTH] * 3,
+    "none": [NEITHER] * 3,
+}
+
+
+@pytest.mark.parametrize("grading", EXPLICIT)
+def test_explicit_grading_of_a_polyline(grading: str) -> None:
+    top = f'top = {{ points = [[2, 2], [1.5, 2.2], [1, 2], [0, 2]], power = 2.5, grading = "{grading}"'
+    model = build(change(SQUARE, ("top = { points = [[2, 2], [0, 2]]", top)))
+    assert refined(model, "top") == EXPLICIT[grading]
+    assert [leg.power for leg in model.curves["top"].legs] == [2.5] * 3
+
+
+@pytest.mark.parametrize(
+    ("grading", "expected"), [("start", [BOTH, START]), ("end", [END, BOTH]), ("none", [NEITHER] * 2)]
+)
+def test_explicit_grading_of_a_leg_that_is_split(grading: str, expected: list[tuple[bool, bool]]) -> None:
+    text = add_curves(SQUARE, "crack = { points = [[0.5, 0], [0.5, 1]], elements = 8 }", 'cracks = ["crack"]')
+    text = change(text, ("[[0, 0], [2, 0]], elements = 8", f'[[0, 0], [2, 0]], elements = 8, grading = "{grading}"'))
+    assert refined(build(text), "bottom") == expected
+
+
+def test_explicit_grading_of_an_arc() -> None:
+    arcs = (
+        'low = { center = [1, 1], radius = 0.5, angles = [180, 360], elements = 9, grading = "both" }\n'
+        'high = { center = [1, 1], radius = 0.5, angles = [180, 0], elements = 9, grading = "start" }'
+    )
+    model = build(change(add_curves(SQUARE, arcs), ('"left"]', '"left", "high", "low"]')))
+    assert refined(model, "low") == [BOTH] and refined(model, "high") == [START]
+
+
+def test_first_element_of_a_refined_leg() -> None:
+    text = change(SQUARE, ("[[0, 0], [2, 0]], elements = 8", '[[0, 0], [2, 0]], elements = 4, grading = "start"'))
+    ends = build(text).curves["bottom"].legs[0].element_ends()
+    assert ends == pytest.approx([2 * (k / 4) ** 3 for k in range(5)])

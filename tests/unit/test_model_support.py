@@ -1,0 +1,119 @@
+"""Bodies that can move as a whole are found, and refused with the motion that is free."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pbem.model.support import find_free_motions
+from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, build, change, find_faults, find_only_fault
+
+HELD = "[boundary.bottom]\nux = 0.0\nuy = 0.0"
+LOADED = "[boundary.top]\nux = 0.001\nuy = -0.001"
+FRICTION = 'law = "coulomb"\nfriction = 0.5'
+
+
+def test_body_without_support_is_free_in_three_ways() -> None:
+    faults = find_faults(change(SQUARE, (HELD + "\n", "")))
+    text = "\n".join(map(str, faults))
+    assert len(faults) == 3 and all(fault.place == "regions.body (line 11)" for fault in faults)
+    assert "translation along x of 'body'" in text and "translation along y of 'body'" in text
+    assert "rotation about" in text
+    assert "the tractions of stage 'load' drive it, with resultant (0, -2) and moment -2 about (0, 0)" in text
+
+
+@pytest.mark.parametrize("condition", ["uy = 0.0", "un = 0.0"])
+def test_side_held_along_its_normal_slides(condition: str) -> None:
+    assert "translation along x of 'body'" in find_only_fault(change(SQUARE, ("ux = 0.0\nuy = 0.0", condition)))
+
+
+def test_side_held_along_itself_leaves_two_motions() -> None:
+    faults = find_faults(change(SQUARE, ("ux = 0.0\nuy = 0.0", "ux = 0.0")))
+    assert "rotation about (1, 0) of 'body'" in faults[0].found
+    assert "translation along y of 'body'" in faults[1].found
+
+
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        "ux = 0.0\nuy = 0.0",
+        "un = 0.0\nus = 0.0",
+        "un = 0.0\n[boundary.left]\nun = 0.0",
+        "uy = 0.0\n[boundary.left]\nux = 0.0",
+    ],
+)
+def test_conditions_that_hold_a_body(conditions: str) -> None:
+    assert find_free_motions(build(change(SQUARE, ("ux = 0.0\nuy = 0.0", conditions)))) == ()
+
+
+def test_balanced_body_is_refused_as_not_yet_supported() -> None:
+    faults = find_faults(change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.0")))
+    assert len(faults) == 3
+    assert all("held by the balance of its loads alone is not yet supported" in fault.expected for fault in faults)
+    assert not any("drive it" in fault.found for fault in faults)
+
+
+def test_ring_held_on_a_circle_along_its_normal_can_turn() -> None:
+    text = f"""{MATERIAL}
+[curves]
+outer = {{ center = [3, 1], radius = 2, elements = 16 }}
+[regions.disc]
+material = "soft"
+boundary = ["outer"]
+[boundary.outer]
+un = -0.1
+"""
+    assert "rotation about (3, 1) of 'disc'" in find_only_fault(text)
+    assert "and moment" in find_only_fault(change(text, ("un = -0.1", "un = -0.1\nts = 1.0")))
+
+
+def test_block_on_a_frictionless_interface_slides_off() -> None:
+    text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (FRICTION, 'law = "frictionless"'))
+    fault = find_only_fault(text)
+    assert fault.startswith("regions.upper") and "translation along x of 'upper'" in fault
+
+
+@pytest.mark.parametrize("law", [FRICTION, 'law = "bonded"', 'law = "coulomb"\ncohesion = 1.0'])
+def test_block_that_is_tied_is_held(law: str) -> None:
+    text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (FRICTION, law))
+    assert find_free_motions(build(text)) == ()
+
+
+@pytest.mark.parametrize("law", ['law = "open"', 'law = "coulomb"\nfriction = 0.5\ngap = 0.1'])
+def test_block_that_does_not_touch_is_free(law: str) -> None:
+    faults = find_faults(change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (FRICTION, law)))
+    assert len(faults) == 3 and all(fault.place.startswith("regions.upper") for fault in faults)
+
+
+def test_tied_blocks_move_together() -> None:
+    text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (HELD, "[boundary.bottom]\nuy = 0"))
+    assert "translation along x of 'lower', 'upper'" in find_only_fault(text)
+
+
+def test_ties_of_the_moment_replace_those_of_the_laws() -> None:
+    model = build(change(BLOCKS, (LOADED, "[boundary.top]\nty = -1")))
+    assert find_free_motions(model) == ()
+    sliding = find_free_motions(model, {"interface": "normal"})
+    assert [motion.regions for motion in sliding] == [("upper",)]
+    a, spin = sliding[0].velocities["upper"]
+    assert abs(a.real) > 0.1 and abs(a.imag) < 1e-9 and abs(spin) < 1e-9
+    assert len(find_free_motions(model, {"interface": "none"})) == 3
+
+
+def test_velocity_of_a_rotation_vanishes_at_its_centre() -> None:
+    text = f"""{MATERIAL}
+[curves]
+outer = {{ center = [3, 1], radius = 2, elements = 16 }}
+[regions.disc]
+material = "soft"
+boundary = ["outer"]
+[boundary.outer]
+ux = 0
+uy = 0
+"""
+    model = build(text)
+    condition = replace(model.conditions["outer"], frame="local", known=("displacement", "traction"))
+    (motion,) = find_free_motions(replace(model, conditions={"outer": condition}))
+    a, spin = motion.velocities["disc"]
+    assert spin != 0 and a + 1j * spin * (3 + 1j) == pytest.approx(0, abs=1e-9)

@@ -25,6 +25,7 @@ from pbem.model.material import Material
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]
+Complex = NDArray[np.complex128]
 
 # Scratch memory of one call of the kernels, in bytes.
 CHUNK_BYTES = 32_000_000
@@ -123,6 +124,26 @@ def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes:
             matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False)
         blocks.append(Block(int(region), (2 * at[:, None] + np.arange(2)).ravel(), columns, matrix))
     return blocks
+
+
+def add_anchor(
+    operator: RowOperator, mesh: Mesh, region: int, nodes: Integer, pattern: Complex, functional: Complex
+) -> None:
+    """Add pattern (functional . u) to the equations of a region's nodes (k,) in place, before the operator is used.
+
+    Makes the equations of a body without supports regular: where the loads balance, the functional of the solution
+    vanishes. pattern, functional (k,): complex.
+    """
+    own = (nodes >= operator.first_node) & (nodes < operator.last_node)
+    columns = (2 * nodes[:, None] + np.arange(2)).ravel()
+    values = np.stack([functional.real, functional.imag], axis=1).ravel()
+    added = np.stack([pattern.real, pattern.imag], axis=1)[own].ravel()
+    rows = (2 * (nodes[own] - operator.first_node)[:, None] + np.arange(2)).ravel()
+    for block in operator.blocks:
+        if block.region == region:
+            at = np.searchsorted(block.columns, columns)
+            stored = (at < len(block.columns)) & (block.columns[np.minimum(at, len(block.columns) - 1)] == columns)
+            block.matrix[np.ix_(np.searchsorted(block.rows, rows), at[stored])] += np.outer(added, values[stored])
 
 
 def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) -> Real:

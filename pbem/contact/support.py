@@ -21,7 +21,7 @@ def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie]:
     return ties
 
 
-def describe_free_motions(model: Model, ties: dict[str, Tie]) -> str | None:
-    """The rigid motions that come free with these ties, in words; None if there are none."""
+def describe_free_motions(model: Model, ties: dict[str, Tie], anchored: int) -> str | None:
+    """The rigid motions that come free with these ties, in words; None if there are no more than were anchored."""
     motions = find_free_motions(model, ties)
-    return "; ".join(motion.text for motion in motions) if motions else None
+    return "; ".join(motion.text for motion in motions) if len(motions) > anchored else None

@@ -13,17 +13,19 @@ from numpy.typing import NDArray
 from pbem.bem.operator import (
     Block,
     RowOperator,
+    add_anchor,
     assemble_displacement_rows,
     assemble_rows,
     scale_equations,
 )
+from pbem.contact.anchor import Anchor, anchor_motions
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.laws import Linearisation, PairLaws, collect_laws
 from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
 from pbem.contact.support import describe_free_motions
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.model.model import Model
-from pbem.model.support import Tie
+from pbem.model.support import Tie, find_free_motions
 from pbem.parallel import gather_parts, norm_of_parts, share_nodes
 from pbem.solve.linear import LinearSolver, choose_method
 
@@ -52,6 +54,7 @@ class Problem:
     traction_scale: float
     equation_scale: Real
     block_columns: tuple[Integer, ...]
+    anchors: tuple[Anchor, ...]
 
     @property
     def unknowns(self) -> int:
@@ -70,7 +73,7 @@ class Problem:
     @cached_property
     def free_motions(self) -> Callable[[tuple[tuple[str, Tie], ...]], str | None]:
         """What can move freely for given ties of the interfaces (name and tie); remembered, as modes rarely change it."""
-        return lru_cache(lambda ties: describe_free_motions(self.model, dict(ties)))
+        return lru_cache(lambda ties: describe_free_motions(self.model, dict(ties), len(self.anchors)))
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
         """The constraint map for linearised laws and a load."""
@@ -110,7 +113,10 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     costs = np.bincount(node_region, minlength=len(materials)).astype(float)[node_region]
     offsets = share_nodes(costs, comm.size)
     first, last = int(offsets[comm.rank]), int(offsets[comm.rank + 1])
+    anchors = anchor_motions(mesh, find_free_motions(model))
     operator = assemble_rows(mesh, materials, first, last, needed, model.size)
+    for anchor in anchors:
+        add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
     crack_nodes = np.flatnonzero(mesh.node_crack)
     shares = np.linspace(0, len(crack_nodes), comm.size + 1).astype(int)
     own_cracks = crack_nodes[shares[comm.rank] : shares[comm.rank + 1]]
@@ -126,6 +132,7 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
         crack_nodes=own_cracks,
         traction_scale=modulus / model.size,
         equation_scale=scale_equations(mesh, materials, model.size),
+        anchors=anchors,
         block_columns=tuple(find_unknowns_of_region(mesh, outer, block.region) for block in operator.blocks),
     )
 

@@ -30,14 +30,17 @@ def describe_unbalance(model: Model, motion: FreeMotion) -> str | None:
 
 
 def _sum_tractions(model: Model, motion: FreeMotion, stage: Stage) -> tuple[complex, float, float, float]:
-    """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs."""
+    """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs.
+
+    Fluid between two regions presses on both; where they are tied along the normal its power cancels.
+    """
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
     for region in model.regions:
         if region.name not in motion.velocities:
             continue
         a, spin = motion.velocities[region.name]
-        for side in (side for loop in region.loops for side in loop.sides if side.curve in model.conditions):
-            condition = model.conditions[side.curve]
+        for side in (side for loop in region.loops for side in loop.sides):
+            condition, values = _find_load(model, stage, side.curve)
             for leg in side_legs(model.curves, side):
                 points = leg.point(0.5 * (_NODES + 1))
                 if leg.center is None:
@@ -45,13 +48,19 @@ def _sum_tractions(model: Model, motion: FreeMotion, stage: Stage) -> tuple[comp
                 else:
                     normals = (points - leg.center) / np.abs(points - leg.center) * math.copysign(1.0, leg.sweep)
                 weights = 0.5 * _WEIGHTS * leg.length
-                tractions = _tractions(condition, stage.boundary[side.curve], normals) * weights
+                tractions = _tractions(condition, values, normals) * weights
                 rates = (np.conj(tractions) * (a + 1j * spin * points)).real
                 force += complex(tractions.sum())
                 moment += float((np.conj(points) * tractions).imag.sum())
                 power += float(rates.sum())
                 scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
     return force, moment, power, scale
+
+
+def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[float, float]]:
+    if curve in model.conditions:
+        return model.conditions[curve], stage.boundary[curve]
+    return Condition(curve, "local"), (-stage.pressure[curve], 0.0)
 
 
 def _tractions(condition: Condition, values: tuple[float, float], normals: np.ndarray) -> np.ndarray:

@@ -121,6 +121,12 @@ def test_explicit_grading_of_an_arc() -> None:
     assert refined(model, "low") == [BOTH] and refined(model, "high") == [START]
 
 
+def test_explicit_grading_of_a_circle_is_at_its_seam() -> None:
+    hole = 'hole = { center = [1, 1], radius = 0.5, elements = 16, grading = "both" }'
+    model = build(change(add_curves(SQUARE, hole), ('"left"]', '"left", "hole"]')))
+    assert refined(model, "hole") == [START, NEITHER, NEITHER, END]
+
+
 def test_first_element_of_a_refined_leg() -> None:
     text = change(SQUARE, ("[[0, 0], [2, 0]], elements = 8", '[[0, 0], [2, 0]], elements = 4, grading = "start"'))
     ends = build(text).curves["bottom"].legs[0].element_ends()

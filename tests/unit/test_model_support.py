@@ -54,6 +54,12 @@ def test_balanced_body_is_refused_as_not_yet_supported() -> None:
     assert not any("drive it" in fault.found for fault in faults)
 
 
+def test_fluid_that_lifts_a_block_is_a_load() -> None:
+    text = change(BLOCKS, (LOADED, "[boundary.left_upper]\nux = 0.0"), (FRICTION, 'law = "open"\npressure = 3.0'))
+    faults = "\n".join(map(str, find_faults(text)))
+    assert "drive it, with resultant (0, 6) and moment 6" in faults
+
+
 def test_ring_held_on_a_circle_along_its_normal_can_turn() -> None:
     text = f"""{MATERIAL}
 [curves]
@@ -89,6 +95,23 @@ def test_block_that_does_not_touch_is_free(law: str) -> None:
 def test_tied_blocks_move_together() -> None:
     text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (HELD, "[boundary.bottom]\nuy = 0"))
     assert "translation along x of 'lower', 'upper'" in find_only_fault(text)
+
+
+def test_velocities_of_tied_blocks_are_equal() -> None:
+    model = build(BLOCKS)
+    free = {name: replace(condition, known=("traction", "traction")) for name, condition in model.conditions.items()}
+    motions = find_free_motions(replace(model, conditions=free), {"interface": "both"})
+    assert len(motions) == 3
+    for motion in motions:
+        (a, spin), (b, other) = motion.velocities["lower"], motion.velocities["upper"]
+        assert a == pytest.approx(b, abs=1e-9) and spin == pytest.approx(other, abs=1e-9)
+
+
+def test_moment_of_the_tractions() -> None:
+    text = change(SQUARE, (HELD, "[boundary.left]\nty = 3.0\n[boundary.right]\ntx = 0.5"), ("ty = -1.0", "tx = -2.0"))
+    faults = "\n".join(map(str, find_faults(text)))
+    # left: force 6 up at x = 0; right: force 1 at (2, 1); top: force -4 along x at y = 2.
+    assert "with resultant (-3, 6) and moment 7 about (0, 0)" in faults
 
 
 def test_ties_of_the_moment_replace_those_of_the_laws() -> None:

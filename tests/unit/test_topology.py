@@ -371,6 +371,26 @@ def test_meeting_points_of_lines_and_arcs() -> None:
     assert meeting_points(Leg(1 - 1j, 1 + 0j, 1), arc, 1e-9) == []
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_fillet_meets_its_line_at_the_shared_end_only(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    turn, shift = np.exp(2j * np.pi * random.random()), complex(*random.uniform(-9, 9, 2))
+    radius, sweep = random.uniform(0.1, 3), random.uniform(0.2, 2)
+    joint, center = shift, shift + 1j * turn * radius
+    arc = Leg(joint, center + (joint - center) * np.exp(1j * sweep), 4, center=center, sweep=sweep)
+    assert meeting_points(Leg(shift - turn, joint, 1), arc, 1e-9) == []
+    below = shift - 1.3j * turn
+    other = Leg(joint, below + (joint - below) * np.exp(-0.4j), 4, center=below, sweep=-0.4)
+    assert meeting_points(other, arc, 1e-9) == []
+
+
+def test_projection_to_an_arc_of_more_than_half_a_circle() -> None:
+    arc = Leg(1 + 0j, -1j, 4, center=0j, sweep=1.5 * np.pi)
+    assert project(arc, -2 - 2j) == pytest.approx((5 / 6, 8**0.5 - 1))
+    assert project(arc, 2 - 1j) == pytest.approx((0.0, 2**0.5))
+    assert project(arc, 1 - 2j) == pytest.approx((1.0, 2**0.5))
+
+
 def test_projection_to_legs() -> None:
     assert project(Leg(0j, 2 + 0j, 1), 0.5 + 1j) == pytest.approx((0.25, 1.0))
     assert project(Leg(0j, 2 + 0j, 1), -1 + 0j) == pytest.approx((0.0, 1.0))

@@ -86,7 +86,7 @@ def test_reference_is_what_was_drawn() -> None:
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3, 1e6])
 @pytest.mark.parametrize("angle", [0.0, 33.0, 90.0, 217.0])
-@pytest.mark.parametrize("shift", [0.0, 1e3, 1e6])
+@pytest.mark.parametrize("shift", [0.0, 1e3, 1e6, 1e8])
 def test_size_direction_and_place_do_not_matter(scale: float, angle: float, shift: float) -> None:
     text = write(scale, angle, scale * shift * (0.7 - 0.4j))
     assert summarise(build(text)) == REFERENCE

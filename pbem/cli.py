@@ -207,13 +207,12 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from pbem.case import read_case
     from pbem.mesh.generate import generate_mesh
-    from pbem.model.build import build_model
+    from pbem.model.build import read_model
     from pbem.results.describe import describe_model
     from pbem.results.output import check_picture_path
 
-    model = build_model(read_case(find_case(options.case)))
+    _, model = read_model(find_case(options.case))
     if options.plot:
         check_picture_path(options.plot)
     mesh = generate_mesh(model)
@@ -283,12 +282,11 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
 
 def _make_reporter(case: Path, quiet: bool) -> Reporter | None:
     """The progress needs the stages, and what is wrong with the case is better said by the run, on all ranks."""
-    from pbem.case import read_case
-    from pbem.model.build import build_model
+    from pbem.model.build import read_model
     from pbem.progress import make_reporter
 
     try:
-        return make_reporter(build_model(read_case(case)).stages, quiet)
+        return make_reporter(read_model(case)[1].stages, quiet)
     except PbemError:
         return None
 

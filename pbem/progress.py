@@ -108,11 +108,14 @@ class BarReporter:
 
 
 def make_reporter(stages: tuple[Stage, ...], quiet: bool = False, stream: TextIO | None = None) -> Reporter:
-    """A bar if the stream (default: standard error for the bar, standard output for lines) is a terminal."""
+    """A bar if the stream is a terminal, otherwise lines; by default a bar on standard error or lines on standard
+    output."""
     if quiet:
         return SilentReporter()
     if stream is None:
-        stream = sys.stderr if sys.stderr.isatty() else sys.stdout
+        # Standard output tells nothing: Open MPI gives its ranks a terminal there, whatever its own output is.
+        stream = sys.stderr
+        return BarReporter(stages, stream) if stream.isatty() else LogReporter(stages, sys.stdout)
     return BarReporter(stages, stream) if stream.isatty() else LogReporter(stages, stream)
 
 

@@ -70,12 +70,15 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh) -> None:
     fields = file.create_group("fields")
     for name in ("displacement", "traction"):
         _create_growing(fields, name, (len(faces.position), 2), "f8")
-    reactions = file.create_group("reactions", track_order=True)
+    reactions = file.create_group("reactions")
+    reactions.attrs["names"] = _text(list(model.conditions))
     for name in model.conditions:
         _create_growing(reactions, name, (2,), "f8")
-    contact = file.create_group("contact", track_order=True)
-    for name, pairs in sort_pairs(mesh).items():
-        _write_interface(contact.create_group(name), model, mesh, name, pairs)
+    contact = file.create_group("contact")
+    interfaces = sort_pairs(mesh)
+    contact.attrs["names"] = _text(list(interfaces))
+    for name, pairs in interfaces.items():
+        _write_interface(_create_group(contact, name), model, mesh, name, pairs)
     file.create_dataset("convergence", shape=(0,), maxshape=(None,), dtype=ITERATION, chunks=(256,))
 
 
@@ -112,6 +115,15 @@ def _write_interface(group: h5py.Group, model: Model, mesh: Mesh, name: str, pai
     for key, value in vars(interface.law).items():
         if key != "kind" and isinstance(value, str | bool | int | float):
             group.attrs[key] = value
+
+
+def _create_group(parent: h5py.Group, name: str) -> h5py.Group:
+    """A group that keeps all its attributes in its header: from the ninth on they would go elsewhere, and HDF5 1.10
+    crashes when it copies texts from there."""
+    properties = h5py.h5p.create(h5py.h5p.GROUP_CREATE)
+    properties.set_attr_phase_change(64, 32)
+    h5py.h5g.create(parent.id, name.encode(), gcpl=properties)
+    return parent[name]
 
 
 def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: str) -> None:

@@ -254,8 +254,8 @@ def _read(path: Path, file: h5py.File) -> Results:
             curve=_read_indices(elements, "curve"), crack=_freeze(elements["crack"][...].astype(bool)),
         ),
         steps=steps,
-        reactions={name: _freeze(data[:k]) for name, data in file["reactions"].items()},
-        contact=_Interfaces(path, tuple(file["contact"]), k),
+        reactions={name: _freeze(file["reactions"][name][:k]) for name in _names(file["reactions"])},
+        contact=_Interfaces(path, _names(file["contact"]), k),
         convergence=_freeze(file["convergence"][...]),
     )
 
@@ -289,8 +289,8 @@ def _read_indices(group: h5py.Group, name: str) -> Integer:
     return _freeze(group[name][...].astype(np.int64))
 
 
-def _names(dataset: h5py.Dataset) -> tuple[str, ...]:
-    return tuple(str(name) for name in dataset.attrs["names"])
+def _names(item: h5py.HLObject) -> tuple[str, ...]:
+    return tuple(str(name) for name in item.attrs["names"])
 
 
 def _freeze(array: NDArray[Any]) -> NDArray[Any]:

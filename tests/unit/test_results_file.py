@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -234,6 +236,18 @@ def test_bad_output_paths_are_refused_before_anything_is_written(tmp_path: Path)
     with pytest.raises(ResultFileError, match="not writable"):
         check_output_path("/proc/a.h5")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_groups_can_be_copied_to_other_files(tmp_path: Path) -> None:
+    # Copied in another process: what went wrong here was a crash of HDF5.
+    write(tmp_path / "a.h5").finish()
+    code = ("import h5py, sys\n"
+            "with h5py.File(sys.argv[1]) as old, h5py.File(sys.argv[2], 'w') as new:\n"
+            "    [old.copy(name, new) for name in old]")
+    done = subprocess.run([sys.executable, "-c", code, tmp_path / "a.h5", tmp_path / "b.h5"], capture_output=True)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "b.h5") as file:
+        assert file["contact/joint"].attrs["law"] == "coulomb"
 
 
 def test_long_lists_of_names_and_texts_are_stored(tmp_path: Path) -> None:

@@ -1,0 +1,238 @@
+"""The command line as a user meets it: texts, files and exit codes."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbem import cli
+from pbem.cli import find_case, list_bundled_cases, main, split_petsc_options
+from pbem.errors import CaseError, ConvergenceError
+from pbem.results.reader import open_results
+from tests.cli.cli_sample import BLOCKS
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A working directory with the case blocks.toml, outside of any launcher."""
+    for name in ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "SLURM_PROCID"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "blocks.toml").write_text(BLOCKS)
+    yield tmp_path
+
+
+@pytest.fixture
+def computed(folder: Path, capsys: Capture) -> Path:
+    """The result file of the case."""
+    assert main(["run", "blocks.toml", "--quiet"]) == 0
+    capsys.readouterr()
+    return folder / "blocks.h5"
+
+
+def test_a_case_is_run_into_a_file_beside_the_user(folder: Path, capsys: Capture) -> None:
+    assert main(["blocks.toml"]) == 0
+    results = open_results("blocks.h5")
+    assert (results.title, results.status, len(results.steps)) == ("Small blocks", "finished", 3)
+    assert results.case == BLOCKS
+    out, err = capsys.readouterr()
+    assert "step 3 of 3, stage shear, factor 0.5 to 1" in out
+    assert "finished: 3 steps" in out and out.rstrip().endswith("results: blocks.h5")
+    assert err == ""
+
+
+def test_reactions_balance_and_friction_limits_them(computed: Path) -> None:
+    reactions = open_results(computed).reactions
+    np.testing.assert_allclose(reactions["top"] + reactions["bottom"], 0, atol=1e-8)
+    assert abs(reactions["top"][-1, 0] / reactions["top"][-1, 1]) == pytest.approx(0.2, rel=0.01)
+
+
+def test_quiet_runs_say_nothing(folder: Path, capsys: Capture) -> None:
+    assert main(["run", "blocks.toml", "-o", "other.h5", "--quiet"]) == 0
+    assert (folder / "other.h5").is_file() and not (folder / "blocks.h5").exists()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_resuming_a_cut_run_gives_what_a_whole_run_gives(computed: Path, capsys: Capture) -> None:
+    import h5py
+
+    whole = open_results(computed)
+    shutil.copy(computed, "cut.h5")
+    with h5py.File("cut.h5", "r+") as cut:
+        for name in ("stage", "factor", "iterations", "residual", "number"):
+            cut["steps"][name].resize(2, axis=0)
+    assert main(["run", "blocks.toml", "-o", "cut.h5", "--resume"]) == 0
+    assert "step 3 of 3" in capsys.readouterr().out
+    resumed = open_results("cut.h5")
+    np.testing.assert_allclose(resumed.displacement, whole.displacement, atol=1e-14)
+    np.testing.assert_allclose(resumed.contact["joint"].slip, whole.contact["joint"].slip, atol=1e-14)
+    np.testing.assert_array_equal(resumed.convergence["step"], whole.convergence["step"])
+
+
+def test_a_wrong_case_is_refused_with_all_its_faults(folder: Path, capsys: Capture) -> None:
+    wrong = BLOCKS.replace("friction = 0.2", "frction = 0.2").replace("poisson = 0.3", "poisson = 0.7")
+    (folder / "wrong.toml").write_text(wrong)
+    for command in (["check", "wrong.toml"], ["run", "wrong.toml"], ["wrong.toml", "--resume"]):
+        assert main(command) == 2
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert "2 faults" in err and "poisson" in err and "frction" in err
+        assert err.count("materials.soft.poisson") == 1
+        assert "Traceback" not in err
+    assert sorted(path.name for path in folder.iterdir()) == ["blocks.toml", "wrong.toml"]
+
+
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["run"], "CASE"),
+        ([], "COMMAND"),
+        (["run", "blocks.toml", "--bogus"], "--bogus"),
+        (["chek", "blocks.toml"], "invalid choice: 'chek'"),
+        (["run", "blocks.toml", "-o", "none/a.h5"], "the folder none does not exist"),
+        (["run", "blocks.toml", "--resume", "--quiet"], "no such file to resume"),
+        (["info", "none.h5"], "none.h5: no such file"),
+        (["info", "blocks.toml"], "is not an HDF5 file"),
+        (["plot", "blocks.toml"], "is not an HDF5 file"),
+        (["check", "blocks.toml", "--plot", "a.txt"], "is no picture"),
+        (["check", "blocks.toml", "--plot", "none/a.png"], "the folder none does not exist"),
+        (["check", "blocks.toml", "-pbem_ksp_view"], "PETSc options"),
+    ],
+)
+def test_a_wrong_command_line_is_refused(folder: Path, capsys: Capture, arguments: list[str], said: str) -> None:
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert said in err
+    assert "Traceback" not in err
+    assert [path.name for path in folder.iterdir()] == ["blocks.toml"]
+
+
+def test_check_tells_what_would_be_computed(folder: Path, capsys: Capture) -> None:
+    assert main(["check", "blocks.toml", "--plot", "model.png"]) == 0
+    out = capsys.readouterr().out
+    for text in ("Small blocks", "region lower", "friction 0.2", "shear: 2 steps", "unknowns", "picture: model.png"):
+        assert text in out
+    assert (folder / "model.png").stat().st_size > 5000
+    assert not (folder / "blocks.h5").exists()
+
+
+def test_info_and_plot_read_a_result_file(computed: Path, capsys: Capture) -> None:
+    assert main(["info", "blocks.h5"]) == 0
+    assert "steps stored: 3" in capsys.readouterr().out
+    assert main(["plot", "blocks.h5"]) == 0
+    assert (computed.with_suffix(".png")).stat().st_size > 5000
+    assert main(["plot", "blocks.h5", "-o", "step2.pdf", "--step", "2", "--magnify", "10"]) == 0
+    assert (computed.parent / "step2.pdf").stat().st_size > 5000
+    capsys.readouterr()
+    assert main(["plot", "blocks.h5", "--step", "7"]) == 2
+    assert "holds no load step 7; it holds: 1, 2, 3" in capsys.readouterr().err
+
+
+def test_help_and_version(capsys: Capture) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("pbem 0.")
+    assert main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(f"pbem {command}" in text for command in ("check", "run", "info", "plot"))
+    assert main(["run", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "-pbem_ksp_rtol" in text and "exit code" in text
+
+
+def break_run(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    """Let a run end by this exception after its first step."""
+    import pbem.driver
+
+    whole = pbem.driver.march
+
+    def march(*arguments: object) -> Iterator[object]:
+        yield next(whole(*arguments))  # type: ignore[arg-type]
+        raise error
+
+    monkeypatch.setattr(pbem.driver, "march", march)
+
+
+def test_a_run_that_does_not_converge_keeps_its_steps(
+    folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_run(monkeypatch, ConvergenceError("mode cycle", "joint near (1, 1); try more steps"))
+    assert main(["blocks.toml"]) == 3
+    err = capsys.readouterr().err
+    assert "joint near (1, 1); try more steps" in err and "blocks.h5 holds every step reached" in err
+    assert "Traceback" not in err
+    results = open_results("blocks.h5")
+    assert (results.status, len(results.steps)) == ("failed", 1)
+    assert "mode cycle" in results.failure
+
+
+def test_an_unexpected_error_shows_one_traceback(
+    folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_run(monkeypatch, ZeroDivisionError("a slip of ours"))
+    assert main(["blocks.toml"]) == 1
+    err = capsys.readouterr().err
+    assert err.count("Traceback") == err.count("ZeroDivisionError: a slip of ours") == 1
+    assert open_results("blocks.h5").status == "failed"
+
+
+def test_interrupting_a_run_is_said_in_a_line(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    break_run(monkeypatch, KeyboardInterrupt())
+    assert main(["blocks.toml"]) == 130
+    err = capsys.readouterr().err
+    assert "interrupted" in err and "--resume" in err and "Traceback" not in err
+    assert main(["blocks.toml", "--quiet"]) == 130
+    assert open_results("blocks.h5").failure.startswith("interrupted")
+
+
+def test_petsc_options_are_taken_out_with_their_values() -> None:
+    arguments = ["-pbem_ksp_rtol", "1e-8", "run", "-pbem_ksp_view", "-o", "a.h5", "-pbem_shift", "-0.5",
+                 "-pbem_mat_mumps_icntl_14=40", "-pbem_ksp_monitor", "case.toml"]
+    petsc, plain = split_petsc_options(arguments)
+    assert petsc == {"ksp_rtol": "1e-8", "ksp_view": "", "shift": "-0.5", "mat_mumps_icntl_14": "40", "ksp_monitor": ""}
+    assert plain == ["run", "-o", "a.h5", "case.toml"]
+
+
+def test_petsc_options_reach_the_run(folder: Path, capsys: Capture) -> None:
+    import h5py
+
+    assert main(["run", "blocks.toml", "--quiet", "-pbem_ksp_rtol", "1e-11"]) == 0
+    with h5py.File("blocks.h5") as file:
+        assert "ksp_rtol" in file.attrs["petsc_options"] and "1e-11" in file.attrs["petsc_options"]
+
+
+def test_cases_of_the_program_are_found_by_name(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bundled = list_bundled_cases()
+    assert "two_blocks" in bundled and all(path.is_file() for path in bundled.values())
+    assert find_case("two_blocks") == find_case("two_blocks.toml") == bundled["two_blocks"]
+    assert find_case("blocks.toml") == Path("blocks.toml")
+    with pytest.raises(CaseError, match=r"two_blocks.*did you mean 'two_blocks'\?"):
+        find_case("two_bocks")
+    # What lies in the working directory goes before what comes with the program.
+    (folder / "two_blocks").write_text(BLOCKS)
+    assert find_case("two_blocks") == Path("two_blocks")
+    monkeypatch.setattr(cli, "list_bundled_cases", dict)
+    with pytest.raises(CaseError, match=r"expected a case file$"):
+        find_case("two_bocks")
+
+
+@pytest.mark.parametrize("command", ["check blocks.toml", "info blocks.h5", "plot blocks.h5", "--help"])
+def test_only_run_needs_mpi_and_petsc(computed: Path, command: str) -> None:
+    code = ("import sys; from pbem.cli import main; code = main(sys.argv[1:]); "
+            "print([name for name in ('mpi4py', 'petsc4py', 'mpi4py.MPI') if name in sys.modules]); sys.exit(code)")
+    done = subprocess.run([sys.executable, "-c", code, *command.split()], capture_output=True, text=True, cwd=computed.parent)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_the_package_can_be_run_as_a_module(folder: Path) -> None:
+    done = subprocess.run([sys.executable, "-m", "pbem", "info", "none.h5"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "pbem: none.h5: no such file\n")

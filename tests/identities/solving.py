@@ -1,0 +1,75 @@
+"""Solve a model as a whole or by its parts: its tangent operator, and systems with values that vary on a curve."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.contact.laws import ModeState, PairState, linearise, start_modes
+from pbem.exact import PlaneField
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.parallel import world
+from pbem.solve.march import march
+from pbem.solve.problem import Problem, assemble_problem
+from pbem.solve.step import SilentReporter, Step
+
+Real = NDArray[np.float64]
+
+
+def march_to_end(model: Model) -> tuple[Mesh, list[Step]]:
+    """All converged steps of a model."""
+    mesh = generate_mesh(model)
+    return mesh, list(march(assemble_problem(model, mesh, world), SilentReporter()))
+
+
+def assemble_tangent(problem: Problem, modes: ModeState | None = None) -> Real:
+    """K = B M (2 nodes, 2 nodes) for given modes, by default those before any load."""
+    count = problem.mesh.pairs.count
+    law = linearise(
+        problem.laws, modes or start_modes(problem.laws), np.zeros(count), np.zeros(count), np.zeros(count),
+        problem.traction_scale,
+    )  # fmt: skip
+    constraints = problem.constrain(law, problem.evaluate_load(0, 0.0))
+    tangent = np.zeros((problem.unknowns, problem.unknowns))
+    for block, columns in zip(problem.operator.blocks, problem.block_columns, strict=True):
+        tangent[np.ix_(block.rows, columns)] = problem.operator.multiply_block(block, constraints.matrix, columns)
+    return tangent
+
+
+def measure_condition(model: Model) -> float:
+    """Condition number of the tangent operator in the modes before any load."""
+    return float(np.linalg.cond(assemble_tangent(assemble_problem(model, generate_mesh(model), world))))
+
+
+def solve_for_field(model: Model, exact: PlaneField) -> tuple[Mesh, Real]:
+    """v (4 nodes,) of a body without pairs whose known values, in the model's conditions, are those of a field.
+
+    The values of the model's conditions must not be zero, so that no column of a known value is left out.
+    """
+    mesh = generate_mesh(model)
+    problem = assemble_problem(model, mesh, world)
+    outer = problem.outer
+    position, normal = mesh.position[outer.node], mesh.normal[outer.node]
+    fields = exact.displacement(position), exact.traction(position, normal)
+    components = [(np.conj(outer.direction) * values[:, None]).real for values in fields]
+    load = replace(problem.evaluate_load(0, 0.0), values=np.where(outer.displacement_known, *components))
+    law = linearise(
+        problem.laws, start_modes(problem.laws), np.zeros(0), np.zeros(0), np.zeros(0), problem.traction_scale
+    )
+    constraints = problem.constrain(law, load)
+    unknowns = np.linalg.solve(assemble_tangent(problem), -problem.apply(constraints.offset, load))
+    return mesh, constraints.evaluate(unknowns)
+
+
+def relative_error(found: PairState, exact: PairState) -> float:
+    """Largest difference of tractions or jumps, relative to the largest traction or jump."""
+    pairs = [(found.p_n, exact.p_n), (found.p_s, exact.p_s), (found.g_n, exact.g_n), (found.g_s, exact.g_s)]
+    errors = []
+    for group in (pairs[:2], pairs[2:]):
+        size = max(float(np.abs(b).max()) for _, b in group)
+        errors.append(max(float(np.abs(a - b).max()) for a, b in group) / (size or 1.0))
+    return max(errors)

@@ -16,139 +16,20 @@
  */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
-#include <complex.h>
-#include <math.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
-typedef double complex cplx;
-
-#define MAX_ORDER 3
-#define MAX_SHAPES (MAX_ORDER + 1)
-enum { NO_TIP = 0, TIP_AT_START = 1, TIP_AT_END = 2 };
-
-typedef struct {
-    cplx c[MAX_SHAPES + 1], d[MAX_SHAPES], e[MAX_SHAPES];
-    double n[MAX_SHAPES], l[MAX_SHAPES]; /* l_k = int s^k ds */
-    double y;                            /* Im w, in units of h */
-} Moments;
-
-/* Beyond this |w|^2 the series in 1/w is used; at it, upward recursion to k = 4 loses a factor of about 40. */
-static const double FAR_SQUARED = 6.25;
-
-/* Terms of a series in q = 1/|w|^2 (or 1/|w|) that reach rounding: the least K with q^K < 1e-17. */
-static int count_terms(double inverse_ratio)
-{
-    return 1 + (int)(39.2 / log(inverse_ratio));
-}
-
-static void evaluate_moments(cplx w, int on_element, int order, Moments *m)
-{
-    const double x = creal(w), y = on_element ? 0.0 : cimag(w);
-    const double r2 = x * x + y * y;
-    /* |w^2 - 1|^2 = |w - 1|^2 |w + 1|^2, without cancellation near the ends */
-    const double right = (x - 1) * (x - 1) + y * y, left = (x + 1) * (x + 1) + y * y;
-    const double log_ends = 0.5 * log(right * left);
-    const int top = order + 1;
-    m->y = y;
-    w = x + I * y;
-    for (int k = 0; k <= order; k++) m->l[k] = (k % 2) ? 0.0 : 2.0 / (k + 1);
-
-    if (r2 < FAR_SQUARED) {
-        /* |w|^2 - 1, without cancellation near the ends */
-        const double angle = on_element ? 0.0 : atan2(2 * y, (x - 1) * (x + 1) + y * y);
-        const cplx below = 1 / (w - 1), above = 1 / (w + 1);
-        m->c[0] = 0.5 * log(right / left) + I * angle;
-        m->d[0] = below - above;
-        m->e[0] = above * above - below * below;
-        for (int k = 0; k < top; k++) {
-            const double l = (k % 2) ? 0.0 : 2.0 / (k + 1);
-            m->c[k + 1] = w * m->c[k] + l;
-        }
-        for (int k = 0; k < order; k++) {
-            m->d[k + 1] = w * m->d[k] + m->c[k];
-            m->e[k + 1] = w * m->e[k] + 2 * m->d[k];
-        }
-    } else {
-        const cplx v = conj(w) / r2, v2 = v * v;
-        const int terms = count_terms(r2);
-        cplx c = 0, d = 0, e = 0;
-        /* c_top = - sum over j = top (mod 2), j += 2 of 2/(top + j + 1) v^(j + 1); Horner in v^2 */
-        const int first = top % 2;
-        for (int i = terms; i >= 0; i--) {
-            const int j = first + 2 * i;
-            const double a = -2.0 / (top + j + 1);
-            c = c * v2 + a;
-            d = d * v2 - a * (j + 1);
-            e = e * v2 + a * (j + 1) * (j + 2);
-        }
-        const cplx lead = first ? v2 : v;
-        m->c[top] = c * lead;
-        cplx d_above = d * lead * v, e_above = e * lead * v2;
-        for (int k = order; k >= 0; k--) {
-            const double l = (k % 2) ? 0.0 : 2.0 / (k + 1);
-            m->c[k] = v * (m->c[k + 1] - l);
-            m->d[k] = d_above = v * (d_above - m->c[k]);
-            m->e[k] = e_above = v * (e_above - 2 * m->d[k]);
-        }
-    }
-    for (int k = 0; k <= order; k++) {
-        const double ends = (k % 2) ? creal(m->c[0]) : log_ends;
-        m->n[k] = (ends - creal(m->c[k + 1])) / (k + 1);
-    }
-}
-
-/* Moments of t^(k + 1/2) seen from the tip; brought to the element's own coordinate, units and direction. */
-static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Moments *m)
-{
-    const double sign = tip == TIP_AT_START ? 1.0 : -1.0;
-    m->y = on_element ? 0.0 : cimag(w);
-    /* distance from the tip over the length: (1 + w)/2 at the start; at the end the axis is reversed, (1 - w)/2 */
-    const cplx q = 0.5 * (1 + sign * (creal(w) + I * m->y));
-    const double r2 = creal(q) * creal(q) + cimag(q) * cimag(q);
-    if (r2 < 4.0) {
-        const cplx root = csqrt(q), sum = root + 1;
-        /* q - 1 = (root - 1)(root + 1), without cancellation near the other end */
-        const cplx rest = 0.5 * (sign * (creal(w) + I * m->y) - 1), ratio = rest / (sum * sum);
-        const cplx logarithm = on_element ? log(-creal(ratio)) : clog(ratio);
-        m->c[0] = 2 + root * logarithm;
-        m->d[0] = logarithm / (2 * root) + 1 / rest;
-        m->e[0] = -logarithm / (4 * q * root) + 1 / (2 * q * rest) - 1 / (rest * rest);
-        for (int k = 0; k < order; k++) {
-            m->c[k + 1] = q * m->c[k] + 1 / (k + 1.5);
-            m->d[k + 1] = q * m->d[k] + m->c[k];
-            m->e[k + 1] = q * m->e[k] + 2 * m->d[k];
-        }
-    } else {
-        const cplx v = conj(q) / r2;
-        const int terms = count_terms(sqrt(r2));
-        cplx c = 0, d = 0, e = 0;
-        for (int j = terms; j >= 0; j--) {
-            const double a = -1.0 / (order + j + 1.5);
-            c = c * v + a;
-            d = d * v - a * (j + 1);
-            e = e * v + a * (j + 1) * (j + 2);
-        }
-        m->c[order] = c * v;
-        m->d[order] = d * v * v;
-        m->e[order] = e * v * v * v;
-        for (int k = order - 1; k >= 0; k--) {
-            m->c[k] = v * (m->c[k + 1] - 1 / (k + 1.5));
-            m->d[k] = v * (m->d[k + 1] - m->c[k]);
-            m->e[k] = v * (m->e[k + 1] - 2 * m->d[k]);
-        }
-    }
-    for (int k = 0; k <= order; k++) {
-        m->c[k] *= sign;
-        m->d[k] *= 0.5;
-        m->e[k] *= 0.25 * sign;
-    }
-}
+#include "arcs.h"
+#include "moments.h"
 
 typedef struct {
     Py_ssize_t points, elements;
-    const cplx *point, *normal, *start, *end;
+    const cplx *point, *normal, *start, *end, *center;
+    const double *sweep;           /* angle through which an arc turns; 0 for a straight element */
     const int64_t *on;             /* element on which the point lies, or -1 */
+    const double *on_local;        /* the point's coordinate s on that element */
+    const double *local;           /* coordinates of an element's nodes */
     const int8_t *tip;             /* NO_TIP, TIP_AT_START, TIP_AT_END */
     const double *shape, *shape_tip_start, *shape_tip_end; /* coefficient of power k in shape j: [k * shapes + j] */
     int order;
@@ -165,7 +46,9 @@ static inline void put_block(double *out, Py_ssize_t width, cplx P, cplx Q)
     out[width + 1] = creal(P) - creal(Q);
 }
 
-static void put_shapes(double *out, Py_ssize_t width, int shapes, const double *shape, const cplx *P, const cplx *Q)
+/* From factors of powers to factors of nodal values; weight (per node) may be NULL. */
+static void put_shapes(double *out, Py_ssize_t width, int shapes, const double *shape, const double *weight, const cplx *P,
+                       const cplx *Q)
 {
     for (int j = 0; j < shapes; j++) {
         cplx p = 0, q = 0;
@@ -173,66 +56,128 @@ static void put_shapes(double *out, Py_ssize_t width, int shapes, const double *
             p += shape[k * shapes + j] * P[k];
             q += shape[k * shapes + j] * Q[k];
         }
-        put_block(out + 2 * j, width, p, q);
+        const double w = weight ? weight[j] : 1.0;
+        put_block(out + 2 * j, width, w * p, w * q);
     }
 }
 
+typedef struct {
+    cplx Pu[MAX_SHAPES], Qu[MAX_SHAPES], Pt[MAX_SHAPES], Qt[MAX_SHAPES];
+} Factors;
+
 /* Factors of the displacement at the point: -int T u for the density u, int U t for the density t. */
-static void combine_displacement(const Rows *r, const Moments *m, double h, cplx e, cplx *Pu, cplx *Qu, cplx *Pt, cplx *Qt)
+static void combine_displacement(const Rows *r, const Moments *m, double h, cplx e, int tractions, Factors *out)
 {
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1));
     const double ft = -h / (4 * M_PI * r->shear_modulus * (kappa + 1)), log_h = log(h) - r->log_length;
     for (int k = 0; k <= r->order; k++) {
-        Pu[k] = fu * ((kappa + 1) * cimag(m->c[k]) + I * (1 - kappa) * creal(m->c[k]));
-        Qu[k] = fu * 2 * m->y * e * e * conj(m->d[k]);
-        if (!Pt) continue;
-        Pt[k] = ft * 2 * kappa * (m->n[k] + m->l[k] * log_h);
-        Qt[k] = -ft * e * e * (m->l[k] - 2 * I * m->y * conj(m->c[k]));
+        out->Pu[k] = fu * ((kappa + 1) * cimag(m->c[k]) + I * (1 - kappa) * creal(m->c[k]));
+        out->Qu[k] = fu * 2 * m->y * e * e * conj(m->d[k]);
+        if (!tractions) continue;
+        out->Pt[k] = ft * 2 * kappa * (m->n[k] + m->l[k] * log_h);
+        out->Qt[k] = -ft * e * e * (m->l[k] - 2 * I * m->y * conj(m->c[k]));
     }
 }
 
 /* Factors of the traction on the normal N at the point. */
-static void combine_traction(const Rows *r, const Moments *m, double h, cplx e, cplx N, cplx *Pu, cplx *Qu, cplx *Pt, cplx *Qt)
+static void combine_traction(const Rows *r, const Moments *m, double h, cplx e, cplx N, int tractions, Factors *out)
 {
     const double kappa = r->kappa, g = r->shear_modulus / (M_PI * (kappa + 1) * h), f = -1 / (2 * M_PI * (kappa + 1));
     const cplx e3 = e * e * e;
     for (int k = 0; k <= r->order; k++) {
         const cplx c = conj(m->c[k]), d = conj(m->d[k]);
-        Pu[k] = g * I * (e * d * conj(N) - conj(e * d) * N);
-        Qu[k] = g * (I * e * d * N + e3 * (I * d + 2 * m->y * conj(m->e[k])) * conj(N));
-        if (!Pt) continue;
-        Pt[k] = -f * (conj(e * c) * N + kappa * e * c * conj(N));
-        Qt[k] = f * (-e * c * N + e3 * (2 * I * m->y * d - c) * conj(N));
+        out->Pu[k] = g * I * (e * d * conj(N) - conj(e * d) * N);
+        out->Qu[k] = g * (I * e * d * N + e3 * (I * d + 2 * m->y * conj(m->e[k])) * conj(N));
+        if (!tractions) continue;
+        out->Pt[k] = -f * (conj(e * c) * N + kappa * e * c * conj(N));
+        out->Qt[k] = f * (-e * c * N + e3 * (2 * I * m->y * d - c) * conj(N));
     }
 }
 
-static void fill_rows(const Rows *r)
+/* The same two for an arc. */
+static void combine_arc_displacement(const Rows *r, const ArcMoments *m, int tractions, Factors *out)
+{
+    const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1)), ft = -1 / (4 * M_PI * r->shear_modulus * (kappa + 1));
+    for (int k = 0; k <= r->order; k++) {
+        out->Pu[k] = fu * ((kappa + 1) * cimag(m->c[k]) + I * (1 - kappa) * creal(m->c[k]));
+        out->Qu[k] = fu * I * conj(m->q[k]);
+        if (!tractions) continue;
+        out->Pt[k] = ft * 2 * kappa * (m->n[k] - m->l[k] * r->log_length);
+        out->Qt[k] = -ft * conj(m->s[k]);
+    }
+}
+
+static void combine_arc_traction(const Rows *r, const ArcMoments *m, cplx N, int tractions, Factors *out)
+{
+    const double kappa = r->kappa, g = r->shear_modulus / (M_PI * (kappa + 1)), f = -1 / (2 * M_PI * (kappa + 1));
+    for (int k = 0; k <= r->order; k++) {
+        const cplx d = m->d[k], x = m->x[k];
+        out->Pu[k] = g * I * (conj(d * N) - d * N);
+        out->Qu[k] = g * I * (conj(d) * N + conj(m->dq[k] * N));
+        if (!tractions) continue;
+        out->Pt[k] = -f * (x * N + kappa * conj(x * N));
+        out->Qt[k] = -f * (conj(x) * N + conj(m->y[k] * N));
+    }
+}
+
+static void evaluate_straight(const Rows *r, Py_ssize_t i, Py_ssize_t j, int tractions, Factors *out)
+{
+    const cplx half = 0.5 * (r->end[j] - r->start[j]), middle = 0.5 * (r->end[j] + r->start[j]);
+    const double h = cabs(half);
+    const cplx e = half / h, w = (r->point[i] - middle) * conj(e) / h;
+    Moments m;
+    if (r->tip[j] == NO_TIP)
+        evaluate_moments(w, r->on[i] == j, r->order, &m);
+    else
+        evaluate_tip_moments(w, r->on[i] == j, r->order, r->tip[j], &m);
+    if (r->normal)
+        combine_traction(r, &m, h, e, r->normal[i], tractions, out);
+    else
+        combine_displacement(r, &m, h, e, tractions, out);
+}
+
+static void evaluate_arc(const Rows *r, const Arc *arc, Py_ssize_t i, Py_ssize_t j, int tractions, Factors *out)
+{
+    ArcMoments m;
+    evaluate_arc_moments(arc, r->point[i], r->on[i] == j, r->on_local[i], &m);
+    if (r->normal)
+        combine_arc_traction(r, &m, r->normal[i], tractions, out);
+    else
+        combine_arc_displacement(r, &m, tractions, out);
+}
+
+/* arcs: one for every element, prepared where the element is an arc. */
+static void fill_rows(const Rows *r, const Arc *arcs)
 {
     const int shapes = r->order + 1;
     const Py_ssize_t width = 2 * r->elements * shapes;
     for (Py_ssize_t i = 0; i < r->points; i++) {
         for (Py_ssize_t j = 0; j < r->elements; j++) {
-            const cplx half = 0.5 * (r->end[j] - r->start[j]), middle = 0.5 * (r->end[j] + r->start[j]);
-            const double h = cabs(half);
-            const cplx e = half / h, w = (r->point[i] - middle) * conj(e) / h;
-            const int on_element = r->on[i] == j, tip = r->tip[j];
-            Moments m;
-            cplx Pu[MAX_SHAPES], Qu[MAX_SHAPES], Pt[MAX_SHAPES], Qt[MAX_SHAPES];
-            const int tractions = r->traction && tip == NO_TIP;
-            if (tip == NO_TIP)
-                evaluate_moments(w, on_element, r->order, &m);
-            else
-                evaluate_tip_moments(w, on_element, r->order, tip, &m);
-            if (r->normal)
-                combine_traction(r, &m, h, e, r->normal[i], Pu, Qu, tractions ? Pt : NULL, tractions ? Qt : NULL);
-            else
-                combine_displacement(r, &m, h, e, Pu, Qu, tractions ? Pt : NULL, tractions ? Qt : NULL);
-            const Py_ssize_t at = 2 * i * width + 2 * j * shapes;
+            const int tip = r->tip[j], tractions = r->traction && tip == NO_TIP, is_arc = r->sweep[j] != 0;
             const double *shape = tip == NO_TIP ? r->shape : tip == TIP_AT_START ? r->shape_tip_start : r->shape_tip_end;
-            put_shapes(r->displacement + at, width, shapes, shape, Pu, Qu);
-            if (tractions) put_shapes(r->traction + at, width, shapes, shape, Pt, Qt);
+            const Py_ssize_t at = 2 * i * width + 2 * j * shapes;
+            Factors f;
+            if (is_arc)
+                evaluate_arc(r, &arcs[j], i, j, tractions, &f);
+            else
+                evaluate_straight(r, i, j, tractions, &f);
+            put_shapes(r->displacement + at, width, shapes, shape, NULL, f.Pu, f.Qu);
+            if (tractions)
+                put_shapes(r->traction + at, width, shapes, shape, is_arc ? arcs[j].node_weight : NULL, f.Pt, f.Qt);
         }
     }
+}
+
+/* Prepared arcs, one slot an element; NULL if there are none (*count is 0) or memory is short. */
+static Arc *prepare_arcs(const Rows *r, Py_ssize_t *count)
+{
+    *count = 0;
+    for (Py_ssize_t j = 0; j < r->elements; j++) *count += r->sweep[j] != 0;
+    Arc *arcs = *count ? malloc(r->elements * sizeof(Arc)) : NULL;
+    for (Py_ssize_t j = 0; arcs && j < r->elements; j++)
+        if (r->sweep[j] != 0)
+            prepare_arc(&arcs[j], r->start[j], r->center[j], r->sweep[j], r->order, r->tip[j], r->local);
+    return arcs;
 }
 
 static int has_length(const Py_buffer *b, Py_ssize_t bytes, const char *name)
@@ -243,49 +188,68 @@ static int has_length(const Py_buffer *b, Py_ssize_t bytes, const char *name)
 }
 
 PyDoc_STRVAR(rows_doc,
-"rows(point, normal, on, start, end, tip, shape, shape_tip_start, shape_tip_end, kappa, shear_modulus, length,\n"
-"     displacement, traction)\n\n"
+"rows(point, on, on_local, start, end, center, sweep, tip, local, shape, shape_tip_start, shape_tip_end, kappa,\n"
+"     shear_modulus, length, displacement, normal, traction)\n\n"
 "Fill displacement and traction (float64, (2 n, 2 m shapes), C order) so that the displacement at the points (normal\n"
 "is None), or the traction on the normals there, is displacement @ u + traction @ t. traction may be None.\n"
-"point, normal, start, end: complex128; on: int64; tip: int8; shape*: float64 (shapes, shapes), power by shape.\n"
+"point, normal (n), start, end, center (m): complex128; on: int64 (n); on_local: float64 (n); sweep: float64 (m), 0 for\n"
+"a straight element; tip: int8 (m); local: float64 (shapes); shape*: float64 (shapes, shapes), power by shape.\n"
 "length: unit of the logarithm of the displacement kernel.");
+
+enum { POINT, ON, ON_LOCAL, START, END, CENTER, SWEEP, TIP, LOCAL, SHAPE, SHAPE_START, SHAPE_END, OUT, NORMAL, TRACTION,
+       BUFFERS };
+
+static int check_lengths(const Py_buffer *b, Py_ssize_t n, Py_ssize_t m, Py_ssize_t shapes)
+{
+    const Py_ssize_t square = shapes * shapes * sizeof(double), full = 4 * n * m * shapes * sizeof(double);
+    return has_length(&b[ON], n * sizeof(int64_t), "on") && has_length(&b[ON_LOCAL], n * sizeof(double), "on_local") &&
+           has_length(&b[END], m * sizeof(cplx), "end") && has_length(&b[CENTER], m * sizeof(cplx), "center") &&
+           has_length(&b[SWEEP], m * sizeof(double), "sweep") && has_length(&b[TIP], m, "tip") &&
+           has_length(&b[SHAPE], square, "shape") && has_length(&b[SHAPE_START], square, "shape_tip_start") &&
+           has_length(&b[SHAPE_END], square, "shape_tip_end") && has_length(&b[OUT], full, "displacement") &&
+           (!b[NORMAL].buf || has_length(&b[NORMAL], n * sizeof(cplx), "normal")) &&
+           (!b[TRACTION].buf || has_length(&b[TRACTION], full, "traction"));
+}
 
 static PyObject *rows(PyObject *self, PyObject *args)
 {
-    PyObject *normal_object, *traction_object, *result = NULL;
-    Py_buffer b[11];
+    PyObject *normal, *traction, *result = NULL;
+    Py_buffer b[BUFFERS];
     double kappa, shear_modulus, length;
     memset(b, 0, sizeof b);
-    if (!PyArg_ParseTuple(args, "y*Oy*y*y*y*y*y*y*dddw*O", &b[0], &normal_object, &b[2], &b[3], &b[4], &b[5], &b[6],
-                          &b[7], &b[8], &kappa, &shear_modulus, &length, &b[9], &traction_object))
+    if (!PyArg_ParseTuple(args, "y*y*y*y*y*y*y*y*y*y*y*y*dddw*OO", &b[POINT], &b[ON], &b[ON_LOCAL], &b[START], &b[END],
+                          &b[CENTER], &b[SWEEP], &b[TIP], &b[LOCAL], &b[SHAPE], &b[SHAPE_START], &b[SHAPE_END], &kappa,
+                          &shear_modulus, &length, &b[OUT], &normal, &traction))
         return NULL;
-    if (normal_object != Py_None && PyObject_GetBuffer(normal_object, &b[1], PyBUF_SIMPLE) < 0) goto end;
-    if (traction_object != Py_None && PyObject_GetBuffer(traction_object, &b[10], PyBUF_WRITABLE) < 0) goto end;
-    const Py_ssize_t n = b[0].len / sizeof(cplx), m = b[3].len / sizeof(cplx);
-    const int shapes = (int)lround(sqrt((double)(b[6].len / sizeof(double))));
+    if (normal != Py_None && PyObject_GetBuffer(normal, &b[NORMAL], PyBUF_SIMPLE) < 0) goto end;
+    if (traction != Py_None && PyObject_GetBuffer(traction, &b[TRACTION], PyBUF_WRITABLE) < 0) goto end;
+    const Py_ssize_t n = b[POINT].len / sizeof(cplx), m = b[START].len / sizeof(cplx);
+    const Py_ssize_t shapes = b[LOCAL].len / sizeof(double);
     if (shapes < 1 || shapes > MAX_SHAPES) {
         PyErr_SetString(PyExc_ValueError, "an element has 1 to 4 shapes");
         goto end;
     }
-    const Py_ssize_t square = shapes * shapes * sizeof(double), full = 4 * n * m * shapes * sizeof(double);
-    if (!has_length(&b[2], n * sizeof(int64_t), "on") || !has_length(&b[4], m * sizeof(cplx), "end") ||
-        !has_length(&b[5], m, "tip") || !has_length(&b[6], square, "shape") ||
-        !has_length(&b[7], square, "shape_tip_start") || !has_length(&b[8], square, "shape_tip_end") ||
-        !has_length(&b[9], full, "displacement") || (b[1].buf && !has_length(&b[1], n * sizeof(cplx), "normal")) ||
-        (b[10].buf && !has_length(&b[10], full, "traction")))
-        goto end;
+    if (!check_lengths(b, n, m, shapes)) goto end;
     const Rows r = {
-        .points = n, .elements = m, .point = b[0].buf, .normal = b[1].buf, .on = b[2].buf, .start = b[3].buf,
-        .end = b[4].buf, .tip = b[5].buf, .shape = b[6].buf, .shape_tip_start = b[7].buf, .shape_tip_end = b[8].buf,
-        .order = shapes - 1, .kappa = kappa, .shear_modulus = shear_modulus, .log_length = log(length),
-        .displacement = b[9].buf, .traction = b[10].buf,
+        .points = n, .elements = m, .point = b[POINT].buf, .normal = b[NORMAL].buf, .start = b[START].buf,
+        .end = b[END].buf, .center = b[CENTER].buf, .sweep = b[SWEEP].buf, .on = b[ON].buf, .on_local = b[ON_LOCAL].buf,
+        .local = b[LOCAL].buf, .tip = b[TIP].buf, .shape = b[SHAPE].buf, .shape_tip_start = b[SHAPE_START].buf,
+        .shape_tip_end = b[SHAPE_END].buf, .order = (int)shapes - 1, .kappa = kappa, .shear_modulus = shear_modulus,
+        .log_length = log(length), .displacement = b[OUT].buf, .traction = b[TRACTION].buf,
     };
+    Py_ssize_t count;
+    Arc *arcs = prepare_arcs(&r, &count);
+    if (count && !arcs) {
+        PyErr_NoMemory();
+        goto end;
+    }
     Py_BEGIN_ALLOW_THREADS
-    fill_rows(&r);
+    fill_rows(&r, arcs);
     Py_END_ALLOW_THREADS
+    free(arcs);
     result = Py_NewRef(Py_None);
 end:
-    for (int i = 0; i < 11; i++)
+    for (int i = 0; i < BUFFERS; i++)
         if (b[i].obj) PyBuffer_Release(&b[i]);
     return result;
 }

@@ -20,6 +20,7 @@ class Sources:
     """The elements of one region, as the kernels see them.
 
     start, end (m,): complex, region on the left; a crack element's displacement is the jump first minus second face.
+    center, sweep (m,): centre and signed angle (radians) of an arc; 0 for a straight element.
     tip (m,) int8: 1 if the displacement has the square-root shape from the start, 2 from the end, else 0.
     local (p + 1,): node coordinates in [-1, 1]. kappa: Kolosov's constant; shear_modulus: stress.
     length: unit of the logarithm in the displacement kernel. It must be several times the size of the region:
@@ -33,6 +34,8 @@ class Sources:
     kappa: float
     shear_modulus: float
     length: float
+    center: Complex | None = None
+    sweep: Real | None = None
 
     @property
     def count(self) -> int:
@@ -40,30 +43,46 @@ class Sources:
 
 
 def evaluate_rows(
-    sources: Sources, point: Complex, on: Integer, normal: Complex | None = None, tractions: bool = True
+    sources: Sources,
+    point: Complex,
+    on: Integer,
+    normal: Complex | None = None,
+    tractions: bool = True,
+    on_local: Real | None = None,
 ) -> tuple[Real, Real | None]:
     """Matrices A, B with: value at the points = A u + B t, for nodal u, t of all elements (x, y interleaved).
 
     point (n,): complex. on (n,): index of the element on which a point lies (principal value, finite part), or -1.
     normal None: the value is the displacement, -int T u + int U t. normal (n,) complex: the value is the traction on
     that normal, -int S u + int D t. At a smooth boundary point the value is half the local one (free term).
+    on_local (n,): the points' coordinates on those elements, needed on arcs.
     Shapes (2 n, 2 m (p + 1)); B is None without `tractions`. Tip elements carry no traction density: zero columns.
-    Source: Kolosov-Muskhelishvili potentials of the single and double layer on a straight element.
+    On an arc the densities are polynomials of s with a point at apex (1 + i q s)/(1 - i q s) from the centre,
+    q = tan(sweep/4); tractions are such polynomials over 1 + q^2 s^2.
+    Source: Kolosov-Muskhelishvili potentials of the single and double layer; Cauchy integrals in closed form.
     """
     shape = interpolate_shapes(sources.local)
     tip_start, tip_end = tip_shapes(tuple(sources.local))
     size = (2 * len(point), 2 * sources.count * len(sources.local))
     displacement = np.empty(size)
     traction = np.zeros(size) if tractions else None
+    center = np.zeros(sources.count, dtype=complex) if sources.center is None else sources.center
+    sweep = np.zeros(sources.count) if sources.sweep is None else sources.sweep
+    local = np.zeros(len(point)) if on_local is None else on_local
     _kernels.rows(
         np.ascontiguousarray(point, dtype=complex),
-        None if normal is None else np.ascontiguousarray(normal, dtype=complex),
         np.ascontiguousarray(on, dtype=np.int64),
+        np.ascontiguousarray(local, dtype=float),
         np.ascontiguousarray(sources.start, dtype=complex),
         np.ascontiguousarray(sources.end, dtype=complex),
+        np.ascontiguousarray(center, dtype=complex),
+        np.ascontiguousarray(sweep, dtype=float),
         np.ascontiguousarray(sources.tip, dtype=np.int8),
+        np.ascontiguousarray(sources.local),
         shape, tip_start, tip_end,
         sources.kappa, sources.shear_modulus, sources.length,
-        displacement, traction,
+        displacement,
+        None if normal is None else np.ascontiguousarray(normal, dtype=complex),
+        traction,
     )  # fmt: skip
     return displacement, traction

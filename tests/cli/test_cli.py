@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -228,9 +229,18 @@ def test_cases_of_the_program_are_found_by_name(folder: Path, monkeypatch: pytes
 def test_only_run_needs_mpi_and_petsc(computed: Path, command: str) -> None:
     code = ("import sys; from pbem.cli import main; code = main(sys.argv[1:]); "
             "print([name for name in ('mpi4py', 'petsc4py', 'mpi4py.MPI') if name in sys.modules]); sys.exit(code)")
-    done = subprocess.run([sys.executable, "-c", code, *command.split()], capture_output=True, text=True, cwd=computed.parent)
+    arguments = [sys.executable, "-c", code, *command.split()]
+    done = subprocess.run(arguments, capture_output=True, text=True, cwd=computed.parent)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_further_ranks_leave_all_but_runs_to_the_first(folder: Path) -> None:
+    environment = os.environ | {"OMPI_COMM_WORLD_RANK": "1", "OMPI_COMM_WORLD_SIZE": "2"}
+    arguments = [sys.executable, "-m", "pbem", "check", "blocks.toml", "--plot", "model.png"]
+    done = subprocess.run(arguments, capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert not (folder / "model.png").exists()
 
 
 def test_the_package_can_be_run_as_a_module(folder: Path) -> None:

@@ -91,7 +91,9 @@ def _check_shape(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     if isinstance(elements, int) and isinstance(points, list) and 0 < elements < len(points) - 1:
         found = f"{elements} elements for {len(points) - 1} legs"
         findings.append(Finding((*loc, "elements"), found, "at least one element for each leg"))
-    if isinstance(angles, list) and len(angles) == 2 and all(type(angle) in (int, float) for angle in angles):
+    if isinstance(angles, list) and len(angles) == 2 and all(
+        type(angle) in (int, float) and abs(angle) <= 3600 for angle in angles
+    ):
         sweep = abs(angles[1] - angles[0])
         if sweep == 0 or sweep > 360:
             found = f"an arc of {sweep:g} degrees"

@@ -41,7 +41,7 @@ def _check_elements(value: object) -> object:
 def _check_gap(value: object) -> object:
     if isinstance(value, dict):
         return value
-    if not _is_number(value) or not 0 <= value < float("inf"):  # type: ignore[operator]
+    if not _is_number(value) or not 0 <= value <= LARGEST:  # type: ignore[operator]
         expected = "a finite number >= 0, or { expression = \"...\" }"
         raise PydanticCustomError("expected", "{expected}", {"expected": expected})
     return value
@@ -60,10 +60,13 @@ def _check_option(value: object) -> object:
     raise PydanticCustomError("expected", "{expected}", {"expected": "a text, a finite number, true or false"})
 
 
+# Numbers beyond this are slips of the pen, and their squares would overflow.
+LARGEST = 1e100
 _SHORT = BeforeValidator(_check_number)
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False), _SHORT]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), _SHORT]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), _SHORT]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST), _SHORT]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST), _SHORT]
+NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST), _SHORT]
+Angle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-3600, le=3600), _SHORT]
 Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1, lt=0.5), _SHORT]
 FrictionAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=90), _SHORT]
 Power = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=10), _SHORT]
@@ -104,7 +107,7 @@ class CurveTable(Table):
     points: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(None, description="vertices of a polyline")
     center: Point | None = Field(None, description="center of a circle or arc")
     radius: Positive | None = Field(None, description="radius of a circle or arc, length")
-    angles: tuple[Number, Number] | None = Field(
+    angles: tuple[Angle, Angle] | None = Field(
         None, description="degrees at which an arc starts and ends; counter-clockwise if the second is larger"
     )
     expression: tuple[Text, Text] | None = Field(None, description="x and y as functions of t from 0 to 1")

@@ -18,6 +18,8 @@ from pbem.model.intersection import extremes
 
 # Points nearer to each other than this part of the model's size are the same point.
 SAME_POINT = 1e-9
+# Squares of lengths must not underflow.
+SMALLEST = 1e-100
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,15 @@ def shape_curves(case: Case) -> Shapes:
     curves: dict[str, Curve] = {}
     for name, table in case.curves.items():
         legs = _circular_legs(table) if table.center is not None else _straight_legs(table)
-        if isinstance(legs, str):
-            faults.append(case.fault(("curves", name), legs, "at least 4 elements around a circle"))
+        if isinstance(legs, Fault):
+            faults.append(case.fault(("curves", name), legs.found, legs.expected))
             continue
         curves[name] = Curve(name, legs)
     size, tolerance = measure(curves)
+    if curves and not size > SMALLEST:
+        found = f"curves with an extent of {size:g}"
+        faults.append(case.fault(("curves",), found, f"a model larger than {SMALLEST:g}"))
+        return Shapes({}, size, tolerance, tuple(faults))
     curves, short = _join(curves, tolerance)
     for name, number in short:
         loc = ("curves", name, "points", number) if case.curves[name].points else ("curves", name)
@@ -104,20 +110,23 @@ def _straight_legs(table: CurveTable) -> tuple[Leg, ...]:
     )
 
 
-def _circular_legs(table: CurveTable) -> tuple[Leg, ...] | str:
+def _circular_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
     """An arc is one leg; a full circle four, cut between elements so that these are all equal."""
     assert table.center is not None and table.radius is not None
     angles = table.angles or (0.0, 360.0)
     center, begin, sweep = complex(*table.center), math.radians(angles[0]), math.radians(angles[1] - angles[0])
     count = _count_elements(table, [table.radius * abs(sweep)])[0]
     start = _point_on_circle(center, table.radius, angles[0])
+    if abs(abs(start - center) - table.radius) > 1e-3 * table.radius:
+        found = f"radius = {table.radius:g}, lost in the rounding of the center"
+        return Fault("", found, "a circle that is not so small against its distance from the origin")
     if abs(angles[1] - angles[0]) < 360:
         end = _point_on_circle(center, table.radius, angles[1])
         return (Leg(start, end, count, power=table.power, center=center, sweep=sweep),)
     if table.size is not None:
         count = max(4, count)
     if count < 4:
-        return f"{count} elements around a circle"
+        return Fault("", f"{count} elements around a circle", "at least 4")
     legs, done, here = [], 0, start
     for number in share(count, [1.0] * 4):
         done += number

@@ -430,6 +430,24 @@ def test_circle_with_a_list_of_elements() -> None:
     assert "a circle or an arc is one leg" in find_only_fault(text)
 
 
+def test_circle_lost_in_rounding() -> None:
+    text = add_curves(SQUARE, "hole = { center = [1, 1], radius = 1e-18, elements = 8 }")
+    text = change(text, ('"left"]', '"left", "hole"]'))
+    assert "lost in the rounding of the center" in find_only_fault(text)
+
+
+def test_model_without_extent() -> None:
+    text = change(SQUARE, ("[0, 0], [2, 0]", "[0, 0], [2e-200, 0]"), ("[2, 0], [2, 2]", "[2e-200, 0], [0, 2e-200]"))
+    text = change(text, ("[2, 2], [0, 2]", "[0, 2e-200], [0, 1e-200]"), ("[0, 2], [0, 0]", "[0, 1e-200], [0, 0]"))
+    assert "curves (line 6): found curves with an extent of 2e-200" in "\n".join(map(str, find_faults(text)))
+
+
+def test_numbers_that_would_overflow() -> None:
+    assert "found 1e+300; expected a number <= 1e+100" in find_only_fault(
+        change(SQUARE, ("[2, 0], [2, 2]", "[2, 0], [1e300, 2]"))
+    )
+
+
 def test_circle_with_three_elements() -> None:
     text = add_curves(SQUARE, "hole = { center = [1, 1], radius = 0.5, elements = 3 }")
     text = change(text, ('"left"]', '"left", "hole"]'))

@@ -78,7 +78,10 @@ def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
         points = np.concatenate([start, end])
         extent = max(np.ptp(points.real), np.ptp(points.imag))
         sources.append(
-            Sources(start, end, mesh.tip[own], mesh.local, material.kappa, material.shear_modulus, 8 * extent)
+            Sources(
+                start, end, mesh.tip[own], mesh.local, material.kappa, material.shear_modulus, 8 * extent,
+                mesh.center[own], mesh.sweep[own],
+            )  # fmt: skip
         )
     return sources
 
@@ -196,8 +199,9 @@ def _evaluate_columns(
     of_displacement = columns < 2 * mesh.nodes
     with_tractions = bool((~of_displacement).any())
     displacement, tractions = evaluate_rows(
-        sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions
-    )
+        sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions,
+        mesh.local[nodes % len(mesh.local)],
+    )  # fmt: skip
     parts = [displacement[:, columns[of_displacement] - 2 * first]]
     if tractions is not None:
         parts.append(tractions[:, columns[~of_displacement] - 2 * (mesh.nodes + first)])

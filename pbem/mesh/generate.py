@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.mesh.shapes import integrate_shapes, place_nodes
+from pbem.mesh.elements import Elements, divide_curve
 from pbem.mesh.equations import explain_exceptions, uses_traction_equation
-from pbem.mesh.mesh import Complex, Integer, Mesh, Pairs, Real
+from pbem.mesh.mesh import Integer, Mesh, Pairs, Real
+from pbem.mesh.shapes import place_nodes
 from pbem.model.model import Interface, Model, Region
 
 
@@ -16,8 +18,8 @@ from pbem.model.model import Interface, Model, Region
 class Chain:
     """The elements of one curve as one region sees it, in the order of travel (region on the left).
 
-    ends (elements + 1,): complex. forward: travelled in the curve's own direction. traction: the traction equation is
-    collocated on its nodes. first_node: number of its first node in the mesh.
+    forward: travelled in the curve's own direction. traction: the traction equation is collocated on its nodes.
+    first_node: number of its first node in the mesh.
     """
 
     region: int
@@ -25,57 +27,37 @@ class Chain:
     forward: bool
     crack: bool
     traction: bool
-    ends: Complex
+    elements: Elements
     first_node: int
-
-    @property
-    def elements(self) -> int:
-        return len(self.ends) - 1
-
-    def place(self, local: Real) -> Complex:
-        return self._spread(local, 0.5 * (self.ends[1:] + self.ends[:-1]), self._half())
-
-    def normals(self, local: Real) -> Complex:
-        half = self._half()
-        return np.repeat(-1j * half / np.abs(half), len(local))
-
-    def weights(self, local: Real) -> Real:
-        return np.outer(np.abs(self._half()), integrate_shapes(local)).ravel()
-
-    def arc_lengths(self, local: Real) -> Real:
-        half = np.abs(self._half())
-        return self._spread(local, 2 * np.cumsum(half) - half, half)
-
-    def _half(self) -> Complex:
-        return 0.5 * (self.ends[1:] - self.ends[:-1])
-
-    @staticmethod
-    def _spread(local: Real, middle: np.ndarray, half: np.ndarray) -> np.ndarray:
-        return (middle[:, None] + half[:, None] * local).ravel()
 
 
 def generate_mesh(model: Model) -> Mesh:
     """Divide every curve as its legs say, once for each region that it bounds, and pair the nodes of interfaces."""
     local = place_nodes(model.analysis.order)
     chains = _list_chains(model, len(local))
-    counts = [chain.elements for chain in chains]
+    counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
 
     def repeat(values: list, dtype: type) -> np.ndarray:
         return np.repeat(np.array(values, dtype=dtype), counts)
 
+    def join(take: Callable[[Elements], np.ndarray]) -> np.ndarray:
+        return np.concatenate([take(chain.elements) for chain in chains], axis=None)
+
     return Mesh(
         order=model.analysis.order,
         local=local,
-        start=np.concatenate([chain.ends[:-1] for chain in chains]),
-        end=np.concatenate([chain.ends[1:] for chain in chains]),
+        start=join(lambda elements: elements.start),
+        end=join(lambda elements: elements.end),
+        center=join(lambda elements: elements.center),
+        sweep=join(lambda elements: elements.sweep),
         region=repeat([chain.region for chain in chains], np.int64),
         curve=repeat([curve_names.index(chain.curve) for chain in chains], np.int64),
         crack=repeat([chain.crack for chain in chains], np.bool_),
         tip=np.concatenate([_mark_tips(model, chain) for chain in chains]),
-        position=np.concatenate([chain.place(local) for chain in chains]),
-        normal=np.concatenate([chain.normals(local) for chain in chains]),
-        weight=np.concatenate([chain.weights(local) for chain in chains]),
+        position=join(lambda elements: elements.place(local)),
+        normal=join(lambda elements: np.broadcast_to(elements.normals(local), (elements.count, len(local)))),
+        weight=join(lambda elements: elements.weights(local)),
         traction_equation=np.repeat(repeat([chain.traction for chain in chains], np.bool_), len(local)),
         pairs=_pair_nodes(model, chains, local),
         region_names=tuple(region.name for region in model.regions),
@@ -90,9 +72,10 @@ def _list_chains(model: Model, nodes_per_element: int) -> list[Chain]:
     first_node = 0
     for number, region in enumerate(model.regions):
         for curve, forward, crack, traction in _list_sides(model, region):
-            ends = _divide_curve(model, curve)
-            chains.append(Chain(number, curve, forward, crack, traction, ends if forward else ends[::-1], first_node))
-            first_node += chains[-1].elements * nodes_per_element
+            elements = divide_curve(model.curves[curve])
+            elements = elements if forward else elements.reverse()
+            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node))
+            first_node += elements.count * nodes_per_element
     return chains
 
 
@@ -106,14 +89,8 @@ def _list_sides(model: Model, region: Region) -> list[tuple[str, bool, bool, boo
     return sides + [(crack, True, True, True) for crack in region.cracks]
 
 
-def _divide_curve(model: Model, name: str) -> Complex:
-    """Ends of all elements along a curve; both of its sides get exactly the same points."""
-    ends = [leg.element_ends() for leg in model.curves[name].legs]
-    return np.concatenate([ends[0], *(more[1:] for more in ends[1:])])
-
-
 def _mark_tips(model: Model, chain: Chain) -> np.ndarray:
-    tips = np.zeros(chain.elements, dtype=np.int8)
+    tips = np.zeros(chain.elements.count, dtype=np.int8)
     if chain.crack and model.analysis.tips:
         at_start, at_end = model.crack_tips[chain.curve]
         if at_start:
@@ -133,19 +110,20 @@ def _pair_nodes(model: Model, chains: list[Chain], local: Real) -> Pairs:
     for number, interface in enumerate(model.interfaces.values()):
         chain = sides[interface.name, interface.first]
         first = _number_nodes(chain, local)
-        along = chain.arc_lengths(local)
+        elements = chain.elements if chain.forward else chain.elements.reverse()
+        outward = elements.normals(local) if chain.forward else -elements.normals(local)
         entry = {
             "interface": np.full(len(first), number),
             "first": first,
             "second": first if interface.second is None else _number_opposite(sides, interface, local),
             "crack": np.full(len(first), interface.second is None),
-            "position": _follow_curve(chain, chain.place(local)),
-            "normal": _follow_curve(chain, chain.normals(local)),
-            "arc_length": along if chain.forward else (np.abs(np.diff(chain.ends)).sum() - along)[::-1],
-            "weight": _follow_curve(chain, chain.weights(local)),
+            "position": elements.place(local),
+            "normal": np.broadcast_to(outward, (elements.count, len(local))),
+            "arc_length": elements.arc_lengths(local),
+            "weight": elements.weights(local),
         }
         for key, values in entry.items():
-            columns[key].append(values)
+            columns[key].append(values.ravel())
     types = {"position": np.complex128, "normal": np.complex128, "arc_length": np.float64, "weight": np.float64}
     return Pairs(
         **{
@@ -161,7 +139,7 @@ def _number_opposite(sides: dict[tuple[str, str], Chain], interface: Interface, 
 
 
 def _number_nodes(chain: Chain, local: Real) -> Integer:
-    return _follow_curve(chain, chain.first_node + np.arange(chain.elements * len(local)))
+    return _follow_curve(chain, chain.first_node + np.arange(chain.elements.count * len(local)))
 
 
 def _follow_curve(chain: Chain, values: np.ndarray) -> np.ndarray:

@@ -45,7 +45,8 @@ class Mesh:
     its direction. A crack's element stands for both faces: it runs in the curve's direction, is the first face, and
     its displacement is the jump u_r - u_l of the first face against the second.
 
-    start, end, region, curve, crack, tip: per element (e,); tip is 1 or 2 where the jump has the square-root shape of
+    start, end, center, sweep, region, curve, crack, tip: per element (e,). An arc has its centre and the signed angle
+    `sweep` that it turns through (radians); a straight element has zeros. tip is 1 or 2 where the jump has the square-root shape of
     a crack tip at the element's start or end, else 0. position, normal, weight, traction_equation: per node (n,).
     local: nodes' coordinates on the element [-1, 1] (order + 1,).
     """
@@ -54,6 +55,8 @@ class Mesh:
     local: Real
     start: Complex
     end: Complex
+    center: Complex
+    sweep: Real
     region: Integer
     curve: Integer
     crack: Bool

@@ -61,8 +61,8 @@ class Leg:
         second = replace(self, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False)
         return first, second
 
-    def element_ends(self) -> NDArray[np.complex128]:
-        """The elements + 1 ends of the elements along the leg."""
+    def element_fractions(self) -> NDArray[np.float64]:
+        """The elements + 1 ends of the elements as fractions of the leg's length."""
         t = np.linspace(0.0, 1.0, self.elements + 1)
         if self.refine_start and self.refine_end:
             t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)
@@ -70,7 +70,11 @@ class Leg:
             t = t**self.power
         elif self.refine_end:
             t = 1 - (1 - t) ** self.power
-        return self.point(t)
+        return t
+
+    def element_ends(self) -> NDArray[np.complex128]:
+        """The elements + 1 ends of the elements along the leg."""
+        return self.point(self.element_fractions())
 
 
 @dataclass(frozen=True)

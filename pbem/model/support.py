@@ -96,6 +96,8 @@ def _sides(loops: tuple[Loop, ...]) -> list[Side]:
 def _boundary_rows(model: Model, names: list[str], center: complex, scale: float) -> list[NDArray[np.float64]]:
     rows = []
     for number, region in enumerate(model.regions):
+        if region.infinite:  # held by what is far away
+            rows.append(np.eye(3, 3 * len(names), 3 * number))
         for side in _sides(region.loops):
             condition = model.conditions.get(side.curve)
             if condition is None:

@@ -1,0 +1,86 @@
+"""Points, normals and lengths on straight and circular elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.shapes import integrate_shapes
+from pbem.model.curve import Curve
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Elements (m,) in the order of travel: ends (complex), and of arcs the centre and the signed angle (else 0).
+
+    A point of an arc is at apex (1 + i q s)/(1 - i q s) from the centre, s in [-1, 1], q = tan(sweep/4), the apex being
+    the middle of the arc: a map under which the kernels' integrals are closed.
+    """
+
+    start: Complex
+    end: Complex
+    center: Complex
+    sweep: Real
+
+    @property
+    def count(self) -> int:
+        return len(self.start)
+
+    def reverse(self) -> Elements:
+        return Elements(self.end[::-1], self.start[::-1], self.center[::-1], -self.sweep[::-1])
+
+    @property
+    def lengths(self) -> Real:
+        radius = np.abs(self.start - self.center)
+        return np.where(self.sweep == 0, np.abs(self.end - self.start), radius * np.abs(self.sweep))
+
+    def place(self, local: Real) -> Complex:
+        """Points (m, p) at the coordinates s (p,)."""
+        straight = 0.5 * (self.end + self.start)[:, None] + 0.5 * (self.end - self.start)[:, None] * local
+        return np.where(self.sweep[:, None] == 0, straight, self.center[:, None] + self._radii(local))
+
+    def normals(self, local: Real) -> Complex:
+        """Unit outward normals (m, p): to the right of travel."""
+        direction = (self.end - self.start) / np.abs(self.end - self.start)
+        radii = self._radii(local)
+        outward = np.sign(self.sweep)[:, None] * radii / np.where(radii == 0, 1, np.abs(radii))
+        return np.where(self.sweep[:, None] == 0, -1j * direction[:, None], outward)
+
+    def weights(self, local: Real) -> Real:
+        """Weights (m, p) that integrate a traction along the element's length from its values at the nodes."""
+        straight = 0.5 * np.abs(self.end - self.start)[:, None]
+        tangent = self._quarter_tangents()[:, None]
+        jacobian = 2 * np.abs(self.start - self.center)[:, None] * np.abs(tangent) / (1 + (tangent * local) ** 2)
+        return np.where(self.sweep[:, None] == 0, straight, jacobian) * integrate_shapes(local)
+
+    def arc_lengths(self, local: Real) -> Real:
+        """Length (m, p) from the first element's start to the points at s."""
+        angle = np.where(self.sweep == 0, 1.0, self.sweep)[:, None]
+        share = 0.5 + 2 * np.arctan(self._quarter_tangents()[:, None] * local) / angle
+        share = np.where(self.sweep[:, None] == 0, 0.5 * (1 + local), share)
+        lengths = self.lengths
+        return (np.cumsum(lengths) - lengths)[:, None] + lengths[:, None] * share
+
+    def _quarter_tangents(self) -> Real:
+        return np.tan(0.25 * self.sweep)
+
+    def _radii(self, local: Real) -> Complex:
+        apex = (self.start - self.center) * np.exp(0.5j * self.sweep)
+        turn = 1j * self._quarter_tangents()[:, None] * local
+        return np.where(self.sweep == 0, 0, apex)[:, None] * (1 + turn) / (1 - turn)
+
+
+def divide_curve(curve: Curve) -> Elements:
+    """The elements of a curve in its own direction; neighbours share exactly the same point."""
+    ends = [leg.element_ends() for leg in curve.legs]
+    return Elements(
+        start=np.concatenate([points[:-1] for points in ends]),
+        end=np.concatenate([points[1:] for points in ends]),
+        center=np.concatenate([np.full(leg.elements, leg.center or 0j) for leg in curve.legs]),
+        sweep=np.concatenate([leg.sweep * np.diff(leg.element_fractions()) for leg in curve.legs]),
+    )

@@ -78,6 +78,14 @@ def test_crack_tips_and_mouths_are_refined() -> None:
     assert refined(model, "bottom") == [BOTH, BOTH]
 
 
+def test_tips_with_elements_of_their_own_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pbem.model.build.TIPS_BY_DEFAULT", True)
+    curves = "crack = { points = [[0.5, 0], [0.5, 1]], elements = 8 }"
+    model = build(add_curves(SQUARE, curves, 'cracks = ["crack"]'))
+    assert model.analysis.tips
+    assert refined(model, "crack") == [START]
+
+
 def test_straight_continuation_of_a_crack_is_smooth_under_one_law() -> None:
     curves = "a = { points = [[0.5, 1], [1, 1]], elements = 8 }\nb = { points = [[1, 1], [1.5, 1]], elements = 8 }"
     text = add_curves(SQUARE, curves, 'cracks = ["a", "b"]')

@@ -54,6 +54,14 @@ def test_balanced_body_is_refused_as_not_yet_supported() -> None:
     assert not any("drive it" in fault.found for fault in faults)
 
 
+def test_balanced_body_is_accepted_where_the_solver_can_hold_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pbem.model.build.FREE_BODIES", True)
+    model = build(change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.0")))
+    assert sum("the loads balance" in note for note in model.notes) == 3
+    unbalanced = find_faults(change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.5")))
+    assert all("drive it" in fault.found for fault in unbalanced)
+
+
 def test_fluid_that_lifts_a_block_is_a_load() -> None:
     text = change(BLOCKS, (LOADED, "[boundary.left_upper]\nux = 0.0"), (FRICTION, 'law = "open"\npressure = 3.0'))
     faults = "\n".join(map(str, find_faults(text)))

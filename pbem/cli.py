@@ -174,6 +174,7 @@ def _names_a_case(argument: str) -> bool:
 
 
 def make_parser() -> argparse.ArgumentParser:
+    """The parser of the command line, without the options of PETSc."""
     parser = argparse.ArgumentParser(
         prog="pbem", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
     )

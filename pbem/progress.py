@@ -120,10 +120,12 @@ def make_reporter(stages: tuple[Stage, ...], quiet: bool = False, stream: TextIO
 
 
 def describe_iteration(iteration: Iteration) -> str:
+    """Residual, changes and counts of modes of one Newton iteration."""
     return (f"residual {iteration.residual:.1e}, {iteration.changed} changed, "
             f"stick/slip/open {iteration.stick}/{iteration.slip}/{iteration.open}")
 
 
 def describe_modes(step: Step) -> str:
+    """How many pairs are in each mode after a step."""
     counts = [int((step.contact.mode == mode).sum()) for mode in (STICK, SLIP, OPEN)]
     return "stick/slip/open {}/{}/{}".format(*counts)

@@ -40,6 +40,7 @@ def to_columns(points: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def open_file(path: Path, mode: str) -> h5py.File:
+    """Open a result file for writing ("w") or for going on ("r+")."""
     # Without locks, so that the file may be read while it is written; the 1.8 format stores long lists of names.
     return h5py.File(path, mode, libver=("v108", "v108"), locking=False)
 
@@ -47,6 +48,7 @@ def open_file(path: Path, mode: str) -> h5py.File:
 def write_attributes(
     file: h5py.File, model: Model, ranks: int, petsc_version: str, petsc_options: Sequence[str]
 ) -> None:
+    """Write what the whole file is about; the status becomes "running", and an earlier failure is forgotten."""
     attributes: dict[str, Any] = {
         "title": model.title, "pbem_version": __version__, "petsc_version": petsc_version, "case": model.source,
         "units_length": model.units_length, "units_stress": model.units_stress, "status": "running",
@@ -61,6 +63,7 @@ def write_attributes(
 
 
 def write_header(file: h5py.File, model: Model, mesh: Mesh) -> None:
+    """Write all that does not change with the steps, and create the datasets that grow, without entries."""
     faces = list_faces(mesh)
     _write_nodes(file, mesh, faces)
     steps = file.create_group("steps")
@@ -133,10 +136,12 @@ def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: 
 
 
 def append_row(dataset: h5py.Dataset, row: NDArray[Any]) -> None:
+    """Add one entry along the first axis."""
     extend(dataset, row[None, ...])
 
 
 def extend(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
+    """Add entries along the first axis."""
     count = dataset.shape[0]
     dataset.resize(count + len(rows), axis=0)
     dataset[count:] = rows

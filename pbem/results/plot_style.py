@@ -66,4 +66,5 @@ def label(quantity: str, unit: str) -> str:
 
 
 def scale_axis(axes: Axes) -> None:
+    """Write small and large numbers of the vertical axis with a common power of ten."""
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))

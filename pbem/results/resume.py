@@ -15,6 +15,7 @@ from pbem.solve.step import ContactState, Step
 
 
 def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> None:
+    """Raise ResultFileError unless the file holds this case on this mesh."""
     if "case" not in file.attrs:
         raise ResultFileError(path, "is not a result file of pbem")
     if file.attrs["case"] != model.source:
@@ -28,6 +29,7 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
 
 
 def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
+    """The last step that was stored completely, without its iterations; None if there is none."""
     steps = file["steps"]
     k = min(len(steps[name]) for name in STEP_DATASETS)
     if k == 0:

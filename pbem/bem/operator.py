@@ -33,7 +33,7 @@ CHUNK_BYTES = 32_000_000
 
 @dataclass(frozen=True)
 class Block:
-    """Dense rows of one region: rows (2 k,) count from this rank's first row; columns index v; matrix (2 k, columns)."""
+    """Dense rows of one region: rows (2 k,) from this rank's first row on; columns index v; matrix (2 k, columns)."""
 
     region: int
     rows: Integer
@@ -43,7 +43,7 @@ class Block:
 
 @dataclass(frozen=True)
 class RowOperator:
-    """The rows of B of the nodes first_node .. last_node - 1: dense blocks, one per region, and the sparse free terms."""
+    """The rows of B of the nodes first_node .. last_node - 1: a dense block per region, and the sparse free terms."""
 
     first_node: int
     last_node: int
@@ -79,9 +79,9 @@ def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
         extent = max(np.ptp(points.real), np.ptp(points.imag))
         sources.append(
             Sources(
-                start, end, mesh.tip[own], mesh.local, material.kappa, material.shear_modulus, 8 * extent,
-                mesh.center[own], mesh.sweep[own],
-            )  # fmt: skip
+                start=start, end=end, center=mesh.center[own], sweep=mesh.sweep[own], tip=mesh.tip[own],
+                local=mesh.local, kappa=material.kappa, shear_modulus=material.shear_modulus, length=8 * extent,
+            )
         )
     return sources
 
@@ -104,7 +104,8 @@ def assemble_rows(
         columns = _needed_columns(mesh, int(region), needed)
         matrix = np.empty((2 * len(own), len(columns)))
         for part, where in _list_chunks(own, mesh.traction_equation, sources[region]):
-            values = _evaluate_columns(mesh, sources[region], int(region), part, columns, mesh.traction_equation[part[0]])
+            traction = bool(mesh.traction_equation[part[0]])
+            values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction)
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
         rows = (2 * (own - first_node)[:, None] + np.arange(2)).ravel()
         blocks.append(Block(int(region), rows, columns, matrix))
@@ -201,7 +202,7 @@ def _evaluate_columns(
     displacement, tractions = evaluate_rows(
         sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions,
         mesh.local[nodes % len(mesh.local)],
-    )  # fmt: skip
+    )
     parts = [displacement[:, columns[of_displacement] - 2 * first]]
     if tractions is not None:
         parts.append(tractions[:, columns[~of_displacement] - 2 * (mesh.nodes + first)])

@@ -1,4 +1,4 @@
-"""Rows of the boundary integral equations: values at points as linear functions of nodal displacements and tractions."""
+"""Rows of the integral equations: values at points as linear functions of nodal displacements and tractions."""
 
 from __future__ import annotations
 

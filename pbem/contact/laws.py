@@ -150,7 +150,7 @@ def linearise(
 
 
 def measure_law_error(laws: PairLaws, modes: ModeState, state: PairState, pressure: Real) -> float:
-    """Largest distance of a slipping pair's p_s from the friction bound at its p_n, relative to the largest traction."""
+    """Largest distance of a slipping pair's p_s from the bound at its p_n, relative to the largest traction."""
     slip = modes.mode == SLIP
     bound, _ = friction_bound(laws, np.minimum(state.p_n, laws.tensile_strength - pressure), pressure)
     error = np.abs(state.p_s - modes.sign * bound)[slip]

@@ -11,7 +11,7 @@ from pbem.model.support import Tie, find_free_motions
 
 
 def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie]:
-    """What every interface of two regions holds in the present modes: sticking pairs both jumps, slipping ones the opening."""
+    """What every interface of two regions holds: sticking pairs both components of the jump, slipping ones one."""
     ties: dict[str, Tie] = {}
     for number, name in enumerate(mesh.interface_names):
         if model.interfaces[name].second is None:

@@ -23,7 +23,7 @@ def explain_exceptions(model: Model) -> tuple[str, ...]:
             if kept and not loop.outer:
                 notes.append(
                     f"region {region.name} keeps the displacement equation on its inner loop {', '.join(kept)}: "
-                    f"{model.analysis.scheme} has a traction equation there, which cannot see a rigid motion of the loop"
+                    f"{model.analysis.scheme} has a traction equation there, which does not see its rigid motion"
                 )
     return tuple(notes)
 

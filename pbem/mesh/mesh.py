@@ -46,7 +46,8 @@ class Mesh:
     its displacement is the jump u_r - u_l of the first face against the second.
 
     start, end, center, sweep, region, curve, crack, tip: per element (e,). An arc has its centre and the signed angle
-    `sweep` that it turns through (radians); a straight element has zeros. tip is 1 or 2 where the jump has the square-root shape of
+    `sweep` that it turns through (radians); a straight element has zeros. tip is 1 or 2 where the jump has the
+    square-root shape of
     a crack tip at the element's start or end, else 0. position, normal, weight, traction_equation: per node (n,).
     local: nodes' coordinates on the element [-1, 1] (order + 1,).
     """

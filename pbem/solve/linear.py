@@ -1,4 +1,4 @@
-"""Linear solvers for the tangent operator: dense LU by LAPACK or ScaLAPACK, sparse block LU by MUMPS, or GMRES on these."""
+"""Linear solvers for the tangent operator: dense LU by LAPACK or ScaLAPACK, sparse LU by MUMPS, GMRES on these."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Newton's method for one load step: modes from trial values, the tangent operator of these modes, until none changes."""
+"""Newton's method for one load step: modes from trial values and their tangent operator, until no mode changes."""
 
 from __future__ import annotations
 
@@ -135,7 +135,8 @@ def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:
     ties = find_ties(problem.model, problem.mesh, modes)
     free = problem.free_motions(tuple(ties.items()))
     if free:
-        raise ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; hold it by a condition")
+        detail = f"nothing in the present contact prevents a {free}; hold it by a condition"
+        raise ConvergenceError("free motion", detail)
 
 
 def _record(number: int, residual: float, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:

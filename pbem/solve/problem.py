@@ -72,7 +72,7 @@ class Problem:
 
     @cached_property
     def free_motions(self) -> Callable[[tuple[tuple[str, Tie], ...]], str | None]:
-        """What can move freely for given ties of the interfaces (name and tie); remembered, as modes rarely change it."""
+        """What moves freely for given ties of the interfaces (name and tie); remembered, as modes rarely change it."""
         return lru_cache(lambda ties: describe_free_motions(self.model, dict(ties), len(self.anchors)))
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
@@ -80,7 +80,7 @@ class Problem:
         return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale)
 
     def apply(self, v: Real, load: Load) -> Real:
-        """This rank's rows of the integral equations' left-hand side less the part that comes from far away, lengths."""
+        """This rank's rows of the integral equations, less the part that comes from far away; lengths."""
         first, last = self.operator.first_node, self.operator.last_node
         own = slice(first, last)
         far = np.where(self.mesh.traction_equation[own], load.far[1, own], load.far[0, own]) * self.equation_scale[own]

@@ -175,15 +175,17 @@ def propose_modes(
 ) -> Proposal:
     """Choose modes from trial values (semi-smooth Newton); a mode is kept while rounding could decide.
 
-    Open if p_n + pressure + r g_n exceeds the tensile strength, else slip if |p_s + r (g_s - slip before)| exceeds the
-    friction bound, with the sign of that trial, else stick. softening multiplies r.
+    Open if p_n + pressure exceeds the tensile strength, or if r g_n > 0 in a pair that is open already; else slip if
+    |p_s + r (g_s - slip before)| exceeds the friction bound, with the sign of that trial; else stick. softening
+    multiplies r.
     """
     stiffness = softening * laws.stiffness
     normal = state.p_n + stiffness * np.where(modes.mode == OPEN, state.g_n, 0.0)
     tangential = state.p_s + stiffness * np.where(modes.mode == STICK, 0.0, state.g_s - slip_before)
     scale = max((np.abs(a).max(initial=0.0) for a in (state.p_n, state.p_s, normal, tangential)), default=0.0)
     margin = 1e-10 * scale
-    parting = normal + pressure - laws.tensile_strength
+    # The strength is that of faces in touch: a pair that is open comes back only when its faces meet again.
+    parting = normal + pressure - np.where(modes.mode == OPEN, 0.0, laws.tensile_strength)
     # A pair without strength parts where its trial traction is positive; within the margin it stays as it is.
     opens = np.where(modes.mode == OPEN, parting > -margin, parting > margin)
     bound, _ = friction_bound(laws, np.minimum(normal, laws.tensile_strength - pressure), pressure)

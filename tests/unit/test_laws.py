@@ -1,0 +1,285 @@
+"""Contact laws: what a mode prescribes, its tangent, and which mode the trial values ask for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.contact.laws import (
+    G_N,
+    G_S,
+    OPEN,
+    P_N,
+    P_S,
+    SLIP,
+    STICK,
+    ModeState,
+    PairLaws,
+    PairState,
+    Proposal,
+    friction_bound,
+    limit_changes,
+    linearise,
+    measure_law_error,
+    propose_modes,
+    start_modes,
+)
+
+Real = NDArray[np.float64]
+
+FRICTION, COHESION, STIFFNESS = 0.5, 0.4, 10.0
+
+
+def make_laws(count: int = 1, **values: object) -> PairLaws:
+    """Laws of equal pairs: friction without cohesion or strength, unless told otherwise."""
+    defaults: dict[str, object] = {
+        "friction": FRICTION, "cohesion": 0.0, "tensile_strength": 0.0, "gap": 0.0, "bonded": False, "parted": False,
+        "fluid_inside": False, "stiffness": STIFFNESS,
+    }  # fmt: skip
+    return PairLaws(**{name: np.full(count, value) for name, value in (defaults | values).items()})
+
+
+def make_modes(mode: int, sign: float = 1.0, count: int = 1) -> ModeState:
+    return ModeState(np.full(count, mode, dtype=np.int8), np.full(count, sign))
+
+
+def make_state(p_n: float, p_s: float = 0.0, g_n: float = 0.0, g_s: float = 0.0) -> PairState:
+    return PairState(*(np.array([value]) for value in (p_n, p_s, g_n, g_s)))
+
+
+def choose(
+    laws: PairLaws, mode: int, state: PairState, slip_before: float = 0.0, pressure: float = 0.0, sign: float = 1.0
+) -> tuple[int, float, bool]:
+    """Mode, sign and whether it changed, for one pair."""
+    proposal = propose_modes(laws, make_modes(mode, sign), state, np.array([slip_before]), np.array([pressure]))
+    return int(proposal.modes.mode[0]), float(proposal.modes.sign[0]), bool(proposal.changed[0])
+
+
+# --- What a mode prescribes -------------------------------------------------------------------------------------------
+
+
+def linearise_one(laws: PairLaws, modes: ModeState, p_n: float, slip: float = 0.0, pressure: float = 0.0) -> PairState:
+    """The state that the law gives for the unknowns (x_n, x_s) = (0.3, -0.2), with a traction scale of 2."""
+    count = len(modes.mode)
+    law = linearise(laws, modes, np.full(count, p_n), np.full(count, slip), np.full(count, pressure), 2.0)
+    return law.evaluate(np.tile([0.3, -0.2], (count, 1)))
+
+
+def test_a_sticking_pair_keeps_its_slip_and_leaves_both_tractions_free() -> None:
+    state = linearise_one(make_laws(), make_modes(STICK), p_n=-1.0, slip=0.07)
+    assert (state.p_n, state.p_s, state.g_n, state.g_s) == (0.6, -0.4, 0.0, 0.07)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_slipping_pair_leaves_normal_traction_and_slip_free(sign: float) -> None:
+    laws = make_laws(cohesion=COHESION)
+    state = linearise_one(laws, make_modes(SLIP, sign), p_n=-1.0, slip=0.07)
+    assert (state.p_n, state.g_n, state.g_s) == (0.6, 0.0, -0.2)
+    assert state.p_s == pytest.approx(sign * (COHESION - FRICTION * 0.6))
+
+
+def test_an_open_pair_carries_the_pressure_and_leaves_both_jumps_free() -> None:
+    state = linearise_one(make_laws(), make_modes(OPEN), p_n=-1.0, slip=0.07, pressure=0.25)
+    assert (state.p_n, state.p_s, state.g_n, state.g_s) == (-0.25, 0.0, 0.3, -0.2)
+
+
+@pytest.mark.parametrize("mode", [STICK, SLIP, OPEN])
+def test_the_tangent_is_the_derivative_of_the_state(mode: int) -> None:
+    # The law without linearisation: the friction bound taken at the traction that the unknowns themselves give.
+    random = np.random.default_rng(1)
+    count, scale, step = 40, 3.0, 1e-6
+    laws = replace(
+        make_laws(count), friction=random.uniform(0, 1, count), cohesion=random.uniform(0, 1, count),
+        fluid_inside=random.random(count) < 0.5, tensile_strength=random.uniform(0, 0.3, count),
+    )  # fmt: skip
+    modes = replace(make_modes(mode, count=count), sign=random.choice([-1.0, 1.0], count))
+    slip, pressure = random.normal(size=count), random.uniform(0, 0.2, count)
+    unknowns = random.uniform(-1, -0.2, (count, 2))
+
+    def evaluate(x: Real) -> Real:
+        p_n = scale * x[:, 0]
+        own = linearise(laws, modes, p_n, slip, pressure, scale).evaluate(x)
+        p_s = modes.sign * np.maximum(laws.cohesion - laws.friction * (p_n + laws.fluid_inside * pressure), 0)
+        return np.stack([own.p_n, p_s if mode == SLIP else own.p_s, own.g_n, own.g_s], axis=1)
+
+    law = linearise(laws, modes, scale * unknowns[:, 0], slip, pressure, scale)
+    np.testing.assert_allclose(np.stack(list(vars(law.evaluate(unknowns)).values()), 1), evaluate(unknowns), atol=1e-14)
+    for k in (0, 1):
+        shift = step * np.eye(2)[k]
+        by_differences = (evaluate(unknowns + shift) - evaluate(unknowns - shift)) / (2 * step)
+        np.testing.assert_allclose(law.tangent[:, :, k], by_differences, atol=1e-8)
+
+
+@pytest.mark.parametrize("mode", [STICK, SLIP, OPEN])
+def test_each_mode_leaves_two_independent_quantities(mode: int) -> None:
+    law = linearise(make_laws(), make_modes(mode), np.array([-1.0]), np.zeros(1), np.zeros(1), 1.0)
+    free = {STICK: (P_N, P_S), SLIP: (P_N, G_S), OPEN: (G_N, G_S)}[np.int8(mode)]
+    np.testing.assert_array_equal(law.tangent[0, free, :], np.eye(2))
+    assert np.linalg.matrix_rank(law.tangent[0]) == 2
+
+
+def test_friction_grows_with_compression_and_ends_at_the_apex() -> None:
+    bound, slope = friction_bound(make_laws(3, cohesion=COHESION), np.array([-2.0, 0.5, 1.0]), np.zeros(3))
+    np.testing.assert_allclose(bound, [COHESION + 2 * FRICTION, COHESION - 0.5 * FRICTION, 0.0])
+    np.testing.assert_allclose(slope, [-FRICTION, -FRICTION, 0.0])
+
+
+@pytest.mark.parametrize(("inside", "expected"), [(False, 1.0), (True, 0.85)])
+def test_fluid_in_closed_parts_takes_its_share_of_the_compression(inside: bool, expected: float) -> None:
+    bound, _ = friction_bound(make_laws(fluid_inside=inside), np.array([-2.0]), np.array([0.3]))
+    assert bound == pytest.approx(expected)
+
+
+def test_the_law_error_is_the_distance_from_the_cone_relative_to_the_tractions() -> None:
+    laws, modes = make_laws(3), ModeState(np.array([SLIP, SLIP, STICK]), np.array([1.0, -1.0, 1.0]))
+    state = PairState(np.array([-2.0, -2.0, -4.0]), np.array([1.0, -0.9, 0.0]), np.zeros(3), np.zeros(3))
+    assert measure_law_error(laws, modes, state, np.zeros(3)) == pytest.approx(0.1 / 4)
+    exact = replace(state, p_s=np.array([1.0, -1.0, 0.0]))
+    assert measure_law_error(laws, modes, exact, np.zeros(3)) == 0.0
+    assert measure_law_error(laws, modes, PairState(*[np.zeros(3)] * 4), np.zeros(3)) == 0.0
+
+
+# --- Which mode comes first and next ----------------------------------------------------------------------------------
+
+
+def test_before_any_load_closed_pairs_stick_and_gaps_are_open() -> None:
+    laws = replace(
+        make_laws(6), gap=np.array([0, 0.1, 0, 0, 0, 0]), parted=np.array([0, 0, 1, 0, 0, 0], dtype=bool),
+        bonded=np.array([0, 0, 0, 1, 0, 0], dtype=bool), friction=np.array([0.5, 0.5, 0.5, 0, 0, 0]),
+        cohesion=np.array([0, 0, 0, 0, 0, 0.4]),
+    )  # fmt: skip
+    # what nothing resists slips at once
+    np.testing.assert_array_equal(start_modes(laws).mode, [STICK, OPEN, OPEN, STICK, SLIP, STICK])
+
+
+# laws, mode, (p_n, p_s, g_n, g_s), slip before, pressure, sign -> mode, sign
+TABLE = {
+    "compression keeps sticking": ({}, STICK, (-1.0, 0.3, 0, 0), 0, 0, 1, STICK, None),
+    "tension opens": ({}, STICK, (0.1, 0.0, 0, 0), 0, 0, 1, OPEN, None),
+    "tension opens what slips": ({}, SLIP, (0.1, 0.0, 0, 0), 0, 0, 1, OPEN, None),
+    "zero traction keeps sticking": ({}, STICK, (0.0, 0.0, 0, 0), 0, 0, 1, STICK, None),
+    "zero traction with cohesion keeps sticking": ({"cohesion": 0.4}, STICK, (0.0, 0.0, 0, 0), 0, 0, 1, STICK, None),
+    "shear within the cohesion sticks": ({"cohesion": 0.4}, STICK, (0.0, 0.39, 0, 0), 0, 0, 1, STICK, None),
+    "shear beyond the cohesion slips": ({"cohesion": 0.4}, STICK, (0.0, 0.41, 0, 0), 0, 0, 1, SLIP, 1),
+    "shear beyond the cone slips": ({}, STICK, (-1.0, 0.51, 0, 0), 0, 0, 1, SLIP, 1),
+    "shear beyond the cone slips the other way": ({}, STICK, (-1.0, -0.51, 0, 0), 0, 0, 1, SLIP, -1),
+    "shear at the cone sticks": ({}, STICK, (-1.0, 0.5, 0, 0), 0, 0, 1, STICK, None),
+    "slip goes on": ({}, SLIP, (-1.0, 0.5, 0, 0.02), 0.01, 0, 1, SLIP, 1),
+    "slip goes on the other way": ({}, SLIP, (-1.0, -0.5, 0, -0.02), -0.01, 0, -1, SLIP, -1),
+    "slip at rest goes on": ({}, SLIP, (-1.0, 0.5, 0, 0.01), 0.01, 0, 1, SLIP, 1),
+    "unloading sticks": ({}, SLIP, (-1.0, 0.5, 0, 0.01), 0.02, 0, 1, STICK, None),
+    "unloading sticks the other way": ({}, SLIP, (-1.0, -0.5, 0, -0.01), -0.02, 0, -1, STICK, None),
+    "strong reversal slips back": ({}, SLIP, (-1.0, 0.5, 0, -0.2), 0.0, 0, 1, SLIP, -1),
+    "an open pair stays open": ({}, OPEN, (0.0, 0.0, 0.01, 0.3), 0, 0, 1, OPEN, None),
+    "overlap closes and sticks": ({}, OPEN, (0.0, 0.0, -0.01, 0.0), 0, 0, 1, STICK, None),
+    "overlap closes and slips": ({}, OPEN, (0.0, 0.0, -0.01, 0.02), 0, 0, 1, SLIP, 1),
+    "overlap closes and slips the other way": ({}, OPEN, (0.0, 0.0, -0.01, -0.02), 0, 0, 1, SLIP, -1),
+    "touching again counts from the last slip": ({}, OPEN, (0.0, 0.0, -0.01, 0.02), 0.02, 0, 1, STICK, None),
+    "tension within the strength sticks": ({"tensile_strength": 0.2, "cohesion": 1.0}, STICK, (0.19, 0, 0, 0), 0, 0, 1,
+                                           STICK, None),
+    "tension beyond the strength opens": ({"tensile_strength": 0.2, "cohesion": 1.0}, STICK, (0.21, 0, 0, 0), 0, 0, 1,
+                                          OPEN, None),
+    "what has parted does not grow together": ({"tensile_strength": 0.2, "cohesion": 1.0}, OPEN, (0, 0, 0.001, 0), 0, 0,
+                                               1, OPEN, None),
+    "overlap closes what had strength": ({"tensile_strength": 0.2, "cohesion": 1.0}, OPEN, (0, 0, -0.001, 0), 0, 0, 1,
+                                         STICK, None),
+    "pressure opens": ({}, STICK, (-0.29, 0, 0, 0), 0, 0.3, 1, OPEN, None),
+    "compression above the pressure sticks": ({}, STICK, (-0.31, 0, 0, 0), 0, 0.3, 1, STICK, None),
+    "pressure keeps open": ({}, OPEN, (-0.3, 0, 0.001, 0), 0, 0.3, 1, OPEN, None),
+    "overlap under pressure closes": ({}, OPEN, (-0.3, 0, -0.001, 0), 0, 0.3, 1, STICK, None),
+    "fluid outside does not weaken": ({}, STICK, (-1.0, 0.45, 0, 0), 0, 0.3, 1, STICK, None),
+    "fluid inside weakens": ({"fluid_inside": True}, STICK, (-1.0, 0.45, 0, 0), 0, 0.3, 1, SLIP, 1),
+    "bonded never slips": ({"bonded": True}, STICK, (-1.0, 9.0, 0, 0), 0, 0, 1, STICK, None),
+    "bonded never parts": ({"bonded": True}, STICK, (9.0, 9.0, 0, 0), 0, 0, 1, STICK, None),
+    "parted never touches": ({"parted": True}, OPEN, (0.0, 0.0, -0.5, 0), 0, 0, 1, OPEN, None),
+    "nothing resists: slips either way": ({"friction": 0.0}, SLIP, (-1.0, 0.0, 0, -0.5), 0, 0, 1, SLIP, None),
+}
+
+
+@pytest.mark.parametrize("case", TABLE.values(), ids=[name.replace(" ", "_") for name in TABLE])
+def test_modes_follow_the_trial_values(case: tuple) -> None:
+    values, mode, state, slip_before, pressure, sign, expected, expected_sign = case
+    chosen = choose(make_laws(**values), mode, make_state(*state), slip_before, pressure, sign)
+    assert chosen[0] == expected
+    if expected_sign is not None:
+        assert chosen[1] == expected_sign
+    flipped = expected_sign is not None and mode == SLIP and expected_sign != sign
+    assert chosen[2] == (expected != mode or flipped)
+
+
+@pytest.mark.parametrize("case", TABLE.values(), ids=[name.replace(" ", "_") for name in TABLE])
+@pytest.mark.parametrize(("stress", "length"), [(1e9, 1e3), (1e-9, 1.0), (1e6, 1e-6)])
+def test_modes_do_not_depend_on_units(case: tuple, stress: float, length: float) -> None:
+    values, mode, state, slip_before, pressure, sign, expected, _ = case
+    laws = make_laws(**values)
+    scaled = replace(
+        laws, cohesion=laws.cohesion * stress, tensile_strength=laws.tensile_strength * stress,
+        stiffness=laws.stiffness * stress / length,
+    )  # fmt: skip
+    p_n, p_s, g_n, g_s = state
+    chosen = choose(
+        scaled, mode, make_state(p_n * stress, p_s * stress, g_n * length, g_s * length), slip_before * length,
+        pressure * stress, sign,
+    )  # fmt: skip
+    assert chosen[0] == expected
+
+
+@pytest.mark.parametrize("size", [1.0, 1e9, 1e-9])
+@pytest.mark.parametrize("noise", [1e-13, -1e-13])
+def test_rounding_does_not_change_a_mode(noise: float, size: float) -> None:
+    # On the border of each mode, off by less than the tractions can be known; another pair tells their size.
+    laws, count = make_laws(5), 5
+    states = np.array(
+        [
+            [noise, 0, 0, 0],  # sticks, no traction
+            [-1.0, 0.5 + noise, 0, 0],  # sticks at the cone
+            [-1.0, 0.5 + noise, 0, noise],  # slips without moving
+            [0, 0, noise, 0],  # open, just touching
+            [-1.0, 0, 0, 0],
+        ]
+    )
+    modes = ModeState(np.array([STICK, STICK, SLIP, OPEN, STICK]), np.ones(count))
+    states[:, :2] *= size
+    laws = replace(laws, stiffness=laws.stiffness * size)
+    proposal = propose_modes(laws, modes, PairState(*states.T), np.zeros(count), np.zeros(count))
+    assert not proposal.changed.any()
+    np.testing.assert_array_equal(proposal.modes.mode, modes.mode)
+
+
+def test_softening_makes_jumps_count_less() -> None:
+    # The jump alone would turn the slip around; a softer trial only lets it stick.
+    state, none = make_state(-1.0, 0.5, 0.0, -0.2), np.zeros(1)
+    hard = propose_modes(make_laws(), make_modes(SLIP), state, none, none)
+    soft = propose_modes(make_laws(), make_modes(SLIP), state, none, none, softening=0.1)
+    assert hard.modes.mode[0] == SLIP and hard.modes.sign[0] == -1
+    assert soft.modes.mode[0] == STICK
+
+
+def test_the_violation_is_the_stress_by_which_a_mode_is_left() -> None:
+    laws = make_laws(3)
+    state = PairState(np.array([0.2, -1.0, -1.0]), np.array([0.0, -0.9, 0.1]), np.zeros(3), np.zeros(3))
+    proposal = propose_modes(laws, make_modes(STICK, count=3), state, np.zeros(3), np.zeros(3))
+    np.testing.assert_allclose(proposal.violation, [0.2, 0.4, 0.0])
+    np.testing.assert_array_equal(proposal.changed, [True, True, False])
+
+
+def test_limited_changes_take_the_largest_violations_only() -> None:
+    before = make_modes(STICK, count=4)
+    wanted = ModeState(np.array([OPEN, SLIP, SLIP, STICK], dtype=np.int8), np.array([1.0, -1.0, -1.0, 1.0]))
+    proposal = Proposal(wanted, np.array([0.2, 0.4, 0.1, 0.0]))
+    for share, expected in ((0.0, [OPEN, SLIP, SLIP, STICK]), (0.3, [OPEN, SLIP, STICK, STICK]),
+                            (1.0, [STICK, SLIP, STICK, STICK])):  # fmt: skip
+        limited = limit_changes(before, proposal, share)
+        np.testing.assert_array_equal(limited.mode, expected)
+        np.testing.assert_array_equal(limited.sign, np.where(limited.mode == SLIP, -1.0, 1.0))
+        assert limited.mode.dtype == np.int8
+
+
+def test_states_differ_by_modes_and_by_the_signs_of_slip_only() -> None:
+    modes = ModeState(np.array([STICK, SLIP], dtype=np.int8), np.array([1.0, 1.0]))
+    assert modes.fingerprint() == replace(modes, sign=np.array([-1.0, 1.0])).fingerprint()
+    assert modes.fingerprint() != replace(modes, sign=np.array([1.0, -1.0])).fingerprint()
+    assert modes.fingerprint() != replace(modes, mode=np.array([SLIP, SLIP], dtype=np.int8)).fingerprint()

@@ -43,17 +43,28 @@ class Region:
 class Law:
     """What an interface or crack does. All strengths are stresses >= 0; `friction` is the friction coefficient.
 
-    kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches.
-    gap: initial normal opening (length, >= 0).
+    kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches; "custom" is Coulomb-like
+    with the friction bound of the function that the Python file `file` registers, called with `parameters`.
+    gap: initial normal opening (length, >= 0), a number or an expression of x, y (see model.expression).
     pressurised: "open": fluid pressure acts in open parts only; "all": in closed parts too.
+    cohesion_lost: cohesion and tensile strength are gone after the first slip or parting.
+    friction_dynamic, slip_distance: friction falls linearly from `friction` to friction_dynamic over that slip.
+    normal_stiffness, tangential_stiffness: elastic joint in front of the law (stress/length); None is rigid.
     """
 
-    kind: Literal["bonded", "coulomb", "open"]
+    kind: Literal["bonded", "coulomb", "open", "custom"]
     friction: float = 0.0
     cohesion: float = 0.0
     tensile_strength: float = 0.0
-    gap: float = 0.0
+    gap: float | str = 0.0
     pressurised: Literal["open", "all"] = "open"
+    cohesion_lost: bool = False
+    friction_dynamic: float | None = None
+    slip_distance: float | None = None
+    normal_stiffness: float | None = None
+    tangential_stiffness: float | None = None
+    file: str | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -67,6 +78,20 @@ class Interface:
     name: str
     first: str
     second: str | None
+    law: Law
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Two different outer curves that may touch; their meshes need not match, the gap follows from the geometry.
+
+    first, second: names of the curves; the first carries the contact pairs and gives their normal. Neither has a
+    Condition: where they do not touch they are free of traction.
+    """
+
+    name: str
+    first: str
+    second: str
     law: Law
 
 
@@ -128,6 +153,8 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
+    contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
+    grid first, x fastest, then single points.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
@@ -148,3 +175,5 @@ class Model:
     size: float
     notes: tuple[str, ...] = ()
     initial_stress: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    contacts: Mapping[str, Contact] = field(default_factory=dict)
+    interior_points: tuple[complex, ...] = ()

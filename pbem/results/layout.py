@@ -98,6 +98,7 @@ def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces) -> None:
     elements["vertices"] = np.stack([to_columns(faces.start), to_columns(faces.end)], axis=1)
     elements["region"] = np.concatenate([mesh.region, mesh.region[crack]]).astype("i4")
     elements["curve"] = np.concatenate([mesh.curve, mesh.curve[crack]]).astype("i4")
+    elements["sweep"] = np.concatenate([mesh.sweep, -mesh.sweep[crack]])
     elements["crack"] = np.concatenate([mesh.crack, mesh.crack[crack]]).astype("i1")
     for group in (nodes, elements):
         group["region"].attrs["names"] = _text(mesh.region_names)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model, Region
 from pbem.results.describe import describe_condition
+from pbem.results.outline import POINTS_PER_ELEMENT, to_columns, trace_elements
 from pbem.results.plot_style import FORCE, MOTION, SHADES, SUPPORT, label, style
 
 Complex = NDArray[np.complex128]
@@ -65,11 +66,11 @@ def _draw_region(axes: Axes, number: int, region: Region, mesh: Mesh) -> None:
     if region.infinite:
         axes.set_facecolor(shade)
         for loop in loops:
-            axes.add_patch(PathPatch(OutlinePath(_columns(loop)), facecolor="white", edgecolor="none", zorder=0))
+            axes.add_patch(PathPatch(OutlinePath(to_columns(loop)), facecolor="white", edgecolor="none", zorder=0))
         text = f"{region.name} (infinite)"
         axes.text(0.02, 0.02, text, transform=axes.transAxes, style="italic", color="0.3", zorder=6)
         return
-    path = OutlinePath.make_compound_path(*(OutlinePath(_columns(loop), closed=True) for loop in loops))
+    path = OutlinePath.make_compound_path(*(OutlinePath(to_columns(loop), closed=True) for loop in loops))
     axes.add_patch(PathPatch(path, facecolor=shade, edgecolor="none", zorder=0.5))
     place = _find_room(path, np.concatenate([mesh.start, mesh.end]))
     axes.text(place.real, place.imag, region.name, ha="center", va="center", style="italic", color="0.3", zorder=6)
@@ -77,15 +78,21 @@ def _draw_region(axes: Axes, number: int, region: Region, mesh: Mesh) -> None:
 
 def _list_loops(mesh: Mesh, region: int) -> list[Complex]:
     """Closed loops (first point repeated) of a region, cracks not among them."""
+    lines = _trace_lines(mesh)
     loops: list[Complex] = []
     points: list[complex] = []
     for e in np.flatnonzero((mesh.region == region) & ~mesh.crack):
         points = points or [complex(mesh.start[e])]
-        points.append(complex(mesh.end[e]))
+        points += [*lines[e, 1:-1], complex(mesh.end[e])]
         if points[-1] == points[0]:
             loops.append(np.array(points))
             points = []
     return loops
+
+
+def _trace_lines(mesh: Mesh) -> Complex:
+    """Points along every element (e, points)."""
+    return trace_elements(mesh.start, mesh.end, mesh.sweep, np.linspace(-1.0, 1.0, POINTS_PER_ELEMENT))
 
 
 def _find_room(path: OutlinePath, boundary: Complex) -> complex:
@@ -94,7 +101,7 @@ def _find_room(path: OutlinePath, boundary: Complex) -> complex:
     x, y = np.meshgrid(*(np.linspace(a, b, 23)[1:-1] for a, b in zip(low, high, strict=True)))
     grid = x.ravel() + 1j * y.ravel()
     # The winding number by the angles from point to point: holes, which run the other way, count zero.
-    inside = path.contains_points(_columns(grid))
+    inside = path.contains_points(to_columns(grid))
     grid = grid[inside] if inside.any() else grid
     distance = np.min(np.abs(grid[:, None] - boundary[None, :: max(1, len(boundary) // 2000)]), axis=1)
     return complex(grid[np.argmax(distance)])
@@ -102,11 +109,11 @@ def _find_room(path: OutlinePath, boundary: Complex) -> complex:
 
 def _draw_elements(axes: Axes, model: Model, mesh: Mesh) -> None:
     """Every element with ticks across its ends; cracks heavier."""
-    lines = np.stack([_columns(mesh.start), _columns(mesh.end)], axis=1)
+    lines = to_columns(_trace_lines(mesh))
     across = 0.006 * model.size * 1j * (mesh.end - mesh.start) / np.abs(mesh.end - mesh.start)
     ends = np.concatenate([mesh.start, mesh.end])
     offset = np.concatenate([across, across])
-    ticks = np.stack([_columns(ends - offset), _columns(ends + offset)], axis=1)
+    ticks = np.stack([to_columns(ends - offset), to_columns(ends + offset)], axis=1)
     axes.add_collection(LineCollection(ticks, colors="0.35", linewidths=0.5, zorder=3))
     for crack, color, width in ((False, "0.15", 0.9), (True, CRACK, 1.3)):
         axes.add_collection(LineCollection(lines[mesh.crack == crack], colors=color, linewidths=width, zorder=3))
@@ -156,7 +163,7 @@ def _spread_points(mesh: Mesh, elements: NDArray[np.int64], most: int = 6) -> tu
 def _draw_clamp(axes: Axes, model: Model, mesh: Mesh, elements: NDArray[np.int64]) -> None:
     place, normal = _spread_points(mesh, elements, 24)
     stroke = 0.03 * model.size * normal * np.exp(0.25j * np.pi)
-    lines = np.stack([_columns(place), _columns(place + stroke)], axis=1)
+    lines = np.stack([to_columns(place), to_columns(place + stroke)], axis=1)
     axes.add_collection(LineCollection(lines, colors=SUPPORT, linewidths=0.6, zorder=2))
 
 
@@ -164,7 +171,7 @@ def _draw_rollers(axes: Axes, model: Model, place: Complex, outward: Complex) ->
     """Circles on which the curve rolls, with a line behind them."""
     radius = 0.012 * model.size
     for point, direction in zip(place, outward, strict=True):
-        circle = OutlinePath.circle(_columns(np.array([point + radius * direction]))[0], radius)
+        circle = OutlinePath.circle(to_columns(np.array([point + radius * direction]))[0], radius)
         axes.add_patch(PathPatch(circle, facecolor="white", edgecolor=SUPPORT, linewidth=0.7, zorder=2.5))
         ground = point + 2 * radius * direction + 1.6 * radius * np.array([-1j, 1j]) * direction
         axes.plot(ground.real, ground.imag, color=SUPPORT, linewidth=0.7, zorder=2.5)
@@ -186,7 +193,7 @@ def _draw_arrows(axes: Axes, size: float, place: Complex, normal: Complex, vecto
                 width=0.003, headwidth=4.5, headlength=5.5, zorder=5)
     # Arrows do not count for the limits of the axes by themselves.
     tips = np.concatenate([tail, tail + arrows])
-    axes.update_datalim(_columns(tips))
+    axes.update_datalim(to_columns(tips))
 
 
 def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: NDArray[np.int64]) -> None:
@@ -213,7 +220,7 @@ def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: NDArr
         va="center" if steep else "bottom" if normal.imag > 0 else "top",
     )
     room = at + 0.06 * model.size * normal * (1 + text.count("\n"))
-    axes.update_datalim(_columns(np.array([room])))
+    axes.update_datalim(to_columns(np.array([room])))
 
 
 def _draw_sides(axes: Axes, model: Model, mesh: Mesh, name: str) -> None:
@@ -251,7 +258,3 @@ def _list_handles(model: Model, few: bool) -> list[Line2D]:
     if not few:
         handles.append(Line2D([], [], linestyle="none", label=f"{len(model.curves)} curves, names left out"))
     return handles
-
-
-def _columns(points: Complex) -> NDArray[np.float64]:
-    return np.stack([points.real, points.imag], axis=-1)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pbem.results.reader import Elements, Nodes
 
+Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 POINTS_PER_ELEMENT = 5
 
@@ -35,8 +36,8 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
     t = np.linspace(-1.0, 1.0, POINTS_PER_ELEMENT)
     values = interpolate_elements(nodes, elements, displacement, t)
     start, end = elements.vertices[:, 0], elements.vertices[:, 1]
-    places = start[:, None] + 0.5 * (1 + t[:, None]) * (end - start)[:, None]
-    places[:, -1] = end
+    places = to_columns(trace_elements(to_complex(start), to_complex(end), elements.sweep, t))
+    places[:, 0], places[:, -1] = start, end
     chains = find_chains(elements)
     join_tips(elements, chains, values)
     outlines = []
@@ -52,13 +53,41 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
 def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t: Real) -> Real:
     """(e, len(t), 2): displacement at local coordinates t in [-1, 1] of every element."""
     count = len(elements.vertices)
-    middle = elements.vertices.mean(axis=1)
-    half = 0.5 * (elements.vertices[:, 1] - elements.vertices[:, 0])
-    offset = nodes.position.reshape(count, -1, 2) - middle[:, None]
-    local = (offset * half[:, None]).sum(axis=-1) / (half**2).sum(axis=-1)[:, None]
+    start, end = to_complex(elements.vertices).T
+    local = find_coordinates(start, end, elements.sweep, to_complex(nodes.position).reshape(count, -1))
     powers = np.arange(nodes.order + 1)
     coefficients = np.linalg.solve(local[..., None] ** powers, displacement.reshape(count, -1, 2))
     return np.asarray(t[:, None] ** powers @ coefficients)
+
+
+def trace_elements(start: Complex, end: Complex, sweep: Real, t: Real) -> Complex:
+    """Points (e, len(t)) at the coordinates t in [-1, 1] of straight (sweep 0) and circular elements.
+
+    On an arc the coordinate is tan(angle/4) from its middle, scaled to 1 at the end, as in `pbem.mesh.elements`.
+    """
+    middle, half = 0.5 * (start + end)[:, None], 0.5 * (end - start)[:, None]
+    # Seen from the middle of the chord an arc is a fractional-linear map of the straight element, which stays as it
+    # is where the sweep is zero.
+    quarter = np.tan(0.25 * sweep)[:, None]
+    return middle + half * (t - 1j * quarter) / (1 - 1j * quarter * t)
+
+
+def find_coordinates(start: Complex, end: Complex, sweep: Real, points: Complex) -> Real:
+    """The coordinates (e, p) of points (e, p) on their elements; the inverse of `trace_elements`."""
+    middle, half = 0.5 * (start + end)[:, None], 0.5 * (end - start)[:, None]
+    quarter = np.tan(0.25 * sweep)[:, None]
+    w = (points - middle) / half
+    return np.asarray(((w + 1j * quarter) / (1 + 1j * quarter * w)).real)
+
+
+def to_complex(columns: Real) -> Complex:
+    """Complex points (...) from their x and y (..., 2)."""
+    return np.asarray(columns[..., 0] + 1j * columns[..., 1])
+
+
+def to_columns(points: Complex) -> Real:
+    """x and y (..., 2) of complex points (...)."""
+    return np.stack([points.real, points.imag], axis=-1)
 
 
 def find_chains(elements: Elements) -> list[NDArray[np.int64]]:

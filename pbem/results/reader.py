@@ -46,11 +46,13 @@ class Nodes:
 @dataclass(frozen=True)
 class Elements:
     """vertices (e, 2, 2): start and end point in the direction of travel; region, curve (e,); crack (e,) bool.
+    sweep (e,): the signed angle (radians, counter-clockwise positive) that an arc turns through, 0 if straight.
 
     The nodes of element i are i * (order + 1) and the `order` that follow.
     """
 
     vertices: Real
+    sweep: Real
     region: Integer
     curve: Integer
     crack: NDArray[np.bool_]
@@ -250,7 +252,8 @@ def _read(path: Path, file: h5py.File) -> Results:
             order=int(nodes.attrs["order"]), region_names=_names(nodes["region"]), curve_names=_names(nodes["curve"]),
         ),
         elements=Elements(
-            vertices=_freeze(elements["vertices"][...]), region=_read_indices(elements, "region"),
+            vertices=_freeze(elements["vertices"][...]), sweep=_freeze(elements["sweep"][...]),
+            region=_read_indices(elements, "region"),
             curve=_read_indices(elements, "curve"), crack=_freeze(elements["crack"][...].astype(bool)),
         ),
         steps=steps,

@@ -46,6 +46,8 @@ def test_fields_of_every_step_are_read_back(tmp_path: Path) -> None:
         [MESH.region_names[i] for i in faces.region]
     np.testing.assert_array_equal(results.elements.vertices[:, 1] @ [1, 1j], faces.end)
     np.testing.assert_array_equal(results.elements.curve[results.nodes.element], results.nodes.curve)
+    crack = MESH.crack
+    np.testing.assert_array_equal(results.elements.sweep, np.concatenate([MESH.sweep, -MESH.sweep[crack]]))
     assert results.elements.crack.sum() == 2 * MESH.crack.sum() > 0
     np.testing.assert_array_equal(results.displacement_at(-2), results.displacement[-2])
 

@@ -65,8 +65,11 @@ def share_nodes(costs: Real, ranks: int) -> Integer:
     targets = total[-1] * np.arange(1, ranks) / ranks
     cuts = np.searchsorted(total, targets * (1 - 1e-12)) + 1
     least = np.arange(1, ranks)
-    cuts = np.clip(cuts, least, len(costs) - ranks + least) if len(costs) >= ranks else np.minimum(least, len(costs))
-    return np.concatenate([[0], np.maximum.accumulate(cuts), [len(costs)]]).astype(np.int64)
+    if len(costs) < ranks:
+        cuts = np.minimum(least, len(costs))
+    else:  # at least one node between two cuts
+        cuts = np.maximum.accumulate(np.clip(cuts - least, 0, len(costs) - ranks)) + least
+    return np.concatenate([[0], cuts, [len(costs)]]).astype(np.int64)
 
 
 def gather_parts(comm: MPI.Intracomm, part: Real) -> Real:

@@ -21,8 +21,8 @@ GAUSS_NODES, GAUSS_WEIGHTS = legendre.leggauss(24)
 class Kelvin:
     """U*, T*, D*, S* of an infinite plane; nu is the effective ratio of plane strain (nu/(1 + nu) in plane stress).
 
-    Arrays: r (q, 2) from the point (where the unit force acts, where stress is taken) to the element; n (2,) the
-    element's normal. First index of U, T: direction of the force; last index of D, S: component of the density.
+    Arrays: r (q, 2) from the point (where the unit force acts, where stress is taken) to the element; n (q or 1, 2)
+    the element's normal. First index of U, T: direction of the force; last index of D, S: component of the density.
     """
 
     def __init__(self, shear_modulus: float, nu: float) -> None:
@@ -39,10 +39,10 @@ class Kelvin:
     def traction(self, r: Real, n: Real) -> Real:
         """T*_ij (q, 2, 2)."""
         nu, length = self.nu, np.hypot(*r.T)
-        d = r / length[:, None]
-        d_n = d @ n
+        d, n = r / length[:, None], np.broadcast_to(n, r.shape)
+        d_n = (d * n).sum(axis=1)
         symmetric = d_n[:, None, None] * ((1 - 2 * nu) * IDENTITY + 2 * np.einsum("qi,qj->qij", d, d))
-        skew = (1 - 2 * nu) * (np.einsum("i,qj->qij", n, d) - np.einsum("qi,j->qij", d, n))
+        skew = (1 - 2 * nu) * (np.einsum("qi,qj->qij", n, d) - np.einsum("qi,qj->qij", d, n))
         return -(symmetric + skew) / (4 * np.pi * (1 - nu) * length[:, None, None])
 
     def stress_of_traction(self, r: Real, n: Real) -> Real:
@@ -61,21 +61,22 @@ class Kelvin:
         """S*_ijk (q, 2, 2, 2): stress ij at the point by the displacement k, with its sign: minus the integral."""
         nu, length = self.nu, np.hypot(*r.T)
         d = r / length[:, None]
-        one = IDENTITY
+        n = np.broadcast_to(n, d.shape)
+        d_n, one = (d * n).sum(axis=1), IDENTITY
         first = (
             (1 - 2 * nu) * np.einsum("ij,qk->qijk", one, d)
             + nu * (np.einsum("ik,qj->qijk", one, d) + np.einsum("jk,qi->qijk", one, d))
             - 4 * np.einsum("qi,qj,qk->qijk", d, d, d)
         )
-        second = np.einsum("i,qj,qk->qijk", n, d, d) + np.einsum("j,qi,qk->qijk", n, d, d)
+        second = np.einsum("qi,qj,qk->qijk", n, d, d) + np.einsum("qj,qi,qk->qijk", n, d, d)
         third = (
-            2 * np.einsum("k,qi,qj->qijk", n, d, d)
-            + np.einsum("j,ik->ijk", n, one)[None]
-            + np.einsum("i,jk->ijk", n, one)[None]
+            2 * np.einsum("qk,qi,qj->qijk", n, d, d)
+            + np.einsum("qj,ik->qijk", n, one)
+            + np.einsum("qi,jk->qijk", n, one)
         )
-        last = np.einsum("k,ij->ijk", n, one)[None]
+        last = np.einsum("qk,ij->qijk", n, one)
         total = (
-            2 * (d @ n)[:, None, None, None] * first + 2 * nu * second + (1 - 2 * nu) * third - (1 - 4 * nu) * last
+            2 * d_n[:, None, None, None] * first + 2 * nu * second + (1 - 2 * nu) * third - (1 - 4 * nu) * last
         )
         return self.shear_modulus * total / (2 * np.pi * (1 - nu) * length[:, None, None, None] ** 2)
 
@@ -92,14 +93,17 @@ def integrate(
     s, weight = graded_rule((point - middle) / half, tip)
     y = middle + half * s
     r = np.stack([(y - point).real, (y - point).imag], axis=1)
-    values = kernel(r, np.array([normal.real, normal.imag]))
-    powers = np.arange(densities)
+    values = kernel(r, np.array([[normal.real, normal.imag]]))
+    density = evaluate_densities(s, densities, tip) * (weight * abs(half))[:, None]
+    return np.asarray(np.einsum("q...,qk->...k", values, density))
+
+
+def evaluate_densities(s: Real, count: int, tip: int = 0) -> Real:
+    """s^k, or t^(k + 1/2) from a tip, (q, count)."""
     if tip == 0:
-        density = s[:, None] ** powers
-    else:
-        t = (1 + s) / 2 if tip == 1 else (1 - s) / 2
-        density = t[:, None] ** (powers + 0.5)
-    return np.asarray(np.einsum("q...,qk->...k", values, density * (weight * abs(half))[:, None]))
+        return np.asarray(s[:, None] ** np.arange(count))
+    t = (1 + s) / 2 if tip == 1 else (1 - s) / 2
+    return np.asarray(t[:, None] ** (np.arange(count) + 0.5))
 
 
 def graded_rule(w: complex, tip: int = 0) -> tuple[Real, Real]:

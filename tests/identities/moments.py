@@ -58,14 +58,14 @@ def _read_factors(
     w: complex, normal: complex | None, order: int, on_element: bool, tip: int
 ) -> tuple[Complex, Complex, Complex, Complex]:
     """Factors P, Q of the density powers of the displacement, then of the traction: a -> P a + Q conj(a)."""
-    identity = np.eye(order + 1)
+    identity, none = np.eye(order + 1), np.zeros(order + 1)
     displacement, traction = np.empty((2, 2 * order + 2)), np.zeros((2, 2 * order + 2))
+    point, on = np.array([w], dtype=complex), np.array([0 if on_element else -1])
+    start, end, no_center = (np.array([z], dtype=complex) for z in (-1, 1, 0))
     _kernels.rows(
-        np.array([w], dtype=complex),
-        None if normal is None else np.array([normal], dtype=complex),
-        np.array([0 if on_element else -1]),
-        np.array([-1 + 0j]), np.array([1 + 0j]), np.array([tip], dtype=np.int8),
-        identity, identity, identity, KAPPA, 1.0, 1.0, displacement, traction,
+        point, on, np.zeros(1), start, end, no_center, np.zeros(1), np.array([tip], dtype=np.int8), none,
+        identity, identity, identity, KAPPA, 1.0, 1.0, displacement,
+        None if normal is None else np.array([normal], dtype=complex), traction,
     )  # fmt: skip
     return (*_split_blocks(displacement), *_split_blocks(traction))
 

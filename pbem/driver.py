@@ -66,9 +66,9 @@ def _solve(
 
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)
-    start = None if last is None else start_from(last.number, last.stage, last.factor, last.contact)
     try:
         problem = assemble_problem(model, mesh, world)
+        start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
         for step in march(problem, listener, start):
             if writer:
                 writer.append(step)

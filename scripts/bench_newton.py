@@ -121,7 +121,8 @@ def measure(model: Model, repeat: int) -> str:
     ended = "" if classical.iterations < MOST_ITERATIONS else " (not converged)"
     return (
         f"{problem.unknowns:9d} {newton.iterations:8d} {newton.seconds * 1e3:9.1f} "
-        f"{factor:10.3g} {classical.iterations:8d} {classical.seconds * 1e3:10.1f} {classical.iterations / newton.iterations:8.1f} "
+        f"{factor:10.3g} {classical.iterations:8d} "
+        f"{classical.seconds * 1e3:10.1f} {classical.iterations / newton.iterations:8.1f} "
         f"{classical.seconds / newton.seconds:8.1f} {difference:11.1e}{ended}"
     )
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pbem.contact.laws import G_N, G_S, P_N, P_S, Linearisation, PairState
+from pbem.contact.laws import PairState
 from pbem.contact.loads import Load, OuterNodes
+from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation
 from pbem.mesh.mesh import Mesh
 
 Real = NDArray[np.float64]

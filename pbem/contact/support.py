@@ -14,7 +14,7 @@ def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie]:
     """What every interface of two regions holds: sticking pairs both components of the jump, slipping ones one."""
     ties: dict[str, Tie] = {}
     for number, name in enumerate(mesh.interface_names):
-        if model.interfaces[name].second is None:
+        if name in model.interfaces and model.interfaces[name].second is None:
             continue
         mode = modes.mode[mesh.pairs.interface == number]
         ties[name] = "both" if np.any(mode == STICK) else "none" if np.all(mode == OPEN) else "normal"

@@ -105,7 +105,7 @@ def _pair_nodes(model: Model, chains: list[Chain], local: Real) -> Pairs:
     sides = {(chain.curve, model.regions[chain.region].name): chain for chain in chains}
     columns: dict[str, list[np.ndarray]] = {
         "interface": [], "first": [], "second": [], "crack": [],
-        "position": [], "normal": [], "arc_length": [], "weight": [],
+        "position": [], "normal": [], "arc_length": [], "weight": [], "distance": [],
     }  # fmt: skip
     for number, interface in enumerate(model.interfaces.values()):
         chain = sides[interface.name, interface.first]
@@ -121,13 +121,15 @@ def _pair_nodes(model: Model, chains: list[Chain], local: Real) -> Pairs:
             "normal": np.broadcast_to(outward, (elements.count, len(local))),
             "arc_length": elements.arc_lengths(local),
             "weight": elements.weights(local),
+            "distance": np.zeros(len(first)),
         }
         for key, values in entry.items():
             columns[key].append(values.ravel())
-    types = {"position": np.complex128, "normal": np.complex128, "arc_length": np.float64, "weight": np.float64}
+    types: dict[str, type] = {"position": np.complex128, "normal": np.complex128, "crack": np.bool_}
+    types |= {"interface": np.int64, "first": np.int64, "second": np.int64}
     return Pairs(
         **{
-            key: np.concatenate([np.zeros(0), *parts]).astype(np.bool_ if key == "crack" else types.get(key, np.int64))
+            key: np.concatenate([np.zeros(0), *parts]).astype(types.get(key, np.float64))
             for key, parts in columns.items()
         }
     )

@@ -20,7 +20,8 @@ class Pairs:
     interface (m,): index into Mesh.interface_names; first, second (m,): the two nodes. The pair of a crack has only
     one node, whose unknown displacement is the jump u_r - u_l: there second = first and crack is True.
     position, normal (m,): complex; normal is outward of the first side. arc_length (m,): from the curve's first point.
-    weight (m,): integration weight (length) of the pair's node.
+    weight (m,): integration weight (length) of the pair's node. distance (m,): of the second side along the normal,
+    zero on interfaces and cracks.
     """
 
     interface: Integer
@@ -31,6 +32,7 @@ class Pairs:
     normal: Complex
     arc_length: Real
     weight: Real
+    distance: Real
 
     @property
     def count(self) -> int:

@@ -107,7 +107,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         for name, table in case.materials.items()
     }
     regions = tuple(
-        Region(name, materials[table.material], topology.loops[name], tuple(table.cracks))
+        Region(name, materials[table.material], topology.loops[name], tuple(table.cracks), table.infinite)
         for name, table in case.regions.items()
     )
     return Model(

@@ -10,9 +10,9 @@ import numpy as np
 from pbem.case import Case
 from pbem.errors import Fault
 from pbem.model.curve import Curve
-from pbem.model.intersection import inner_points, project, winding_number
+from pbem.model.intersection import inner_points, project
 from pbem.model.junction import Boxes, format_point
-from pbem.model.loop import Loops, loop_legs
+from pbem.model.loop import Loops, is_inside, loop_legs
 from pbem.model.model import Loop
 
 # A tip nearer to another curve than this part of the model's size is taken for a slip of the pen.
@@ -77,7 +77,7 @@ def check_inside(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, s
         if region not in loops:
             continue
         points = np.concatenate([inner_points(leg) for leg in curves[name].legs])
-        outside = points[winding_number(loop_legs(curves, loops[region]), points) != 1]
+        outside = points[~is_inside(curves, loops[region], points)]
         if len(outside):
             loc = ("regions", region, "cracks", case.regions[region].cracks.index(name))
             found = f"crack '{name}' outside region '{region}', at {format_point(complex(outside[0]))}"

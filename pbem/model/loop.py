@@ -44,10 +44,18 @@ def loop_legs(curves: Mapping[str, Curve], loops: tuple[Loop, ...]) -> list[Leg]
     return [leg for loop in loops for side in loop.sides for leg in side_legs(curves, side)]
 
 
+def is_inside(
+    curves: Mapping[str, Curve], loops: tuple[Loop, ...], points: NDArray[np.complex128]
+) -> NDArray[np.bool_]:
+    """Which points (off the loops) lie in the region of these loops, which is infinite if none of them is outer."""
+    around = 1 if any(loop.outer for loop in loops) else 0
+    return winding_number(loop_legs(curves, loops), points) == around
+
+
 def find_loops(
     case: Case, curves: Mapping[str, Curve], tolerance: float, check_nesting: bool
 ) -> tuple[Loops, list[Fault]]:
-    """Loops of every region all of whose curves are known; regions with faults are left out.
+    """Loops of every region all of whose curves are known; regions with faults are left out, the whole plane has none.
 
     check_nesting: False if curves cross, when it is not settled which loop lies in which.
     """
@@ -55,11 +63,13 @@ def find_loops(
     faults: list[Fault] = []
     for region, table in case.regions.items():
         names = list(dict.fromkeys(table.boundary))
+        if not names and table.infinite:
+            result[region] = ()
         if not names or any(name not in curves for name in names):
             continue
         chains, wrong = _chain(case, region, {name: curves[name] for name in names}, tolerance)
         if not wrong:
-            loops, wrong = _nest(case, region, chains)
+            loops, wrong = _nest(case, region, chains, table.infinite)
             wrong = wrong if check_nesting else []
         if wrong:
             faults += wrong
@@ -174,10 +184,15 @@ def _is_enclosed_oddly(legs: list[Leg], points: NDArray[np.complex128]) -> list[
     return [sum(len(meeting_points(ray, leg, 0.0)) for leg in legs) % 2 == 1 for ray in rays]
 
 
-def _nest(case: Case, region: str, chains: list[_Chain]) -> tuple[tuple[Loop, ...], list[Fault]]:
-    """The loop of the largest area is outer, counter-clockwise; all others lie in it side by side, clockwise."""
+def _nest(
+    case: Case, region: str, chains: list[_Chain], infinite: bool
+) -> tuple[tuple[Loop, ...], list[Fault]]:
+    """The loop of the largest area is outer, counter-clockwise; all others lie in it side by side, clockwise.
+
+    An infinite region has no outer loop.
+    """
     areas = [enclosed_area(chain.legs) for chain in chains]
-    outer = max(range(len(chains)), key=lambda i: abs(areas[i]))
+    outer = -1 if infinite else max(range(len(chains)), key=lambda i: abs(areas[i]))
     turned = [
         chain if (area > 0) == (i == outer) else chain.reverse()
         for i, (chain, area) in enumerate(zip(chains, areas, strict=True))
@@ -209,7 +224,8 @@ def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops) -> list
     names = list(loops)
     for number, first in enumerate(names):
         for second in names[number + 1:]:
-            found = _overlap(curves, loops[first], loops[second])
+            both = [case.regions[name].infinite for name in (first, second)]
+            found = "" if all(both) else _overlap(curves, loops[first], loops[second])
             if found:
                 expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
                 loc = ("regions", second, "boundary")
@@ -224,10 +240,9 @@ def _overlap(curves: Mapping[str, Curve], first: tuple[Loop, ...], second: tuple
         if sides[0][curve] == sides[1][curve]:
             return f"both lie on the same side of '{curve}'"
     for one, other in ((0, 1), (1, 0)):
-        legs = loop_legs(curves, (first, second)[one])
         for curve in sides[other]:
             if curve not in common:
                 points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
-                if (winding_number(legs, points) == 1).any():
+                if is_inside(curves, (first, second)[one], points).any():
                     return f"'{curve}' lies inside"
     return ""

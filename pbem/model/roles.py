@@ -48,6 +48,10 @@ def resolve_roles(case: Case) -> Roles:
                     faults.append(case.fault(loc_of_name, f"curve '{name}' a second time", "each curve once"))
                 else:
                     uses[name].append(region)
+    infinite = [region for region, table in case.regions.items() if table.infinite]
+    for region in infinite[1:]:
+        found = f"a second infinite region beside '{infinite[0]}'"
+        faults.append(case.fault(("regions", region, "infinite"), found, "at most one: they would overlap far away"))
     outer, shared, cracks = {}, {}, {}
     for name in case.curves:
         fault = _check_use(case, name, bounds[name], inside[name])

@@ -22,7 +22,10 @@ ITERATION = np.dtype(
     ]
 )
 STEP_DATASETS = {"stage": "i4", "factor": "f8", "iterations": "i4", "residual": "f8", "number": "i4"}
-PAIR_DATASETS = {"mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8"}
+PAIR_DATASETS = {
+    "mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8",
+    "slip_path": "f8", "broken": "?",
+}
 CHUNK_BYTES = 32768
 
 

@@ -34,22 +34,15 @@ def petsc_version() -> str:
 
 @contextmanager
 def petsc_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Hold options in PETSc's database under the program's prefix while the block runs.
-
-    At the end of the process PETSc itself names the options that nothing asked for.
-    """
+    """Hold options in PETSc's database under the program's prefix while the block runs."""
     database = PETSc.Options()
-    for name in _options_in_use:
-        database.delValue(PREFIX + name)
-    _options_in_use[:] = list(options)
     for name, value in options.items():
         database.setValue(PREFIX + name, value)
-    if options:
-        database.setValue("options_left", "true")
-    yield
-
-
-_options_in_use: list[str] = []
+    try:
+        yield
+    finally:
+        for name in options:
+            database.delValue(PREFIX + name)
 
 
 class LinearSolver:
@@ -115,8 +108,8 @@ class LinearSolver:
             assert self.matrix is not None
             self.converted = self.matrix.convert("scalapack", out=PETSc.Mat())
         solver.setOperators(self.matrix, self.converted)
-        direct = self.factor_type != "scalapack" and not self.reuse
-        solver.setType("preonly" if direct else "fgmres")
+        # Not "preonly": with factors as preconditioner GMRES ends in one iteration, and heeds the user's options.
+        solver.setType("fgmres")
         solver.setTolerances(rtol=1e-13, atol=0.0, divtol=1e10, max_it=60)
         preconditioner = solver.getPC()
         preconditioner.setType("lu")

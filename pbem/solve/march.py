@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.contact.laws import ModeState, start_modes
+from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.errors import ConvergenceError
-from pbem.solve.newton import Memory, Solution, solve_step
+from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem, Tangent
 from pbem.solve.step import ContactState, Reporter, Step
 
@@ -26,14 +26,15 @@ class Start:
 
 def start_from_rest(problem: Problem) -> Start:
     """The unloaded state: closed pairs stick."""
-    count = problem.mesh.pairs.count
-    return Start(0, 0, 0.0, Memory(start_modes(problem.laws), np.zeros(count), np.zeros(count)))
+    return Start(0, 0, 0.0, start_memory(problem.laws))
 
 
-def start_from(number: int, stage: int, factor: float, contact: ContactState) -> Start:
+def start_from(problem: Problem, number: int, stage: int, factor: float, contact: ContactState) -> Start:
     """The state of a stored step."""
     modes = ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
-    return Start(number, stage, factor, Memory(modes, contact.slip, contact.traction_n))
+    elastic = problem.laws.compliance_s * contact.traction_s
+    memory = Memory(modes, contact.slip - elastic, contact.slip_path, contact.broken, contact.traction_n)
+    return Start(number, stage, factor, memory)
 
 
 def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
@@ -52,9 +53,9 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
                 solution, reached = _advance(problem, tangent, memory, stage, reached, planned, reporter)
-                memory = Memory(solution.modes, solution.pairs.g_s, solution.pairs.p_n)
+                memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
                 number += 1
-                step = describe_step(problem, solution, number, stage, reached)
+                step = describe_step(problem, solution, memory, number, stage, reached)
                 reporter.accept(step)
                 yield step
     finally:
@@ -83,7 +84,9 @@ def _advance(
             target = reached + half
 
 
-def describe_step(problem: Problem, solution: Solution, number: int, stage: int, factor: float) -> Step:
+def describe_step(
+    problem: Problem, solution: Solution, memory: Memory, number: int, stage: int, factor: float
+) -> Step:
     """Displacements and tractions on all faces, crack faces recovered from their displacement equation, and contact."""
     mesh = problem.mesh
     values = solution.v[0::2] + 1j * solution.v[1::2]
@@ -104,5 +107,13 @@ def describe_step(problem: Problem, solution: Solution, number: int, stage: int,
         residual=solution.residual,
         displacement=np.concatenate([displacement, opposite[order]]),
         traction=np.concatenate([traction, -traction[order]]),
-        contact=ContactState(solution.modes.mode, pairs.g_n, pairs.g_s, pairs.p_n, pairs.p_s),
+        contact=ContactState(
+            mode=solution.modes.mode,
+            opening=pairs.g_n,
+            slip=pairs.g_s,
+            traction_n=pairs.p_n,
+            traction_s=pairs.p_s,
+            slip_path=memory.path,
+            broken=memory.broken,
+        ),
     )

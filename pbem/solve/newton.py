@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.constraints import evaluate_pairs
-from pbem.contact.laws import (
-    OPEN,
-    SLIP,
-    STICK,
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
+from pbem.contact.loads import Load
+from pbem.contact.modes import (
     Linearisation,
-    ModeState,
-    PairState,
     Proposal,
+    find_failures,
     limit_changes,
     linearise,
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.loads import Load
 from pbem.contact.support import find_ties
 from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem, Tangent
@@ -32,22 +29,17 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Memory:
-    """What the contact pairs remember from the last converged step: modes, slip, normal traction."""
-
-    modes: ModeState
-    slip: Real
-    normal_traction: Real
-
-
-@dataclass(frozen=True)
 class Solution:
-    """A converged state: unknowns (2 nodes,), v (4 nodes,), pairs, modes and the iterations that led to it."""
+    """A converged state: unknowns (2 nodes,), v (4 nodes,), pairs, modes and the iterations that led to it.
+
+    memory: that of the last step, with the brittle bonds that failed in this one.
+    """
 
     unknowns: Real
     v: Real
     pairs: PairState
     modes: ModeState
+    memory: Memory
     residual: float
     iterations: tuple[Iteration, ...]
 
@@ -68,44 +60,81 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
     """Converge one load step from the memory of the last.
 
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
-    mode, so that a step in which no mode changes takes one iteration. All decisions are taken from gathered values.
+    mode (but for friction that depends on slip), so that a step in which no mode changes takes one iteration. Brittle
+    bonds fail, those with the largest overload first, only when the modes of all other pairs have settled. All
+    decisions are taken from gathered values.
     Raises ConvergenceError: "free motion", "mode cycle", "iteration limit", "singular tangent", "linear solver".
     """
-    options = problem.model.solver
-    modes, normal_traction = memory.modes, memory.normal_traction
-    level = 0
-    seen = {modes.fingerprint()}
+    laws = problem.laws
+    modes, normal_traction, slip = memory.modes, memory.normal_traction, memory.slip
+    search = _Search(problem.model.solver.newton_max_iterations, modes)
     iterations: list[Iteration] = []
-    for number in range(1, options.newton_max_iterations + 1):
+    while True:
         begin = time.perf_counter()
-        law = linearise(problem.laws, modes, normal_traction, memory.slip, load.pressure, problem.traction_scale)
-        try:
-            unknowns, v, residual = _solve_linearised(problem, tangent, law, load)
-        except ConvergenceError:
-            _refuse_free_motion(problem, modes)
-            raise
+        law = linearise(laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale)
+        unknowns, v, residual = _solve_linearised(problem, tangent, modes, law, load)
         pairs = evaluate_pairs(problem.mesh, law, unknowns)
-        caution = CAUTIONS[level]
-        proposal = propose_modes(problem.laws, modes, pairs, memory.slip, load.pressure, caution.softening)
-        law_error = measure_law_error(problem.laws, modes, pairs, load.pressure)
-        iterations.append(_record(number, residual, modes, proposal, begin))
+        proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening)
+        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure)
+        settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
+        failing = find_failures(laws, pairs, memory, load.pressure)
+        if settled and failing.any():
+            memory = replace(memory, broken=memory.broken | failing)
+            proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening)
+            search.restart(modes)
+        iterations.append(_record(len(iterations) + 1, residual, modes, proposal, begin))
         reporter.iterate(iterations[-1])
-        if not proposal.changed.any() and law_error <= options.newton_tolerance:
+        if settled and not failing.any():
             _refuse_free_motion(problem, modes)
-            return Solution(unknowns, v, pairs, modes, residual, tuple(iterations))
-        modes = limit_changes(modes, proposal, caution.share)
-        normal_traction = pairs.p_n
-        if proposal.changed.any() and modes.fingerprint() in seen:
-            level += 1
-            seen.clear()
-            if level == len(CAUTIONS):
+            return Solution(unknowns, v, pairs, modes, memory, residual, tuple(iterations))
+        modes = limit_changes(modes, proposal, search.caution.share)
+        normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
+        search.note(problem, modes, proposal)
+
+
+class _Search:
+    """Watches the sequence of modes: more caution when they come back, an end when nothing helps."""
+
+    def __init__(self, most: int, modes: ModeState) -> None:
+        self.most = most
+        self.restart(modes)
+
+    def restart(self, modes: ModeState) -> None:
+        self.count = 0
+        self.level = 0
+        self.seen = {modes.fingerprint()}
+
+    @property
+    def caution(self) -> Caution:
+        return CAUTIONS[self.level]
+
+    def note(self, problem: Problem, modes: ModeState, proposal: Proposal) -> None:
+        """Take note of the next modes. Raises ConvergenceError when they go round in spite of all caution."""
+        self.count += 1
+        if proposal.changed.any() and modes.fingerprint() in self.seen:
+            if self.level == len(CAUTIONS) - 1:
                 raise ConvergenceError("mode cycle", _describe_changes(problem, proposal))
-        seen.add(modes.fingerprint())
-    raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
+            self.level += 1
+            self.seen.clear()
+        self.seen.add(modes.fingerprint())
+        if self.count == self.most:
+            raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
 
 
-def _solve_linearised(problem: Problem, tangent: Tangent, law: Linearisation, load: Load) -> tuple[Real, Real, float]:
-    """Unknowns and v with B v = 0 for linearised laws, and the relative residual; refined once if need be."""
+def _solve_linearised(
+    problem: Problem, tangent: Tangent, modes: ModeState, law: Linearisation, load: Load
+) -> tuple[Real, Real, float]:
+    """Unknowns and v for linearised laws, and the relative residual; a failure names a free body if there is one."""
+    try:
+        return _solve_and_refine(problem, tangent, law, load)
+    except ConvergenceError:
+        _refuse_free_motion(problem, modes)
+        raise
+
+
+def _solve_and_refine(
+    problem: Problem, tangent: Tangent, law: Linearisation, load: Load
+) -> tuple[Real, Real, float]:
     constraints = problem.constrain(law, load)
     tangent.update(constraints)
     forced = problem.apply(constraints.offset, load)

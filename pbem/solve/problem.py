@@ -20,8 +20,9 @@ from pbem.bem.operator import (
 )
 from pbem.contact.anchor import Anchor, anchor_motions
 from pbem.contact.constraints import ConstraintMap, build_constraints
-from pbem.contact.laws import Linearisation, PairLaws, collect_laws
+from pbem.contact.laws import PairLaws, collect_laws
 from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
+from pbem.contact.modes import Linearisation
 from pbem.contact.support import describe_free_motions
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.model.model import Model

@@ -29,7 +29,8 @@ class ContactState:
     """State of all m contact pairs, in the order of Mesh.pairs.
 
     mode (m,) int8: STICK, SLIP, OPEN; opening (initial gap included), slip: lengths; traction_n, traction_s:
-    traction on the first side along n and s (stress).
+    traction on the first side along n and s (stress). What the pairs remember besides: slip_path, the accumulated
+    length of their plastic slip; broken, brittle bonds that are lost.
     """
 
     mode: NDArray[np.int8]
@@ -37,6 +38,8 @@ class ContactState:
     slip: NDArray[np.float64]
     traction_n: NDArray[np.float64]
     traction_s: NDArray[np.float64]
+    slip_path: NDArray[np.float64]
+    broken: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

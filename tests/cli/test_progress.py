@@ -21,7 +21,7 @@ class Terminal(io.StringIO):
 
 def make_step(number: int, stage: int, factor: float) -> Step:
     zeros = np.zeros(3)
-    contact = ContactState(np.array([STICK, SLIP, OPEN], dtype=np.int8), zeros, zeros, zeros, zeros)
+    contact = ContactState(np.array([STICK, SLIP, OPEN], dtype=np.int8), zeros, zeros, zeros, zeros, zeros, zeros > 0)
     return Step(number, stage, factor, (Iteration(1, 1e-3, 5, 1, 1, 1, 0.5),), 2e-12, zeros + 0j, zeros + 0j, contact)
 
 

@@ -9,37 +9,59 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.contact.laws import (
-    G_N,
-    G_S,
     OPEN,
-    P_N,
-    P_S,
     SLIP,
     STICK,
+    Memory,
     ModeState,
     PairLaws,
     PairState,
+    StrengthGroup,
+    evaluate_strength,
+    start_memory,
+)
+from pbem.contact.modes import (
+    G_N,
+    G_S,
+    P_N,
+    P_S,
     Proposal,
-    friction_bound,
     limit_changes,
     linearise,
     measure_law_error,
     propose_modes,
-    start_modes,
 )
+from pbem.contact.strength import Strength, coulomb
 
 Real = NDArray[np.float64]
 
 FRICTION, COHESION, STIFFNESS = 0.5, 0.4, 10.0
 
 
-def make_laws(count: int = 1, **values: object) -> PairLaws:
-    """Laws of equal pairs: friction without cohesion or strength, unless told otherwise."""
+def make_laws(count: int = 1, friction: object = FRICTION, cohesion: object = 0.0, **values: object) -> PairLaws:
+    """Coulomb's law for all pairs: friction without cohesion or strength, unless told otherwise."""
     defaults: dict[str, object] = {
-        "friction": FRICTION, "cohesion": 0.0, "tensile_strength": 0.0, "gap": 0.0, "bonded": False, "parted": False,
-        "fluid_inside": False, "stiffness": STIFFNESS,
+        "tensile_strength": 0.0, "gap": 0.0, "bonded": False, "parted": False, "brittle": False, "fluid_inside": False,
+        "compliance_n": 0.0, "compliance_s": 0.0, "stiffness": STIFFNESS,
     }  # fmt: skip
-    return PairLaws(**{name: np.full(count, value) for name, value in (defaults | values).items()})
+    parameters = {"friction": np.full(count, friction), "cohesion": np.full(count, cohesion)}
+    strengths = (StrengthGroup(coulomb, np.arange(count), parameters),)
+    return PairLaws(strengths, **{name: np.full(count, value) for name, value in (defaults | values).items()})
+
+
+def scale_cohesion(laws: PairLaws, factor: float) -> tuple[StrengthGroup, ...]:
+    (group,) = laws.strengths
+    return (replace(group, parameters=group.parameters | {"cohesion": factor * group.parameters["cohesion"]}),)
+
+
+def remember(slip: Real | float, count: int = 1, path: Real | float = 0.0) -> Memory:
+    """A memory of pairs that stuck with the given slip."""
+    none = np.zeros(count)
+    return Memory(make_modes(STICK, count=count), none + slip, none + path, none > 0, none)
+
+
+def friction_bound(laws: PairLaws, p_n: Real, pressure: Real) -> Strength:
+    return evaluate_strength(laws, p_n, np.zeros(laws.count), pressure, np.zeros(laws.count, dtype=bool))
 
 
 def make_modes(mode: int, sign: float = 1.0, count: int = 1) -> ModeState:
@@ -54,7 +76,7 @@ def choose(
     laws: PairLaws, mode: int, state: PairState, slip_before: float = 0.0, pressure: float = 0.0, sign: float = 1.0
 ) -> tuple[int, float, bool]:
     """Mode, sign and whether it changed, for one pair."""
-    proposal = propose_modes(laws, make_modes(mode, sign), state, np.array([slip_before]), np.array([pressure]))
+    proposal = propose_modes(laws, make_modes(mode, sign), state, remember(slip_before), np.array([pressure]))
     return int(proposal.modes.mode[0]), float(proposal.modes.sign[0]), bool(proposal.changed[0])
 
 
@@ -64,7 +86,8 @@ def choose(
 def linearise_one(laws: PairLaws, modes: ModeState, p_n: float, slip: float = 0.0, pressure: float = 0.0) -> PairState:
     """The state that the law gives for the unknowns (x_n, x_s) = (0.3, -0.2), with a traction scale of 2."""
     count = len(modes.mode)
-    law = linearise(laws, modes, np.full(count, p_n), np.full(count, slip), np.full(count, pressure), 2.0)
+    at_slip = np.full(count, slip)
+    law = linearise(laws, modes, np.full(count, p_n), at_slip, remember(slip, count), np.full(count, pressure), 2.0)
     return law.evaluate(np.tile([0.3, -0.2], (count, 1)))
 
 
@@ -91,9 +114,10 @@ def test_the_tangent_is_the_derivative_of_the_state(mode: int) -> None:
     # The law without linearisation: the friction bound taken at the traction that the unknowns themselves give.
     random = np.random.default_rng(1)
     count, scale, step = 40, 3.0, 1e-6
-    laws = replace(
-        make_laws(count), friction=random.uniform(0, 1, count), cohesion=random.uniform(0, 1, count),
-        fluid_inside=random.random(count) < 0.5, tensile_strength=random.uniform(0, 0.3, count),
+    friction, cohesion = random.uniform(0, 1, count), random.uniform(0, 1, count)
+    laws = make_laws(
+        count, friction, cohesion, fluid_inside=random.random(count) < 0.5, compliance_s=random.uniform(0, 1, count),
+        compliance_n=random.uniform(0, 1, count), tensile_strength=random.uniform(0, 0.3, count),
     )  # fmt: skip
     modes = replace(make_modes(mode, count=count), sign=random.choice([-1.0, 1.0], count))
     slip, pressure = random.normal(size=count), random.uniform(0, 0.2, count)
@@ -101,11 +125,14 @@ def test_the_tangent_is_the_derivative_of_the_state(mode: int) -> None:
 
     def evaluate(x: Real) -> Real:
         p_n = scale * x[:, 0]
-        own = linearise(laws, modes, p_n, slip, pressure, scale).evaluate(x)
-        p_s = modes.sign * np.maximum(laws.cohesion - laws.friction * (p_n + laws.fluid_inside * pressure), 0)
-        return np.stack([own.p_n, p_s if mode == SLIP else own.p_s, own.g_n, own.g_s], axis=1)
+        own = linearise(laws, modes, p_n, slip, remember(slip, count), pressure, scale).evaluate(x)
+        p_s = modes.sign * np.maximum(cohesion - friction * (p_n + laws.fluid_inside * pressure), 0)
+        slipped = x[:, 1] + laws.compliance_s * p_s
+        return np.stack(
+            [own.p_n, p_s if mode == SLIP else own.p_s, own.g_n, slipped if mode == SLIP else own.g_s], axis=1
+        )
 
-    law = linearise(laws, modes, scale * unknowns[:, 0], slip, pressure, scale)
+    law = linearise(laws, modes, scale * unknowns[:, 0], slip, remember(slip, count), pressure, scale)
     np.testing.assert_allclose(np.stack(list(vars(law.evaluate(unknowns)).values()), 1), evaluate(unknowns), atol=1e-14)
     for k in (0, 1):
         shift = step * np.eye(2)[k]
@@ -115,44 +142,43 @@ def test_the_tangent_is_the_derivative_of_the_state(mode: int) -> None:
 
 @pytest.mark.parametrize("mode", [STICK, SLIP, OPEN])
 def test_each_mode_leaves_two_independent_quantities(mode: int) -> None:
-    law = linearise(make_laws(), make_modes(mode), np.array([-1.0]), np.zeros(1), np.zeros(1), 1.0)
+    law = linearise(make_laws(), make_modes(mode), np.array([-1.0]), np.zeros(1), remember(0.0), np.zeros(1), 1.0)
     free = {STICK: (P_N, P_S), SLIP: (P_N, G_S), OPEN: (G_N, G_S)}[np.int8(mode)]
     np.testing.assert_array_equal(law.tangent[0, free, :], np.eye(2))
     assert np.linalg.matrix_rank(law.tangent[0]) == 2
 
 
 def test_friction_grows_with_compression_and_ends_at_the_apex() -> None:
-    bound, slope = friction_bound(make_laws(3, cohesion=COHESION), np.array([-2.0, 0.5, 1.0]), np.zeros(3))
-    np.testing.assert_allclose(bound, [COHESION + 2 * FRICTION, COHESION - 0.5 * FRICTION, 0.0])
-    np.testing.assert_allclose(slope, [-FRICTION, -FRICTION, 0.0])
+    strength = friction_bound(make_laws(3, cohesion=COHESION), np.array([-2.0, 0.5, 1.0]), np.zeros(3))
+    np.testing.assert_allclose(strength.bound, [COHESION + 2 * FRICTION, COHESION - 0.5 * FRICTION, 0.0])
+    np.testing.assert_allclose(strength.by_traction, [-FRICTION, -FRICTION, 0.0])
 
 
 @pytest.mark.parametrize(("inside", "expected"), [(False, 1.0), (True, 0.85)])
 def test_fluid_in_closed_parts_takes_its_share_of_the_compression(inside: bool, expected: float) -> None:
-    bound, _ = friction_bound(make_laws(fluid_inside=inside), np.array([-2.0]), np.array([0.3]))
-    assert bound == pytest.approx(expected)
+    strength = friction_bound(make_laws(fluid_inside=inside), np.array([-2.0]), np.array([0.3]))
+    assert strength.bound == pytest.approx(expected)
 
 
 def test_the_law_error_is_the_distance_from_the_cone_relative_to_the_tractions() -> None:
     laws, modes = make_laws(3), ModeState(np.array([SLIP, SLIP, STICK]), np.array([1.0, -1.0, 1.0]))
     state = PairState(np.array([-2.0, -2.0, -4.0]), np.array([1.0, -0.9, 0.0]), np.zeros(3), np.zeros(3))
-    assert measure_law_error(laws, modes, state, np.zeros(3)) == pytest.approx(0.1 / 4)
+    assert measure_law_error(laws, modes, state, remember(0.0, 3), np.zeros(3)) == pytest.approx(0.1 / 4)
     exact = replace(state, p_s=np.array([1.0, -1.0, 0.0]))
-    assert measure_law_error(laws, modes, exact, np.zeros(3)) == 0.0
-    assert measure_law_error(laws, modes, PairState(*[np.zeros(3)] * 4), np.zeros(3)) == 0.0
+    assert measure_law_error(laws, modes, exact, remember(0.0, 3), np.zeros(3)) == 0.0
+    assert measure_law_error(laws, modes, PairState(*[np.zeros(3)] * 4), remember(0.0, 3), np.zeros(3)) == 0.0
 
 
 # --- Which mode comes first and next ----------------------------------------------------------------------------------
 
 
 def test_before_any_load_closed_pairs_stick_and_gaps_are_open() -> None:
-    laws = replace(
-        make_laws(6), gap=np.array([0, 0.1, 0, 0, 0, 0]), parted=np.array([0, 0, 1, 0, 0, 0], dtype=bool),
-        bonded=np.array([0, 0, 0, 1, 0, 0], dtype=bool), friction=np.array([0.5, 0.5, 0.5, 0, 0, 0]),
-        cohesion=np.array([0, 0, 0, 0, 0, 0.4]),
+    laws = make_laws(
+        6, np.array([0.5, 0.5, 0.5, 0, 0, 0]), np.array([0, 0, 0, 0, 0, 0.4]), gap=np.array([0, 0.1, 0, 0, 0, 0]),
+        parted=np.array([0, 0, 1, 0, 0, 0], dtype=bool), bonded=np.array([0, 0, 0, 1, 0, 0], dtype=bool),
     )  # fmt: skip
     # what nothing resists slips at once
-    np.testing.assert_array_equal(start_modes(laws).mode, [STICK, OPEN, OPEN, STICK, SLIP, STICK])
+    np.testing.assert_array_equal(start_memory(laws).modes.mode, [STICK, OPEN, OPEN, STICK, SLIP, STICK])
 
 
 # laws, mode, (p_n, p_s, g_n, g_s), slip before, pressure, sign -> mode, sign
@@ -216,7 +242,7 @@ def test_modes_do_not_depend_on_units(case: tuple, stress: float, length: float)
     values, mode, state, slip_before, pressure, sign, expected, _ = case
     laws = make_laws(**values)
     scaled = replace(
-        laws, cohesion=laws.cohesion * stress, tensile_strength=laws.tensile_strength * stress,
+        laws, strengths=scale_cohesion(laws, stress), tensile_strength=laws.tensile_strength * stress,
         stiffness=laws.stiffness * stress / length,
     )  # fmt: skip
     p_n, p_s, g_n, g_s = state
@@ -244,16 +270,16 @@ def test_rounding_does_not_change_a_mode(noise: float, size: float) -> None:
     modes = ModeState(np.array([STICK, STICK, SLIP, OPEN, STICK]), np.ones(count))
     states[:, :2] *= size
     laws = replace(laws, stiffness=laws.stiffness * size)
-    proposal = propose_modes(laws, modes, PairState(*states.T), np.zeros(count), np.zeros(count))
+    proposal = propose_modes(laws, modes, PairState(*states.T), remember(0.0, count), np.zeros(count))
     assert not proposal.changed.any()
     np.testing.assert_array_equal(proposal.modes.mode, modes.mode)
 
 
 def test_softening_makes_jumps_count_less() -> None:
     # The jump alone would turn the slip around; a softer trial only lets it stick.
-    state, none = make_state(-1.0, 0.5, 0.0, -0.2), np.zeros(1)
-    hard = propose_modes(make_laws(), make_modes(SLIP), state, none, none)
-    soft = propose_modes(make_laws(), make_modes(SLIP), state, none, none, softening=0.1)
+    state, none, before = make_state(-1.0, 0.5, 0.0, -0.2), np.zeros(1), remember(0.0)
+    hard = propose_modes(make_laws(), make_modes(SLIP), state, before, none)
+    soft = propose_modes(make_laws(), make_modes(SLIP), state, before, none, softening=0.1)
     assert hard.modes.mode[0] == SLIP and hard.modes.sign[0] == -1
     assert soft.modes.mode[0] == STICK
 
@@ -261,7 +287,7 @@ def test_softening_makes_jumps_count_less() -> None:
 def test_the_violation_is_the_stress_by_which_a_mode_is_left() -> None:
     laws = make_laws(3)
     state = PairState(np.array([0.2, -1.0, -1.0]), np.array([0.0, -0.9, 0.1]), np.zeros(3), np.zeros(3))
-    proposal = propose_modes(laws, make_modes(STICK, count=3), state, np.zeros(3), np.zeros(3))
+    proposal = propose_modes(laws, make_modes(STICK, count=3), state, remember(0.0, 3), np.zeros(3))
     np.testing.assert_allclose(proposal.violation, [0.2, 0.4, 0.0])
     np.testing.assert_array_equal(proposal.changed, [True, True, False])
 

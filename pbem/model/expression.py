@@ -1,0 +1,129 @@
+"""Arithmetic that users write in case files, evaluated for whole arrays and without Python's own eval."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+
+CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
+FUNCTIONS: Mapping[str, Callable[[Real], Real]] = {
+    "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan,
+    "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs,
+}
+FUNCTIONS_OF_TWO: Mapping[str, Callable[[Real, Real], Real]] = {
+    "atan2": np.arctan2, "min": np.minimum, "max": np.maximum,
+}
+_OPERATORS: Mapping[type[ast.operator], Callable[[Real, Real], Real]] = {
+    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Pow: np.power,
+}
+LONGEST = 2000
+_UNREADABLE = ("a text that cannot be read", 'an expression such as "0.1*sin(2*pi*t)"')
+
+
+class ExpressionError(ValueError):
+    """A text that is no expression. found: what is wrong and where in the text; expected: what may stand there."""
+
+    def __init__(self, found: str, expected: str) -> None:
+        self.found = found
+        self.expected = expected
+        super().__init__(f"found {found}; expected {expected}")
+
+
+def evaluate_expression(text: str, **variables: ArrayLike) -> Real:
+    """The values of an expression, in the common shape of the variables (arrays or numbers).
+
+    Numbers, + - * / **, parentheses, pi, e, the variables and the functions above; an operation without a value in real
+    numbers gives nan or inf. Raises ExpressionError where the text is anything else.
+    """
+    arrays = {name: np.asarray(value, dtype=float) for name, value in variables.items()}
+    shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    tree = _parse(text)
+    try:
+        with np.errstate(all="ignore"):
+            value = _Evaluation(text, arrays).evaluate(tree)
+    except RecursionError:
+        raise ExpressionError(*_UNREADABLE) from None
+    return np.array(np.broadcast_to(value, shape))
+
+
+def _parse(text: str) -> ast.expr:
+    if len(text) > LONGEST:
+        raise ExpressionError(f"a text of {len(text)} characters", f"at most {LONGEST}")
+    try:
+        return ast.parse(_straighten(text), mode="eval").body
+    except SyntaxError as error:
+        at = (error.offset or 1) - 1 + len(text) - len(text.lstrip())
+        where = "at its end" if at >= len(text.rstrip()) else f"at character {at + 1} ('{text[at:at + 12]}')"
+        raise ExpressionError(f'"{text}", which breaks off {where}', _UNREADABLE[1]) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise ExpressionError(*_UNREADABLE) from None
+
+
+def _straighten(text: str) -> str:
+    """One line without spaces before it, as Python wants an expression."""
+    return "".join(" " if character.isspace() else character for character in text).strip()
+
+
+class _Evaluation:
+    """Walks down the tree of an expression; whatever is not named here is refused."""
+
+    def __init__(self, text: str, variables: Mapping[str, Real]) -> None:
+        self.text = text
+        self.variables = variables
+
+    def evaluate(self, node: ast.expr) -> Real:
+        match node:
+            case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
+                return self._number(node, value)
+            case ast.Name(id=name):
+                return self._look_up(node, name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return -self.evaluate(operand)
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.evaluate(operand)
+            case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
+                return _OPERATORS[type(operator)](self.evaluate(left), self.evaluate(right))
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(node, name, arguments)
+            case ast.BinOp(op=ast.BitXor()):
+                raise self._refuse(node, "'^'", "'**' for a power")
+        raise self._refuse(node, "a piece that is no arithmetic", "numbers, names, + - * / ** and functions")
+
+    def _number(self, node: ast.expr, value: float) -> Real:
+        try:
+            return np.array(float(value))
+        except OverflowError:
+            raise self._refuse(node, "a number of too many digits", "a number to compute with") from None
+
+    def _look_up(self, node: ast.expr, name: str) -> Real:
+        if name in self.variables:
+            return self.variables[name]
+        if name in CONSTANTS:
+            return np.array(CONSTANTS[name])
+        known = ", ".join([*self.variables, *CONSTANTS])
+        if name in FUNCTIONS or name in FUNCTIONS_OF_TWO:
+            raise self._refuse(node, f"the function '{name}' without its argument", f"{name}(...)")
+        raise self._refuse(node, f"the unknown name '{name}'", f"one of: {known}")
+
+    def _call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Real:
+        wanted = 1 if name in FUNCTIONS else 2 if name in FUNCTIONS_OF_TWO else 0
+        if not wanted:
+            known = ", ".join([*FUNCTIONS, *FUNCTIONS_OF_TWO])
+            raise self._refuse(node, f"the unknown function '{name}'", f"one of: {known}")
+        if len(arguments) != wanted:
+            found = f"{name} with {len(arguments)} argument{'s' if len(arguments) != 1 else ''}"
+            raise self._refuse(node, found, f"{wanted} in its parentheses")
+        values = [self.evaluate(argument) for argument in arguments]
+        return FUNCTIONS[name](values[0]) if wanted == 1 else FUNCTIONS_OF_TWO[name](values[0], values[1])
+
+    def _refuse(self, node: ast.expr, what: str, expected: str) -> ExpressionError:
+        """Name the place by its character, counted from 1; the tree counts bytes."""
+        before = _straighten(self.text).encode()[: node.col_offset].decode(errors="ignore")
+        at = len(self.text) - len(self.text.lstrip()) + len(before)
+        return ExpressionError(f'{what} at character {at + 1} of "{self.text}"', expected)

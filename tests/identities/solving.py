@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.laws import ModeState, PairState, linearise, start_modes
+from pbem.contact.laws import ModeState, PairState, start_memory
+from pbem.contact.modes import Linearisation, linearise
 from pbem.exact import PlaneField
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -26,14 +27,21 @@ def march_to_end(model: Model) -> tuple[Mesh, list[Step]]:
     return mesh, list(march(assemble_problem(model, mesh, world), SilentReporter()))
 
 
+def linearise_pairs(
+    problem: Problem, modes: ModeState | None = None, p_n: Real | float = 0.0, slip: Real | float = 0.0,
+    factor: float = 0.0,
+) -> Linearisation:
+    """The laws in given modes at the normal tractions p_n, after an earlier slip, with the first stage's pressure."""
+    none = np.zeros(problem.mesh.pairs.count)
+    memory = replace(start_memory(problem.laws), slip=none + slip)
+    pressure = problem.evaluate_load(0, factor).pressure
+    scale = problem.traction_scale
+    return linearise(problem.laws, modes or memory.modes, none + p_n, memory.slip, memory, pressure, scale)
+
+
 def assemble_tangent(problem: Problem, modes: ModeState | None = None) -> Real:
     """K = B M (2 nodes, 2 nodes) for given modes, by default those before any load."""
-    count = problem.mesh.pairs.count
-    law = linearise(
-        problem.laws, modes or start_modes(problem.laws), np.zeros(count), np.zeros(count), np.zeros(count),
-        problem.traction_scale,
-    )  # fmt: skip
-    constraints = problem.constrain(law, problem.evaluate_load(0, 0.0))
+    constraints = problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 0.0))
     tangent = np.zeros((problem.unknowns, problem.unknowns))
     for block, columns in zip(problem.operator.blocks, problem.block_columns, strict=True):
         tangent[np.ix_(block.rows, columns)] = problem.operator.multiply_block(block, constraints.matrix, columns)
@@ -57,10 +65,7 @@ def solve_for_field(model: Model, exact: PlaneField) -> tuple[Mesh, Real]:
     fields = exact.displacement(position), exact.traction(position, normal)
     components = [(np.conj(outer.direction) * values[:, None]).real for values in fields]
     load = replace(problem.evaluate_load(0, 0.0), values=np.where(outer.displacement_known, *components))
-    law = linearise(
-        problem.laws, start_modes(problem.laws), np.zeros(0), np.zeros(0), np.zeros(0), problem.traction_scale
-    )
-    constraints = problem.constrain(law, load)
+    constraints = problem.constrain(linearise_pairs(problem), load)
     unknowns = np.linalg.solve(assemble_tangent(problem), -problem.apply(constraints.offset, load))
     return mesh, constraints.evaluate(unknowns)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.operator import assemble_rows
 from pbem.contact.constraints import evaluate_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, linearise
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.loads import collect_outer_nodes, evaluate_load, find_needed_columns
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -17,6 +17,7 @@ from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.solve.problem import Problem, assemble_problem
 from tests.identities.bodies import ROCK, Body, mesh_body
+from tests.identities.solving import linearise_pairs
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -60,7 +61,7 @@ def draw_state(problem: Problem, seed: int, factor: float = 1.0) -> tuple[Real, 
     modes = ModeState(random.integers(0, 3, count).astype(np.int8), random.choice([-1.0, 1.0], count))
     slip = random.normal(size=count)
     load = problem.evaluate_load(0, factor)
-    law = linearise(problem.laws, modes, -random.random(count), slip, load.pressure, problem.traction_scale)
+    law = linearise_pairs(problem, modes, -random.random(count), slip, factor)
     x = random.normal(size=problem.unknowns)
     return x, problem.constrain(law, load).evaluate(x), modes, slip
 
@@ -112,9 +113,7 @@ def test_faces_are_in_equilibrium_and_obey_their_law(problem: Problem) -> None:
     np.testing.assert_allclose(p_n[kind == OPEN], -np.where(joint, PRESSURE, 0.0)[kind == OPEN], atol=1e-14)
     np.testing.assert_allclose(p_s[kind == OPEN], 0, atol=1e-14)
     # the same as the laws themselves say, without the map
-    load = problem.evaluate_load(0, 1.0)
-    law = linearise(problem.laws, modes, -np.ones(pairs.count), slip, load.pressure, problem.traction_scale)
-    state = evaluate_pairs(mesh, law, x)
+    state = evaluate_pairs(mesh, linearise_pairs(problem, modes, -1.0, slip, 1.0), x)
     for found, expected in ((p_n, state.p_n), (p_s, state.p_s), (g_n, state.g_n), (g_s, state.g_s)):
         np.testing.assert_allclose(found, expected, atol=1e-13)
 
@@ -123,8 +122,7 @@ def test_every_unknown_counts_and_none_counts_twice(problem: Problem) -> None:
     count = problem.mesh.pairs.count
     for mode in (STICK, SLIP, OPEN):
         modes = ModeState(np.full(count, mode), np.ones(count))
-        load = problem.evaluate_load(0, 1.0)
-        law = linearise(problem.laws, modes, -np.ones(count), np.zeros(count), load.pressure, problem.traction_scale)
+        law, load = linearise_pairs(problem, modes, -1.0), problem.evaluate_load(0, 1.0)
         matrix = problem.constrain(law, load).matrix.toarray()
         matrix[2 * problem.mesh.nodes :] /= problem.traction_scale
         singular = np.linalg.svd(matrix, compute_uv=False)
@@ -137,8 +135,7 @@ def test_columns_outside_the_blocks_are_never_touched(problem: Problem) -> None:
     for seed in range(3):
         random = np.random.default_rng(seed)
         modes = ModeState(random.integers(0, 3, count).astype(np.int8), np.ones(count))
-        load = problem.evaluate_load(0, 1.0)
-        law = linearise(problem.laws, modes, -np.ones(count), np.zeros(count), load.pressure, problem.traction_scale)
+        law, load = linearise_pairs(problem, modes, -1.0), problem.evaluate_load(0, 1.0)
         matrix = problem.constrain(law, load).matrix
         for block, columns in zip(problem.operator.blocks, problem.block_columns, strict=True):
             left_out = np.setdiff1d(np.arange(problem.unknowns), columns)

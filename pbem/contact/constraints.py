@@ -88,32 +88,30 @@ def _constrain_outer_nodes(
 
 
 def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation) -> None:
-    pairs = mesh.pairs
+    """The slot node follows the other side but for the jump; the other side carries the opposite of its traction."""
+    pairs, links = mesh.pairs, mesh.links
     n, s = pairs.normal, 1j * pairs.normal
-    crack, joint = pairs.crack, ~pairs.crack
-    constant_jump = (law.offset[:, G_N] - gap) * n + law.offset[:, G_S] * s
-    constant_traction = law.offset[:, P_N] * n + law.offset[:, P_S] * s
+    givers = links.traction_pair
+    constant_jump = pairs.sense * ((law.offset[:, G_N] - gap) * n + law.offset[:, G_S] * s)
+    constant_traction = -pairs.sense * (law.offset[:, P_N] * n + law.offset[:, P_S] * s)
     for k in range(2):
-        unknown = 2 * pairs.second + k
-        jump = law.tangent[:, G_N, k] * n + law.tangent[:, G_S, k] * s
-        traction = law.tangent[:, P_N, k] * n + law.tangent[:, P_S, k] * s
-        entries.add(TRACTION, pairs.first, unknown, traction)
-        entries.add(TRACTION, pairs.second[joint], unknown[joint], -traction[joint])
-        entries.add(DISPLACEMENT, pairs.second[joint], unknown[joint], jump[joint])
-        entries.add(DISPLACEMENT, pairs.first[crack], unknown[crack], -jump[crack])
-        common = 2 * pairs.first[joint] + k
-        along = np.full(len(common), 1j**k)
-        entries.add(DISPLACEMENT, pairs.first[joint], common, along)
-        entries.add(DISPLACEMENT, pairs.second[joint], common, along)
-    offset[TRACTION, pairs.first] += constant_traction
-    offset[TRACTION, pairs.second[joint]] -= constant_traction[joint]
-    offset[DISPLACEMENT, pairs.second[joint]] += constant_jump[joint]
-    offset[DISPLACEMENT, pairs.first[crack]] -= constant_jump[crack]
+        unknown = 2 * pairs.slot + k
+        jump = pairs.sense * (law.tangent[:, G_N, k] * n + law.tangent[:, G_S, k] * s)
+        traction = -pairs.sense * (law.tangent[:, P_N, k] * n + law.tangent[:, P_S, k] * s)
+        entries.add(DISPLACEMENT, pairs.slot, unknown, jump)
+        entries.add(TRACTION, pairs.slot, unknown, traction)
+        entries.add(TRACTION, links.traction_node, unknown[givers], -links.traction_weight * traction[givers])
+        entries.add(DISPLACEMENT, links.carrier, 2 * links.carrier + k, np.full(len(links.carrier), 1j**k))
+        follower = pairs.slot[links.displacement_pair]
+        entries.add(DISPLACEMENT, follower, 2 * links.displacement_node + k, links.displacement_weight * 1j**k)
+    offset[DISPLACEMENT, pairs.slot] += constant_jump
+    offset[TRACTION, pairs.slot] += constant_traction
+    np.subtract.at(offset[TRACTION], links.traction_node, links.traction_weight * constant_traction[givers])
 
 
 def read_pair_unknowns(mesh: Mesh, unknowns: Real) -> Real:
     """The two unknowns (m, 2) of every pair's mode, from x (2 nodes,)."""
-    return unknowns.reshape(-1, 2)[mesh.pairs.second]
+    return unknowns.reshape(-1, 2)[mesh.pairs.slot]
 
 
 def evaluate_pairs(mesh: Mesh, law: Linearisation, unknowns: Real) -> PairState:

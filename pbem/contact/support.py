@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pbem.contact.laws import OPEN, STICK, ModeState
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, resists_slip
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.support import Tie, find_free_motions
@@ -25,3 +26,23 @@ def describe_free_motions(model: Model, ties: dict[str, Tie], anchored: int) -> 
     """The rigid motions that come free with these ties, in words; None if there are no more than were anchored."""
     motions = find_free_motions(model, ties)
     return "; ".join(motion.text for motion in motions) if len(motions) > anchored else None
+
+
+# Pairs of each parted interface that are closed to hold a body that would be free.
+CLOSED_AT_LEAST = 3
+
+
+def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: NDArray[np.float64]) -> ModeState:
+    """Modes with the nearest pairs of every wholly open interface closed, for a body that is free otherwise.
+
+    A body that is pressed against another one by forces alone has no equilibrium until they touch somewhere; opening
+    (m,): the present openings.
+    """
+    mode = modes.mode.copy()
+    closed = np.where(resists_slip(laws), STICK, SLIP)
+    for number in range(len(mesh.interface_names)):
+        own = np.flatnonzero((mesh.pairs.interface == number) & ~laws.parted & ~mesh.pairs.crack)
+        if len(own) and np.all(mode[own] == OPEN):
+            nearest = own[np.argsort(opening[own], kind="stable")[:CLOSED_AT_LEAST]]
+            mode[nearest] = closed[nearest]
+    return ModeState(mode, modes.sign)

@@ -34,6 +34,9 @@ class Elements:
     def reverse(self) -> Elements:
         return Elements(self.end[::-1], self.start[::-1], self.center[::-1], -self.sweep[::-1])
 
+    def select(self, numbers: NDArray[np.int64]) -> Elements:
+        return Elements(self.start[numbers], self.end[numbers], self.center[numbers], self.sweep[numbers])
+
     @property
     def lengths(self) -> Real:
         radius = np.abs(self.start - self.center)
@@ -51,12 +54,24 @@ class Elements:
         outward = np.sign(self.sweep)[:, None] * radii / np.where(radii == 0, 1, np.abs(radii))
         return np.where(self.sweep[:, None] == 0, -1j * direction[:, None], outward)
 
-    def weights(self, local: Real) -> Real:
-        """Weights (m, p) that integrate a traction along the element's length from its values at the nodes."""
+    def stretch(self, local: Real) -> Real:
+        """Length of the element per unit of s (m, p) at the coordinates s."""
         straight = 0.5 * np.abs(self.end - self.start)[:, None]
         tangent = self._quarter_tangents()[:, None]
         jacobian = 2 * np.abs(self.start - self.center)[:, None] * np.abs(tangent) / (1 + (tangent * local) ** 2)
-        return np.where(self.sweep[:, None] == 0, straight, jacobian) * integrate_shapes(local)
+        return np.where(self.sweep[:, None] == 0, straight, jacobian)
+
+    def weights(self, local: Real) -> Real:
+        """Weights (m, p) that integrate a traction along the element's length from its values at the nodes."""
+        return self.stretch(local) * integrate_shapes(local)
+
+    def locate(self, points: Complex) -> Real:
+        """Coordinate s at which the normal of a single element passes each of the points (k,)."""
+        half, middle = 0.5 * (self.end - self.start), 0.5 * (self.end + self.start)
+        if self.sweep[0] == 0:
+            return ((points - middle) / half).real
+        apex = (self.start - self.center) * np.exp(0.5j * self.sweep)
+        return np.tan(0.5 * np.angle((points - self.center) / apex)) / self._quarter_tangents()
 
     def arc_lengths(self, local: Real) -> Real:
         """Length (m, p) from the first element's start to the points at s."""

@@ -32,6 +32,9 @@ def _asks_traction_equation(model: Model, region: Region, curve: str) -> bool:
     scheme = model.analysis.scheme
     if scheme in ("SST", "THST"):
         return scheme == "THST"
+    for contact in model.contacts.values():
+        if curve in (contact.first, contact.second):
+            return scheme == "HST" or curve == contact.second
     interface = model.interfaces.get(curve)
     if interface is None:
         return False

@@ -3,32 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from pbem.mesh.chain import Chain
 from pbem.mesh.elements import Elements, divide_curve
 from pbem.mesh.equations import explain_exceptions, uses_traction_equation
-from pbem.mesh.mesh import Integer, Mesh, Pairs, Real
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.pairing import pair_nodes
 from pbem.mesh.shapes import place_nodes
-from pbem.model.model import Interface, Model, Region
-
-
-@dataclass(frozen=True)
-class Chain:
-    """The elements of one curve as one region sees it, in the order of travel (region on the left).
-
-    forward: travelled in the curve's own direction. traction: the traction equation is collocated on its nodes.
-    first_node: number of its first node in the mesh.
-    """
-
-    region: int
-    curve: str
-    forward: bool
-    crack: bool
-    traction: bool
-    elements: Elements
-    first_node: int
+from pbem.model.model import Model, Region
 
 
 def generate_mesh(model: Model) -> Mesh:
@@ -37,6 +21,7 @@ def generate_mesh(model: Model) -> Mesh:
     chains = _list_chains(model, len(local))
     counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
+    pairs, links = pair_nodes(model, chains, local)
 
     def repeat(values: list, dtype: type) -> np.ndarray:
         return np.repeat(np.array(values, dtype=dtype), counts)
@@ -59,10 +44,11 @@ def generate_mesh(model: Model) -> Mesh:
         normal=join(lambda elements: np.broadcast_to(elements.normals(local), (elements.count, len(local)))),
         weight=join(lambda elements: elements.weights(local)),
         traction_equation=np.repeat(repeat([chain.traction for chain in chains], np.bool_), len(local)),
-        pairs=_pair_nodes(model, chains, local),
+        pairs=pairs,
+        links=links,
         region_names=tuple(region.name for region in model.regions),
         curve_names=curve_names,
-        interface_names=tuple(model.interfaces),
+        interface_names=(*model.interfaces, *model.contacts),
         notes=explain_exceptions(model),
     )
 
@@ -98,52 +84,3 @@ def _mark_tips(model: Model, chain: Chain) -> np.ndarray:
         if at_end:
             tips[-1] = 2
     return tips
-
-
-def _pair_nodes(model: Model, chains: list[Chain], local: Real) -> Pairs:
-    """Pair the nodes of the two sides of every interface, in the order of the curve's direction."""
-    sides = {(chain.curve, model.regions[chain.region].name): chain for chain in chains}
-    columns: dict[str, list[np.ndarray]] = {
-        "interface": [], "first": [], "second": [], "crack": [],
-        "position": [], "normal": [], "arc_length": [], "weight": [], "distance": [],
-    }  # fmt: skip
-    for number, interface in enumerate(model.interfaces.values()):
-        chain = sides[interface.name, interface.first]
-        first = _number_nodes(chain, local)
-        elements = chain.elements if chain.forward else chain.elements.reverse()
-        outward = elements.normals(local) if chain.forward else -elements.normals(local)
-        entry = {
-            "interface": np.full(len(first), number),
-            "first": first,
-            "second": first if interface.second is None else _number_opposite(sides, interface, local),
-            "crack": np.full(len(first), interface.second is None),
-            "position": elements.place(local),
-            "normal": np.broadcast_to(outward, (elements.count, len(local))),
-            "arc_length": elements.arc_lengths(local),
-            "weight": elements.weights(local),
-            "distance": np.zeros(len(first)),
-        }
-        for key, values in entry.items():
-            columns[key].append(values.ravel())
-    types: dict[str, type] = {"position": np.complex128, "normal": np.complex128, "crack": np.bool_}
-    types |= {"interface": np.int64, "first": np.int64, "second": np.int64}
-    return Pairs(
-        **{
-            key: np.concatenate([np.zeros(0), *parts]).astype(types.get(key, np.float64))
-            for key, parts in columns.items()
-        }
-    )
-
-
-def _number_opposite(sides: dict[tuple[str, str], Chain], interface: Interface, local: Real) -> Integer:
-    assert interface.second is not None
-    return _number_nodes(sides[interface.name, interface.second], local)
-
-
-def _number_nodes(chain: Chain, local: Real) -> Integer:
-    return _follow_curve(chain, chain.first_node + np.arange(chain.elements.count * len(local)))
-
-
-def _follow_curve(chain: Chain, values: np.ndarray) -> np.ndarray:
-    """Values at a chain's nodes in the order of the curve's own direction."""
-    return values if chain.forward else values[::-1]

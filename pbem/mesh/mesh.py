@@ -18,7 +18,10 @@ class Pairs:
     """Contact pairs of all interfaces and cracks, m in all; those of one interface are neighbours, by arc length.
 
     interface (m,): index into Mesh.interface_names; first, second (m,): the two nodes. The pair of a crack has only
-    one node, whose unknown displacement is the jump u_r - u_l: there second = first and crack is True.
+    one node, whose unknown displacement is the jump u_r - u_l: there second = first and crack is True. Between curves
+    with different meshes `second` is the nearest node of the element that the first node faces.
+    slot (m,): the node that follows the other side and owns the pair's two unknowns; sense (m,): +1 if that is the
+    second, -1 if it is the first.
     position, normal (m,): complex; normal is outward of the first side. arc_length (m,): from the curve's first point.
     weight (m,): integration weight (length) of the pair's node. distance (m,): of the second side along the normal,
     zero on interfaces and cracks.
@@ -27,7 +30,9 @@ class Pairs:
     interface: Integer
     first: Integer
     second: Integer
+    slot: Integer
     crack: Bool
+    sense: Real
     position: Complex
     normal: Complex
     arc_length: Real
@@ -37,6 +42,24 @@ class Pairs:
     @property
     def count(self) -> int:
         return len(self.interface)
+
+
+@dataclass(frozen=True)
+class Links:
+    """What the two sides of the pairs take from each other, as lists of weights.
+
+    carrier (k,): nodes whose displacement is their own unknown. The displacement of a pair's slot node is the jump plus
+    the sum of displacement_weight times the displacement of displacement_node over displacement_pair (l,);
+    traction_node carries minus the sum of traction_weight times the slot node's traction over traction_pair (r,).
+    """
+
+    carrier: Integer
+    displacement_pair: Integer
+    displacement_node: Integer
+    displacement_weight: Real
+    traction_pair: Integer
+    traction_node: Integer
+    traction_weight: Real
 
 
 @dataclass(frozen=True)
@@ -69,6 +92,7 @@ class Mesh:
     weight: Real
     traction_equation: Bool
     pairs: Pairs
+    links: Links
     region_names: tuple[str, ...]
     curve_names: tuple[str, ...]
     interface_names: tuple[str, ...]

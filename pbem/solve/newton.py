@@ -20,7 +20,7 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.support import find_ties
+from pbem.contact.support import close_nearest_pairs, find_ties
 from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem, Tangent
 from pbem.solve.step import Iteration, Reporter
@@ -66,7 +66,8 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
     Raises ConvergenceError: "free motion", "mode cycle", "iteration limit", "singular tangent", "linear solver".
     """
     laws = problem.laws
-    modes, normal_traction, slip = memory.modes, memory.normal_traction, memory.slip
+    modes = _hold_free_bodies(problem, memory.modes, laws.gap)
+    normal_traction, slip = memory.normal_traction, memory.slip
     search = _Search(problem.model.solver.newton_max_iterations, modes)
     iterations: list[Iteration] = []
     while True:
@@ -87,9 +88,17 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
         if settled and not failing.any():
             _refuse_free_motion(problem, modes)
             return Solution(unknowns, v, pairs, modes, memory, residual, tuple(iterations))
-        modes = limit_changes(modes, proposal, search.caution.share)
+        modes = _hold_free_bodies(problem, limit_changes(modes, proposal, search.caution.share), pairs.g_n)
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
         search.note(problem, modes, proposal)
+
+
+def _hold_free_bodies(problem: Problem, modes: ModeState, opening: Real) -> ModeState:
+    """The modes, with the nearest pairs closed where a body would be free to move."""
+    ties = find_ties(problem.model, problem.mesh, modes)
+    if not problem.free_motions(tuple(ties.items())):
+        return modes
+    return close_nearest_pairs(problem.mesh, problem.laws, modes, opening)
 
 
 class _Search:
@@ -113,11 +122,13 @@ class _Search:
         self.count += 1
         if proposal.changed.any() and modes.fingerprint() in self.seen:
             if self.level == len(CAUTIONS) - 1:
+                _refuse_free_motion(problem, proposal.modes)
                 raise ConvergenceError("mode cycle", _describe_changes(problem, proposal))
             self.level += 1
             self.seen.clear()
         self.seen.add(modes.fingerprint())
         if self.count == self.most:
+            _refuse_free_motion(problem, proposal.modes)
             raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
 
 

@@ -121,6 +121,7 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     crack_nodes = np.flatnonzero(mesh.node_crack)
     shares = np.linspace(0, len(crack_nodes), comm.size + 1).astype(int)
     own_cracks = crack_nodes[shares[comm.rank] : shares[comm.rank + 1]]
+    unknowns = find_unknowns_of_regions(mesh, outer, evaluate_load(model, mesh, outer, 0, 1.0))
     modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
     return Problem(
         comm=comm,
@@ -134,18 +135,20 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
         traction_scale=modulus / model.size,
         equation_scale=scale_equations(mesh, materials, model.size),
         anchors=anchors,
-        block_columns=tuple(find_unknowns_of_region(mesh, outer, block.region) for block in operator.blocks),
+        block_columns=tuple(unknowns[block.region] for block in operator.blocks),
     )
 
 
-def find_unknowns_of_region(mesh: Mesh, outer: OuterNodes, region: int) -> Integer:
-    """Unknowns, in rising order, on which a region's displacements and tractions can depend in any mode."""
-    own = mesh.node_region == region
-    pairs = mesh.pairs
-    touching = own[pairs.first] | own[pairs.second]
-    nodes = np.unique(np.concatenate([outer.node[own[outer.node]], pairs.first[touching], pairs.second[touching]]))
-    columns: Integer = (2 * nodes[:, None] + np.arange(2)).ravel()
-    return columns
+def find_unknowns_of_regions(mesh: Mesh, outer: OuterNodes, load: Load) -> list[Integer]:
+    """Unknowns, in rising order, on which each region's displacements and tractions can depend in any mode."""
+    # A law that depends on everything has the entries of all modes at once.
+    everything = np.tile(1 + 0.1 * np.arange(8.0).reshape(4, 2), (mesh.pairs.count, 1, 1))
+    law = Linearisation(everything, np.zeros((mesh.pairs.count, 4)))
+    matrix = build_constraints(mesh, outer, np.zeros(mesh.pairs.count), law, load, 1.0).matrix
+    region_of_row = np.tile(np.repeat(mesh.node_region, 2), 2)
+    return [
+        np.unique(matrix[np.flatnonzero(region_of_row == region)].indices) for region in range(len(mesh.region_names))
+    ]
 
 
 class Tangent:

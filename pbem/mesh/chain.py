@@ -1,0 +1,34 @@
+"""The elements of one curve as one region sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.elements import Elements
+
+Integer = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The elements of one curve in a region's order of travel (region on the left).
+
+    forward: travelled in the curve's own direction. traction: the traction equation is collocated on its nodes.
+    first_node: number of its first node in the mesh.
+    """
+
+    region: int
+    curve: str
+    forward: bool
+    crack: bool
+    traction: bool
+    elements: Elements
+    first_node: int
+
+    def number_nodes(self, per_element: int) -> Integer:
+        """Numbers of its nodes in the order of the curve's own direction."""
+        numbers = self.first_node + np.arange(self.elements.count * per_element)
+        return numbers if self.forward else numbers[::-1]

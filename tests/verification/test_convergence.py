@@ -20,7 +20,8 @@ Real = NDArray[np.float64]
 CORNERS = [0j, 2 + 0.2j, 1.8 + 1.4j, -0.1 + 1.1j]
 FIELD = exponential_field(ROCK.kappa, ROCK.shear_modulus, (0.3 + 0.2j) * ROCK.shear_modulus, 1.1 - 0.6j)
 # Known: both displacements, both tractions, and one of each in both frames. The values come from the field.
-BOTTOM, RIGHT, TOP, LEFT = {"ux": 1.0, "uy": 1.0}, {"tx": 1.0, "ty": 1.0}, {"un": 1.0, "ts": 1.0}, {"ux": 1.0, "ty": 1.0}
+BOTTOM, RIGHT = {"ux": 1.0, "uy": 1.0}, {"tx": 1.0, "ty": 1.0}
+TOP, LEFT = {"un": 1.0, "ts": 1.0}, {"ux": 1.0, "ty": 1.0}
 
 
 def make_quadrilateral(elements: int, order: int, scheme: str) -> Body:
@@ -42,7 +43,8 @@ def make_halves(elements: int, order: int, scheme: str) -> Body:
     lower, upper = ["bottom", "right", "joint", "left"], ["joint", "right2", "top", "left2"]
     regions = {"lower": (ROCK, lower), "upper": (ROCK, upper)}
     conditions = {"bottom": BOTTOM, "right": RIGHT, "right2": RIGHT, "top": TOP, "left": LEFT, "left2": LEFT}
-    return Body(curves, regions, conditions, {"joint": {"law": "bonded"}}, elements=elements, order=order, scheme=scheme)
+    laws = {"joint": {"law": "bonded"}}
+    return Body(curves, regions, conditions, laws, elements=elements, order=order, scheme=scheme)
 
 
 def measure_errors(body: Body) -> Real:

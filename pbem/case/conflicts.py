@@ -117,6 +117,23 @@ def _check_condition(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     local = [key for key in LOCAL_KEYS if key in table]
     if in_axes and local:
         findings.append(Finding((*loc, local[0]), f"{in_axes[0]} together with {local[0]}", ONE_FAMILY))
+    return findings + _check_spring(loc, table, in_axes)
+
+
+def _check_spring(loc: Loc, table: Mapping[str, Any], in_axes: Sequence[str]) -> list[Finding]:
+    """A spring acts along the normal and the curve, where nothing else says what moves."""
+    spring = table.get("spring")
+    if not isinstance(spring, dict):
+        return []
+    findings = []
+    if in_axes:
+        expected = "local conditions beside a spring (tn, ts or pressure, or un or us where it has no stiffness)"
+        findings.append(Finding((*loc, "spring"), f"{in_axes[0]} together with spring", expected))
+    if all(type(value) in (int, float) and value == 0 for value in (spring.get("kn", 0), spring.get("ks", 0))):
+        findings.append(Finding((*loc, "spring"), "a spring without stiffness", "kn > 0 or ks > 0"))
+    for key, displacement in (("kn", "un"), ("ks", "us")):
+        if displacement in table and spring.get(key):
+            findings.append(Finding((*loc, displacement), f"both spring.{key} and {displacement}", "only one of them"))
     return findings
 
 

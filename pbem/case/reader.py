@@ -104,9 +104,7 @@ def parse_draft(text: str, source: str = "case") -> Draft:
     )
     separable = all(refusal.separable for refusal, _ in refusals)
     case = _compose_draft(raw, every, text, source, lines) if separable else None
-    touched = {finding.loc[0] for finding in findings if finding.loc}
-    known = not touched & {"boundary", "interfaces", "stages"} and touched <= set(CaseFile.model_fields)
-    return Draft(case, faults, known)
+    return Draft(case, faults, not any(_concerns_loads(finding.loc) for finding in findings))
 
 
 def _refuse_syntax(message: str) -> Draft:
@@ -115,6 +113,14 @@ def _refuse_syntax(message: str) -> Draft:
     place = at[1] if at else "the file"
     found = f"text that is not TOML: {found[:1].lower() + found[1:]}"
     return _refuse(place, found, "a TOML file (key = value, [table])")
+
+
+def _concerns_loads(loc: Loc) -> bool:
+    """Whether a fault here leaves open what holds and what loads the bodies."""
+    if loc and loc[0] == "materials":
+        return loc[-1] == "density"
+    return bool(loc) and (loc[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
+                          loc[0] not in CaseFile.model_fields)
 
 
 def _touches(loc: Loc, wrong: set[Loc]) -> bool:

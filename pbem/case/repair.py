@@ -37,6 +37,10 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
     if table == "materials" and key in _STAND_INS:
         raw["materials"][loc[1]][key] = _STAND_INS[key]
         return True
+    if table == "materials" and key == "density":
+        raw.pop("gravity", None)  # what weighs on what is unknown
+        for stage in raw.get("stages", ()):
+            stage.pop("gravity", None)
     if table == "interfaces" and key == "law":
         raw["interfaces"][loc[1]][key] = "coulomb"  # the law that all other keys go with
         return True
@@ -52,7 +56,7 @@ def _patch_elements(raw: dict[str, Any], loc: Loc) -> bool:
         return False
     curve.pop("size", None)
     points = curve.get("points")
-    curve["elements"] = 4 + (len(points) if isinstance(points, list) else 0)
+    curve["elements"] = 64 + (len(points) if isinstance(points, list) else 0)
     return True
 
 

@@ -133,7 +133,7 @@ class SpringTable(Table):
     ks: NotNegative = 0.0
 
 
-class ConditionTable(Table):
+class StageConditionTable(Table):
     """Displacement or traction in two directions; what is not given is free of traction."""
 
     ux: Number | None = None
@@ -145,7 +145,12 @@ class ConditionTable(Table):
     tn: Number | None = None
     ts: Number | None = None
     pressure: Number | None = Field(None, description="tn = -pressure, ts = 0")
-    spring: SpringTable | None = None
+
+
+class ConditionTable(StageConditionTable):
+    """Displacement or traction in two directions, and springs in place of displacements."""
+
+    spring: SpringTable | None = Field(None, description="adds -kn un to tn and -ks us to ts, through all stages")
 
 
 class ExpressionTable(Table):
@@ -198,7 +203,7 @@ class AnalysisTable(Table):
 
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: Annotated[int, Field(strict=True, ge=0, le=3)] = 2
-    tips: Flag | None = Field(None, description="crack-tip elements with the square-root shape")
+    tips: Flag = Field(True, description="crack-tip elements with the square-root shape")
     steps: Count = Field(10, description="load steps; ignored when [[stages]] is given")
 
 
@@ -213,7 +218,7 @@ class StageTable(Table):
 
     name: Text | None = None
     steps: Count = 10
-    boundary: Mapping[str, ConditionTable] = {}
+    boundary: Mapping[str, StageConditionTable] = {}
     interfaces: Mapping[str, StageInterfaceTable] = {}
     remote: StressTable | None = None
     gravity: GravityTable | None = None

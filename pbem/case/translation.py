@@ -49,7 +49,10 @@ def _translate(details: ErrorDetails) -> Finding:
     if kind == "extra_forbidden":
         known = known_keys(loc[:-1])
         found = f"unknown key '{loc[-1]}'{suggest(str(loc[-1]), known)}"
-        return Finding(loc, found, f"one of: {list_names(sorted(known), 40)}")
+        expected = f"one of: {list_names(sorted(known), 40)}"
+        if loc[0] == "stages" and str(loc[-1]) in known_keys(loc[2:-1]):
+            expected += f" ({loc[-1]} cannot change: it is told in [{format_place(loc[2:-1])}])"
+        return Finding(loc, found, expected)
     if kind == "missing":
         if isinstance(loc[-1], int):
             return Finding(loc[:-1], show(value), f"at least {loc[-1] + 1} entries")

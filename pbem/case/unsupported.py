@@ -9,11 +9,6 @@ from typing import Any
 from pbem.case.finding import Finding
 from pbem.case.places import Loc
 
-# Crack-tip elements if the file does not say.
-TIPS_BY_DEFAULT = False
-# Finite bodies under balanced tractions alone (their rigid motion has to be fixed by the solver).
-FREE_BODIES = False
-
 
 def _given(value: object) -> bool:
     return True
@@ -41,23 +36,14 @@ class Refusal:
 
 
 REFUSALS = (
-    Refusal("regions.*.infinite", "an infinite region", _true, separable=False),
-    Refusal("remote", "remote stress"),
-    Refusal("gravity", "gravity"),
-    Refusal("initial_stress", "initial stress"),
     Refusal("contacts", "contact between different curves", separable=False),
     Refusal("curves.*.expression", "a curve given by an expression", separable=False),
-    Refusal("boundary.*.spring", "a spring support", separable=False),
     Refusal("interfaces.*.gap", "a gap given by an expression", _table),
     Refusal("interfaces.*.cohesion_lost", "a bond that is lost", _true),
     Refusal("interfaces.*.friction_dynamic", "slip-weakening friction"),
     Refusal("interfaces.*.slip_distance", "slip-weakening friction"),
     Refusal("interfaces.*.normal_stiffness", "an elastic joint"),
     Refusal("interfaces.*.tangential_stiffness", "an elastic joint"),
-    Refusal("analysis.tips", "crack-tip elements", _true),
-    Refusal("stages.*.remote", "remote stress"),
-    Refusal("stages.*.gravity", "gravity"),
-    Refusal("stages.*.boundary.*.spring", "a spring support", separable=False),
     Refusal("output.interior", "output at interior points"),
     Refusal("output.points", "output at interior points"),
 )

@@ -1,14 +1,13 @@
-"""Resultants of the prescribed tractions on bodies that nothing holds."""
+"""Resultants of the prescribed tractions and the weight of bodies that nothing holds."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from pbem.model.junction import format_point
-from pbem.model.loop import side_legs
-from pbem.model.model import Condition, Model, Stage
+from pbem.model.loop import loop_legs, side_legs
+from pbem.model.model import Condition, Model, Region, Stage
+from pbem.model.sampling import leg_normals
 from pbem.model.support import FreeMotion
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
@@ -17,13 +16,14 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
 def describe_unbalance(model: Model, motion: FreeMotion) -> str | None:
-    """What drives a free motion: the first stage whose tractions do work on it, with their resultant; None if none."""
+    """What drives a free motion: the first stage whose loads do work on it, with their resultant; None if none."""
     for stage in model.stages:
         force, moment, power, scale = _sum_tractions(model, motion, stage)
         if abs(power) > BALANCED * scale:
             about = format_point(0j)
+            loads = "tractions and weight" if any(stage.gravity) else "tractions"
             return (
-                f"the tractions of stage '{stage.name}' drive it, with resultant ({force.real:.6g}, {force.imag:.6g}) "
+                f"the {loads} of stage '{stage.name}' drive it, with resultant ({force.real:.6g}, {force.imag:.6g}) "
                 f"and moment {moment:.6g} about {about}"
             )
     return None
@@ -39,22 +39,38 @@ def _sum_tractions(model: Model, motion: FreeMotion, stage: Stage) -> tuple[comp
         if region.name not in motion.velocities:
             continue
         a, spin = motion.velocities[region.name]
+        weight, lever = _weigh(model, region, stage)
+        force += weight
+        moment += float((np.conj(lever) * weight).imag)
+        power += float((np.conj(weight) * (a + 1j * spin * lever)).real)
+        scale += float(np.abs(weight) * (np.abs(a) + np.abs(spin * lever)))
         for side in (side for loop in region.loops for side in loop.sides):
             condition, values = _find_load(model, stage, side.curve)
             for leg in side_legs(model.curves, side):
                 points = leg.point(0.5 * (_NODES + 1))
-                if leg.center is None:
-                    normals = np.full(points.shape, -1j * leg.tangent(at_end=False))
-                else:
-                    normals = (points - leg.center) / np.abs(points - leg.center) * math.copysign(1.0, leg.sweep)
                 weights = 0.5 * _WEIGHTS * leg.length
-                tractions = _tractions(condition, values, normals) * weights
+                tractions = _tractions(condition, values, leg_normals(leg, points)) * weights
                 rates = (np.conj(tractions) * (a + 1j * spin * points)).real
                 force += complex(tractions.sum())
                 moment += float((np.conj(points) * tractions).imag.sum())
                 power += float(rates.sum())
                 scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
     return force, moment, power, scale
+
+
+def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex]:
+    """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops."""
+    if region.infinite or not any(stage.gravity):
+        return 0j, 0j
+    legs = loop_legs(model.curves, region.loops)
+    origin = legs[0].start
+    area, first_moment = 0.0, 0j
+    for leg in legs:
+        points = leg.point(0.5 * (_NODES + 1)) - origin
+        outward = leg_normals(leg, points + origin) * 0.5 * _WEIGHTS * leg.length
+        area += 0.5 * float((np.conj(points) * outward).real.sum())
+        first_moment += 0.5 * complex((np.abs(points) ** 2 * outward).sum())
+    return region.material.density * complex(*stage.gravity) * area, origin + first_moment / area
 
 
 def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[float, float]]:

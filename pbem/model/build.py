@@ -8,12 +8,11 @@ from pathlib import Path
 
 from pbem.case import Case, parse_draft, read_case_text
 from pbem.case.finding import list_names
-from pbem.case.unsupported import FREE_BODIES, TIPS_BY_DEFAULT
 from pbem.errors import CaseError, Fault
 from pbem.model.balance import describe_unbalance
-from pbem.model.crack import check_closing, check_inside, check_near_misses, find_tips
+from pbem.model.crack import check_closing, check_inside, check_near_misses, check_tip_elements, find_tips
 from pbem.model.curve import Curve
-from pbem.model.grading import grade_curves
+from pbem.model.grading import check_turning, grade_curves
 from pbem.model.junction import find_crossings, split_at_junctions
 from pbem.model.loading import Loading, read_loading
 from pbem.model.loop import Loops, find_loops, find_overlaps
@@ -66,8 +65,10 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
     if faults:
         return None, faults
     model = _compose(case, roles, loading, topology)
+    faults = check_turning(case, model.curves)
     if conditions_known:
-        faults, notes = _check_support(case, model)
+        wrong, notes = _check_support(case, model)
+        faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
     return model, faults
 
@@ -89,18 +90,19 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         faults += closing
         notes += cuts
     tips = find_tips(curves, cracks)
+    faults += check_tip_elements(case, curves, tips)
     return _Topology(curves, split.breaks, loops, tips, shapes.size, tuple(notes), tuple(faults))
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> Model:
-    tip_shape = TIPS_BY_DEFAULT if case.analysis.tips is None else case.analysis.tips
     behaviour: dict[str, Hashable] = {
-        name: (roles.outer[name], condition.frame, condition.known) for name, condition in loading.conditions.items()
+        name: (roles.outer[name], condition.frame, condition.known, condition.stiffness)
+        for name, condition in loading.conditions.items()
     }
     behaviour |= {
         name: (interface.first, interface.second, interface.law) for name, interface in loading.interfaces.items()
     }
-    with_tips = frozenset(roles.cracks) if tip_shape else frozenset()
+    with_tips = frozenset(roles.cracks) if case.analysis.tips else frozenset()
     curves, grading = grade_curves(case, topology.curves, topology.breaks, behaviour, with_tips)
     materials = {
         name: Material(name, table.young, table.poisson, table.plane, table.density)
@@ -114,40 +116,36 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source=case.text,
         regions=regions, curves=curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
-        analysis=Analysis(case.analysis.scheme, case.analysis.order, tip_shape),
+        analysis=Analysis(case.analysis.scheme, case.analysis.order, case.analysis.tips),
         solver=SolverOptions(
             case.solver.linear, case.solver.newton_tolerance, case.solver.newton_max_iterations, case.solver.min_step,
             dict(case.petsc),
         ),
         output_every=case.output.every, size=topology.size,
-        notes=(*topology.notes, *grading, *_note_choices(case, roles)),
+        notes=(*topology.notes, *grading, *_note_choices(case)),
+        initial_stress=loading.initial_stress,
     )
 
 
-def _note_choices(case: Case, roles: Roles) -> list[str]:
+def _note_choices(case: Case) -> list[str]:
     notes = []
     used = {table.material for table in case.regions.values()}
     unused = [f"'{name}'" for name in case.materials if name not in used]
     if unused:
         notes.append(f"Materials that no region uses: {list_names(unused)}.")
-    if roles.cracks and case.analysis.tips is None and not TIPS_BY_DEFAULT:
-        notes.append("Crack tips have ordinary elements (tips = false), as the file does not say.")
     return notes
 
 
 def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
-    faults, notes = [], []
+    faults, balanced = [], []
     for motion in find_free_motions(model):
         found = f"a free rigid motion ({motion.text})"
         unbalance = describe_unbalance(model, motion)
-        expected = "displacement conditions, or bonded or touching neighbours, that prevent it"
-        if unbalance:
-            found += f": {unbalance}"
-        elif FREE_BODIES:
-            notes.append(f"Nothing prevents a {motion.text}; the loads balance, and its mean is set to zero.")
+        if unbalance is None:
+            balanced.append(motion.text)
             continue
-        else:
-            expected += " (a body held by the balance of its loads alone is not yet supported)"
-        faults.append(case.fault(("regions", motion.regions[0]), found, expected))
-    return faults, notes
+        expected = "displacement conditions, springs, or bonded or touching neighbours, that prevent it"
+        faults.append(case.fault(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+    sentence = "Nothing prevents: {}. The loads balance, and the mean displacement and rotation are set to zero."
+    return faults, [sentence.format("; ".join(balanced))] if balanced else []

@@ -45,6 +45,19 @@ def find_tips(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> dict[st
     return {name: (visits[curves[name].start] == 1, visits[curves[name].end] == 1) for name in cracks}
 
 
+def check_tip_elements(
+    case: Case, curves: Mapping[str, Curve], tips: Mapping[str, tuple[bool, bool]]
+) -> list[Fault]:
+    """A fault for every crack with two tips and one element, which cannot have the shape of both."""
+    faults = []
+    for name, ends in tips.items():
+        if case.analysis.tips and all(ends) and sum(leg.elements for leg in curves[name].legs) < 2:
+            key = "elements" if case.curves[name].elements is not None else "size"
+            expected = "at least 2, one for each tip; or tips = false in [analysis]"
+            faults.append(case.fault(("curves", name, key), f"1 element on crack '{name}' with two tips", expected))
+    return faults
+
+
 def count_leg_ends(curves: Mapping[str, Curve]) -> Counter[complex]:
     """How many legs end at each point."""
     return Counter(end for curve in curves.values() for leg in curve.legs for end in (leg.start, leg.end))

@@ -7,10 +7,14 @@ from collections import defaultdict
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pbem.case import Case
 from pbem.case.finding import list_names
-from pbem.model.curve import Curve, turning_angle
+from pbem.errors import Fault
+from pbem.model.curve import Curve, Leg, turning_angle
 from pbem.model.junction import Places
+from pbem.model.shape import WIDEST_ARC, share
 
 # A curve that turns by less than this goes on smoothly.
 SMOOTH = math.radians(1.0)
@@ -56,6 +60,32 @@ def grade_curves(
         ]
         result[name] = Curve(name, tuple(legs))
     return result, _describe(case, result)
+
+
+def check_turning(case: Case, curves: Mapping[str, Curve]) -> list[Fault]:
+    """A fault for every curve with a circular element that turns too far, after legs were split and graded."""
+    faults = []
+    for name, curve in curves.items():
+        turn = max(map(_widest_turn, curve.legs))
+        widest = WIDEST_ARC * (1 + 1e-9)
+        if turn > widest:
+            counts = [leg.elements for leg in curve.legs]
+            while max(_widest_turn(leg, count) for leg, count in zip(curve.legs, counts, strict=True)) > widest:
+                counts = share(sum(counts) + 1, [leg.length for leg in curve.legs])
+            key = "elements" if case.curves[name].elements is not None else "size"
+            enough = f"at least {sum(counts)} elements" if key == "elements" else "smaller elements"
+            found = f"an element that turns by {turn:.3g} degrees, as its curve is split or graded"
+            expected = f"at most {WIDEST_ARC:g} degrees: {enough}, or less grading"
+            faults.append(case.fault(("curves", name, key), found, expected))
+    return faults
+
+
+def _widest_turn(leg: Leg, elements: int | None = None) -> float:
+    """Largest angle (degrees) that an element of the leg turns by, with the given number of elements if any."""
+    if leg.center is None:
+        return 0.0
+    fractions = replace(leg, elements=elements or leg.elements).element_fractions()
+    return math.degrees(abs(leg.sweep)) * float(np.diff(fractions).max())
 
 
 def _collect(curves: Mapping[str, Curve]) -> dict[complex, list[_LegEnd]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,23 @@ def project(leg: Leg, point: complex) -> tuple[float, float]:
         t = fraction_of_arc(leg, point) if point != leg.center else 0.0
     t = min(1.0, max(0.0, t))
     return t, abs(complex(leg.point(np.array(t))) - point)
+
+
+def measure_distances(legs: Sequence[Leg], points: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Distance of each point from the nearest of some legs."""
+    nearest = np.full(points.shape, np.inf)
+    for leg in legs:
+        ends = np.minimum(abs(points - leg.start), abs(points - leg.end))
+        if leg.center is None:
+            along = leg.end - leg.start
+            local = (points - leg.start) / along
+            beside = np.where((local.real > 0) & (local.real < 1), abs(local.imag * along), ends)
+        else:
+            angle = np.angle((points - leg.center) / (leg.start - leg.center)) * math.copysign(1.0, leg.sweep)
+            off_circle = abs(abs(points - leg.center) - abs(leg.start - leg.center))
+            beside = np.where(angle % (2 * math.pi) < abs(leg.sweep), off_circle, ends)
+        nearest = np.minimum(nearest, np.minimum(beside, ends))
+    return nearest
 
 
 def meeting_points(first: Leg, second: Leg, tolerance: float) -> list[complex]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pbem.case import Case
-from pbem.case.schema import ConditionTable, LawTable
+from pbem.case.schema import LawTable, StageConditionTable
 from pbem.errors import Fault
+from pbem.model.background import Backgrounds, read_backgrounds
 from pbem.model.model import Condition, Interface, Law, Quantity, Stage
 from pbem.model.roles import Roles, unknown_name
 
@@ -30,6 +31,7 @@ class Loading:
     conditions: Mapping[str, Condition]
     interfaces: Mapping[str, Interface]
     stages: tuple[Stage, ...]
+    initial_stress: Mapping[str, tuple[float, float, float]]
     faults: tuple[Fault, ...]
 
 
@@ -47,11 +49,13 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         law, wrong = _find_law(case, name, shared=name in roles.shared)
         interfaces[name] = Interface(name, sides[0], sides[1], law)
         faults += wrong
-    stages = _find_stages(case, conditions, interfaces)
-    return Loading(conditions, interfaces, stages, tuple(faults))
+    backgrounds = read_backgrounds(case)
+    faults += backgrounds.faults
+    stages = _find_stages(case, conditions, interfaces, backgrounds)
+    return Loading(conditions, interfaces, stages, backgrounds.initial_stress, tuple(faults))
 
 
-def _given(table: ConditionTable) -> dict[str, float]:
+def _given(table: StageConditionTable) -> dict[str, float]:
     """Values by the keys ux ... ts, with pressure written out."""
     values = {key: getattr(table, key) for key in _KEYS if getattr(table, key) is not None}
     if table.pressure is not None:
@@ -59,9 +63,9 @@ def _given(table: ConditionTable) -> dict[str, float]:
     return values
 
 
-def _tables(case: Case, curve: str) -> list[tuple[Loc, ConditionTable]]:
+def _tables(case: Case, curve: str) -> list[tuple[Loc, StageConditionTable]]:
     """The condition tables of a curve in the order in which they act: base, then stages."""
-    tables: list[tuple[Loc, ConditionTable]] = []
+    tables: list[tuple[Loc, StageConditionTable]] = []
     if curve in case.boundary:
         tables.append((("boundary", curve), case.boundary[curve]))
     for number, stage in enumerate(case.stages):
@@ -103,6 +107,11 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
     frame: Literal["global", "local"] | None = None
     known: list[Quantity | None] = [None, None]
     where = ["", ""]
+    spring = case.boundary[curve].spring if curve in case.boundary else None
+    stiffness = (spring.kn, spring.ks) if spring else (0.0, 0.0)
+    for direction in (0, 1):
+        if stiffness[direction]:
+            frame, known[direction], where[direction] = "local", "traction", "spring"
     for order, (loc, table) in enumerate(_tables(case, curve)):
         for key in _given(table):
             key_frame, direction, quantity = _KEYS[key]
@@ -123,7 +132,7 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
                 faults.append(case.fault(written, found, expected))
             if known[direction] is None:
                 known[direction], where[direction] = quantity, str(written[-1])
-    return Condition(curve, frame or "global", (known[0] or "traction", known[1] or "traction")), faults
+    return Condition(curve, frame or "global", (known[0] or "traction", known[1] or "traction"), stiffness), faults
 
 
 def _is_late(case: Case, curve: str, order: int) -> bool:
@@ -133,7 +142,7 @@ def _is_late(case: Case, curve: str, order: int) -> bool:
 
 
 def _find_stages(
-    case: Case, conditions: Mapping[str, Condition], interfaces: Mapping[str, Interface]
+    case: Case, conditions: Mapping[str, Condition], interfaces: Mapping[str, Interface], backgrounds: Backgrounds
 ) -> tuple[Stage, ...]:
     values = {name: [0.0, 0.0] for name in conditions}
     pressure = {name: 0.0 for name in interfaces}
@@ -142,26 +151,28 @@ def _find_stages(
     for name in interfaces:
         if name in case.interfaces:
             pressure[name] = case.interfaces[name].pressure
+    fields = list(zip(backgrounds.remote, backgrounds.gravity, strict=True))
     if not case.stages:
-        return (_freeze("load", case.analysis.steps, values, pressure),)
+        return (Stage("load", case.analysis.steps, _freeze(values), pressure, *fields[0]),)
     stages = []
-    for number, stage in enumerate(case.stages, start=1):
+    for number, stage in enumerate(case.stages):
         for name in conditions:
             _update(values[name], stage.boundary.get(name))
         for name in interfaces:
             if name in stage.interfaces:
                 pressure[name] = stage.interfaces[name].pressure
-        stages.append(_freeze(stage.name or f"stage {number}", stage.steps, values, pressure))
+        name = stage.name or f"stage {number + 1}"
+        stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number]))
     return tuple(stages)
 
 
-def _update(values: list[float], table: ConditionTable | None) -> None:
+def _update(values: list[float], table: StageConditionTable | None) -> None:
     for key, value in _given(table).items() if table else ():
         values[_KEYS[key][1]] = value
 
 
-def _freeze(name: str, steps: int, values: Mapping[str, list[float]], pressure: Mapping[str, float]) -> Stage:
-    return Stage(name, steps, {curve: (pair[0], pair[1]) for curve, pair in values.items()}, dict(pressure))
+def _freeze(values: Mapping[str, list[float]]) -> dict[str, tuple[float, float]]:
+    return {curve: (pair[0], pair[1]) for curve, pair in values.items()}
 
 
 def _find_law(case: Case, name: str, shared: bool) -> tuple[Law, list[Fault]]:

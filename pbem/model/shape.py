@@ -18,6 +18,8 @@ from pbem.model.intersection import extremes
 
 # Points nearer to each other than this part of the model's size are the same point.
 SAME_POINT = 1e-9
+# Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
+WIDEST_ARC = 45.0
 # Squares of lengths must not underflow.
 SMALLEST = 1e-100
 
@@ -111,7 +113,7 @@ def _straight_legs(table: CurveTable) -> tuple[Leg, ...]:
 
 
 def _circular_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
-    """An arc is one leg; a full circle four, cut between elements so that these are all equal."""
+    """An arc is one leg; a full circle four, cut between elements so that these are all equal (if eight or more)."""
     assert table.center is not None and table.radius is not None
     angles = table.angles or (0.0, 360.0)
     center, begin, sweep = complex(*table.center), math.radians(angles[0]), math.radians(angles[1] - angles[0])
@@ -120,13 +122,17 @@ def _circular_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
     if abs(abs(start - center) - table.radius) > 1e-3 * table.radius:
         found = f"radius = {table.radius:g}, lost in the rounding of the center"
         return Fault("", found, "a circle that is not so small against its distance from the origin")
-    if abs(angles[1] - angles[0]) < 360:
+    turn = abs(angles[1] - angles[0])
+    needed = math.ceil(turn / WIDEST_ARC - 1e-9)
+    if table.size is not None:
+        count = max(needed, count)
+    if count < needed:
+        what = "a circle" if turn == 360 else f"an arc of {turn:g} degrees"
+        found = f"{count} element{'s' if count > 1 else ''} around {what}"
+        return Fault("", found, f"at least {needed}: an element may turn by {WIDEST_ARC:g} degrees")
+    if turn < 360:
         end = _point_on_circle(center, table.radius, angles[1])
         return (Leg(start, end, count, power=table.power, center=center, sweep=sweep),)
-    if table.size is not None:
-        count = max(4, count)
-    if count < 4:
-        return Fault("", f"{count} elements around a circle", "at least 4")
     legs, done, here = [], 0, start
     for number in share(count, [1.0] * 4):
         done += number

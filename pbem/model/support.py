@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,15 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.case.finding import list_names
-from pbem.model.intersection import inner_points
 from pbem.model.junction import format_point
-from pbem.model.loop import side_legs
-from pbem.model.model import Law, Loop, Model, Side
+from pbem.model.model import Contact, Interface, Law, Model, Side
+from pbem.model.rigid import GROUND, Link, find_null_motions
+from pbem.model.sampling import sample_side
+from pbem.model.touching import measure_opening
 
 Tie = Literal["both", "normal", "none"]
 
-# A motion is free if it violates the constraints by less than this part of their size.
-RELATIVE_RANK = 1e-8
+# Faces nearer to each other than this part of the model's size are taken to touch.
+TOUCHING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -34,29 +35,25 @@ class FreeMotion:
     text: str
 
 
-def default_tie(law: Law) -> Tie:
+def default_tie(law: Law, touches: bool) -> Tie:
     """What an interface holds before anything is computed: faces that touch are taken to press on each other."""
     if law.kind == "bonded":
         return "both"
-    if law.kind == "open" or law.gap > 0:
+    if law.kind == "open" or not touches:
         return "none"
-    return "both" if law.friction > 0 or law.cohesion > 0 else "normal"
+    return "both" if law.friction > 0 or law.cohesion > 0 or law.kind == "custom" else "normal"
 
 
 def find_free_motions(model: Model, ties: Mapping[str, Tie] | None = None) -> tuple[FreeMotion, ...]:
-    """A basis of the rigid motions of the regions that no prescribed displacement and no interface prevents.
+    """A basis of the rigid motions of the regions that no prescribed displacement, spring and interface prevents.
 
-    ties: interface name to what it holds: "both" relative displacements, the "normal" one, or "none"; interfaces that
-    are not named hold what their law gives (`default_tie`).
+    ties: name of an interface or contact to what it holds: "both" relative displacements, the "normal" one, or "none";
+    those that are not named hold what their law gives (`default_tie`).
     """
-    held = {name: default_tie(interface.law) for name, interface in model.interfaces.items()} | dict(ties or {})
     names = [region.name for region in model.regions]
     center, scale = _frame(model)
-    rows = _boundary_rows(model, names, center, scale) + _interface_rows(model, names, held, center, scale)
-    matrix = np.concatenate([np.zeros((1, 3 * len(names))), *rows])
-    singular, right = np.linalg.svd(np.linalg.qr(matrix, mode="r"), full_matrices=True)[1:]
-    rank = int(np.sum(singular > RELATIVE_RANK * max(1.0, singular[0])))
-    return tuple(_describe(vector, names, center, scale) for vector in _sparse_basis(right[rank:]))
+    links = [*_link_to_ground(model, center, scale), *_link_regions(model, names, dict(ties or {}), center, scale)]
+    return tuple(_describe(motion, names, center, scale) for motion in find_null_motions(len(names), links))
 
 
 def _frame(model: Model) -> tuple[complex, float]:
@@ -75,92 +72,58 @@ def _constrain(motions: NDArray[np.complex128], directions: list[NDArray[np.comp
     return np.asarray(np.linalg.qr(np.concatenate(components), mode="r"))
 
 
-def _sample(model: Model, side: Side) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Points along a side and the outward normals there."""
-    points, normals = [], []
-    for leg in side_legs(model.curves, side):
-        at = np.concatenate([[leg.start], inner_points(leg, 5), [leg.end]])
-        if leg.center is None:
-            normal = np.full(at.shape, -1j * leg.tangent(at_end=False))
-        else:
-            normal = (at - leg.center) / np.abs(at - leg.center) * np.sign(leg.sweep)
-        points.append(at)
-        normals.append(normal)
-    return np.concatenate(points), np.concatenate(normals)
-
-
-def _sides(loops: tuple[Loop, ...]) -> list[Side]:
-    return [side for loop in loops for side in loop.sides]
-
-
-def _boundary_rows(model: Model, names: list[str], center: complex, scale: float) -> list[NDArray[np.float64]]:
-    rows = []
+def _link_to_ground(model: Model, center: complex, scale: float) -> Iterator[Link]:
     for number, region in enumerate(model.regions):
         if region.infinite:  # held by what is far away
-            rows.append(np.eye(3, 3 * len(names), 3 * number))
-        for side in _sides(region.loops):
+            yield number, GROUND, np.eye(3)
+        for side in (side for loop in region.loops for side in loop.sides):
             condition = model.conditions.get(side.curve)
             if condition is None:
                 continue
-            points, normals = _sample(model, side)
-            first = normals if condition.frame == "local" else np.ones_like(normals)
-            prescribed = [
-                direction for direction, quantity in zip((first, 1j * first), condition.known, strict=True)
-                if quantity == "displacement"
+            held = [
+                quantity == "displacement" or stiffness > 0
+                for quantity, stiffness in zip(condition.known, condition.stiffness, strict=True)
             ]
-            if prescribed:
-                demands = _constrain(_motions(points, center, scale), prescribed)
-                block = np.zeros((len(demands), 3 * len(names)))
-                block[:, 3 * number:3 * number + 3] = demands
-                rows.append(block)
-    return rows
+            if any(held):
+                points, normals = sample_side(model.curves, side)
+                first = normals if condition.frame == "local" else np.ones_like(normals)
+                directions = [direction for direction, holds in zip((first, 1j * first), held, strict=True) if holds]
+                yield number, GROUND, _constrain(_motions(points, center, scale), directions)
 
 
-def _interface_rows(
-    model: Model, names: list[str], held: Mapping[str, Tie], center: complex, scale: float
-) -> list[NDArray[np.float64]]:
-    rows = []
-    for name, interface in model.interfaces.items():
-        if interface.second is None or held[name] == "none":
-            continue
-        points, normals = _sample(model, Side(name, True))
-        motions = _motions(points, center, scale)
-        first, second = names.index(interface.first), names.index(interface.second)
-        demands = _constrain(motions, [normals] if held[name] == "normal" else [normals, 1j * normals])
-        block = np.zeros((len(demands), 3 * len(names)))
-        block[:, 3 * first:3 * first + 3] = demands
-        block[:, 3 * second:3 * second + 3] = -demands
-        rows.append(block)
-    return rows
+def _link_regions(
+    model: Model, names: list[str], ties: Mapping[str, Tie], center: complex, scale: float
+) -> Iterator[Link]:
+    """What interfaces and contacts demand of the difference of two regions' motions, on the (first) curve's points."""
+    numbers = {name: number for number, name in enumerate(names)}
+    bounded = {
+        side.curve: region.name for region in model.regions for loop in region.loops for side in loop.sides
+    }
+    joints: list[tuple[Interface | Contact, str, str, str]] = [
+        (one, one.name, one.first, one.second) for one in model.interfaces.values() if one.second is not None
+    ]
+    joints += [(one, one.first, bounded[one.first], bounded[one.second]) for one in model.contacts.values()]
+    for joint, curve, first, second in joints:
+        tie = ties.get(joint.name) or default_tie(joint.law, _touches(model, joint))
+        if tie != "none" and first != second:
+            points, normals = sample_side(model.curves, Side(curve, True))
+            directions = [normals] if tie == "normal" else [normals, 1j * normals]
+            yield numbers[first], numbers[second], _constrain(_motions(points, center, scale), directions)
 
 
-def _sparse_basis(null: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same space by vectors with many zeros: eliminate rotations first, so that what is left are translations."""
-    basis = null.copy()
-    columns = [*range(2, basis.shape[1], 3), *(c for c in range(basis.shape[1]) if c % 3 != 2)]
-    row = 0
-    for column in columns:
-        if row == len(basis):
-            break
-        pivot = row + int(np.argmax(np.abs(basis[row:, column])))
-        if abs(basis[pivot, column]) < 1e-6:
-            continue
-        basis[[row, pivot]] = basis[[pivot, row]]
-        basis[row] /= basis[row, column]
-        others = np.arange(len(basis)) != row
-        basis[others] -= np.outer(basis[others, column], basis[row])
-        row += 1
-    basis[np.abs(basis) < 1e-9] = 0.0
-    return basis
+def _touches(model: Model, joint: Interface | Contact) -> bool:
+    if isinstance(joint, Interface) and not isinstance(joint.law.gap, str):
+        return joint.law.gap <= 0
+    return measure_opening(model, joint) <= TOUCHING * model.size
 
 
 def _describe(vector: NDArray[np.float64], names: list[str], center: complex, scale: float) -> FreeMotion:
     velocities: dict[str, tuple[complex, float]] = {}
     parts: dict[str, list[str]] = {}
-    for number, name in enumerate(names):
+    moving = np.flatnonzero(np.abs(vector.reshape(-1, 3)).max(axis=1) >= 1e-6)
+    for number in moving:
+        name = names[number]
         x, y, turn = (float(value) for value in vector[3 * number:3 * number + 3])
-        if max(abs(x), abs(y), abs(turn)) < 1e-6:
-            continue
         spin = turn / scale
         velocities[name] = (complex(x, y) - 1j * spin * center, spin)
         if abs(turn) > 1e-6:

@@ -102,6 +102,9 @@ def test_defaults() -> None:
     assert [(stage.name, stage.steps) for stage in model.stages] == [("load", 10)]
     assert model.regions[0].material.plane == "strain"
     assert model.conditions["left"].known == ("traction", "traction")
+    assert model.conditions["left"].stiffness == (0.0, 0.0)
+    assert model.analysis.tips and not model.regions[0].infinite and model.initial_stress == {}
+    assert model.stages[0].remote == (0.0, 0.0, 0.0) and model.stages[0].gravity == (0.0, 0.0)
     assert all(leg.power == 3.0 for curve in model.curves.values() for leg in curve.legs)
 
 
@@ -146,6 +149,9 @@ def test_json_schema_knows_every_key() -> None:
     assert set(schema["required"]) == {"materials", "curves", "regions"}
     assert schema["additionalProperties"] is False
     law = schema["$defs"]["LawTable"]["properties"]
+    assert "spring" in schema["$defs"]["ConditionTable"]["properties"]
+    assert "spring" not in schema["$defs"]["StageConditionTable"]["properties"]
+    assert schema["$defs"]["AnalysisTable"]["properties"]["tips"]["default"] is True
     assert {"law", "friction", "friction_angle", "cohesion", "gap", "pressure", "pressurised"} <= set(law)
     assert schema["$defs"]["MaterialTable"]["properties"]["young"]["exclusiveMinimum"] == 0
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbem.model.model import Model
-from tests.unit.case_sample import BLOCKS, SQUARE, add_curves, build, change
+from tests.unit.case_sample import BLOCKS, SQUARE, add_curves, build, change, find_only_fault
 
 
 def refined(model: Model, name: str) -> list[tuple[bool, bool]]:
@@ -72,14 +72,13 @@ def test_interface_and_its_neighbours_are_refined_at_its_ends() -> None:
 
 def test_crack_tips_and_mouths_are_refined() -> None:
     curves = "crack = { points = [[0.5, 0], [0.5, 1]], elements = 8 }"
-    text = add_curves(SQUARE, curves, 'cracks = ["crack"]')
+    text = add_curves(SQUARE, curves, 'cracks = ["crack"]') + "[analysis]\ntips = false\n"
     model = build(text)
     assert refined(model, "crack") == [BOTH]
     assert refined(model, "bottom") == [BOTH, BOTH]
 
 
-def test_tips_with_elements_of_their_own_are_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbem.model.build.TIPS_BY_DEFAULT", True)
+def test_tips_with_elements_of_their_own_are_left_alone() -> None:
     curves = "crack = { points = [[0.5, 0], [0.5, 1]], elements = 8 }"
     model = build(add_curves(SQUARE, curves, 'cracks = ["crack"]'))
     assert model.analysis.tips
@@ -90,9 +89,9 @@ def test_straight_continuation_of_a_crack_is_smooth_under_one_law() -> None:
     curves = "a = { points = [[0.5, 1], [1, 1]], elements = 8 }\nb = { points = [[1, 1], [1.5, 1]], elements = 8 }"
     text = add_curves(SQUARE, curves, 'cracks = ["a", "b"]')
     model = build(text)
-    assert refined(model, "a") == [START] and refined(model, "b") == [END]
+    assert refined(model, "a") == [NEITHER] and refined(model, "b") == [NEITHER]
     model = build(text + "[interfaces.a]\nfriction = 0.5\n")
-    assert refined(model, "a") == [BOTH] and refined(model, "b") == [BOTH]
+    assert refined(model, "a") == [END] and refined(model, "b") == [START]
 
 
 EXPLICIT = {
@@ -122,17 +121,65 @@ def test_explicit_grading_of_a_leg_that_is_split(grading: str, expected: list[tu
 
 def test_explicit_grading_of_an_arc() -> None:
     arcs = (
-        'low = { center = [1, 1], radius = 0.5, angles = [180, 360], elements = 9, grading = "both" }\n'
-        'high = { center = [1, 1], radius = 0.5, angles = [180, 0], elements = 9, grading = "start" }'
+        'low = { center = [1, 1], radius = 0.5, angles = [180, 360], elements = 16, grading = "both" }\n'
+        'high = { center = [1, 1], radius = 0.5, angles = [180, 0], elements = 16, grading = "start" }'
     )
     model = build(change(add_curves(SQUARE, arcs), ('"left"]', '"left", "high", "low"]')))
     assert refined(model, "low") == [BOTH] and refined(model, "high") == [START]
 
 
 def test_explicit_grading_of_a_circle_is_at_its_seam() -> None:
-    hole = 'hole = { center = [1, 1], radius = 0.5, elements = 16, grading = "both" }'
+    hole = 'hole = { center = [1, 1], radius = 0.5, elements = 24, grading = "both" }'
     model = build(change(add_curves(SQUARE, hole), ('"left"]', '"left", "hole"]')))
     assert refined(model, "hole") == [START, NEITHER, NEITHER, END]
+
+
+def test_springs_are_a_change_of_condition() -> None:
+    curves = "top2 = { points = [[1, 2], [0, 2]], elements = 4 }"
+    text = change(add_curves(SQUARE, curves), ("[[2, 2], [0, 2]]", "[[2, 2], [1, 2]]"), ('"left"]', '"left", "top2"]'))
+    text = change(text, ("ty = -1.0", "spring = { kn = 3.0 }"))
+    same, other = (build(f"{text}[boundary.top2]\nspring = {{ kn = {kn} }}\n") for kn in (3.0, 4.0))
+    assert refined(same, "top") == [START] and refined(same, "top2") == [END]
+    assert refined(other, "top") == [BOTH] and refined(other, "top2") == [BOTH]
+
+
+def with_arc(line: str, crack: str = "") -> str:
+    """A quarter disc with a corner at the origin, as a hole cut from the square's corner (2, 2)."""
+    text = change(
+        SQUARE,
+        ("right = { points = [[2, 0], [2, 2]]", "right = { points = [[2, 0], [2, 1]]"),
+        ("top = { points = [[2, 2], [0, 2]]", "top = { points = [[1, 2], [0, 2]]"),
+        ('"left"]', '"left", "bite"]'),
+    )
+    return add_curves(text, f"bite = {{ center = [2, 2], radius = 1, angles = [180, 270], {line} }}{crack}")
+
+
+def test_circular_elements_turn_by_45_degrees_at_most() -> None:
+    assert refined(build(with_arc('elements = 2, grading = "none"')), "bite") == [NEITHER]
+    fault = find_only_fault(with_arc('elements = 1, grading = "none"'))
+    assert fault.startswith("curves.bite (line 11): found 1 element around an arc of 90 degrees; expected at least 2")
+    assert build(with_arc('size = 5.0, grading = "none"')).curves["bite"].legs[0].elements == 2
+
+
+@pytest.mark.parametrize(("count", "needed"), [(2, 5), (4, 5)])
+def test_circular_elements_that_are_graded(count: int, needed: int) -> None:
+    line = 'elements = {}, grading = "end"'
+    fault = find_only_fault(with_arc(line.format(count)))
+    assert fault.startswith("curves.bite.elements (line 11): found an element that turns by ")
+    assert f"expected at most 45 degrees: at least {needed} elements, or less grading" in fault
+    build(with_arc(line.format(needed)))
+    assert "smaller elements" in find_only_fault(with_arc('size = 0.5, grading = "end"'))
+
+
+def test_circular_elements_that_are_split() -> None:
+    angle = np.radians(200)
+    mouth = f"[{2 + np.cos(angle)}, {2 + np.sin(angle)}]"
+    crack = f"\ncrack = {{ points = [{mouth}, [0.7, 1.2]], elements = 4 }}"
+    text = change(with_arc('elements = 2, grading = "none"', crack), ('"bite"]', '"bite"]\ncracks = ["crack"]'))
+    fault = find_only_fault(text)
+    assert "found an element that turns by 70 degrees, as its curve is split" in fault
+    assert "at least 3 elements" in fault
+    build(change(text, ("270], elements = 2", "270], elements = 3")))
 
 
 def test_first_element_of_a_refined_leg() -> None:

@@ -22,7 +22,7 @@ def test_inner_crack_has_two_tips_and_frictionless_contact() -> None:
     assert (interface.law.kind, interface.law.friction, interface.law.cohesion) == ("coulomb", 0.0, 0.0)
     assert model.regions[0].cracks == ("crack",)
     assert "crack" not in model.conditions
-    assert any("tips = false" in note for note in model.notes)
+    assert model.analysis.tips
 
 
 def test_edge_crack_splits_the_side() -> None:
@@ -89,11 +89,11 @@ def test_branch_at_a_vertex_of_a_polyline() -> None:
 
 def test_edge_crack_in_a_hole_of_arcs() -> None:
     text = with_cracks(crack="points = [[1.3, 1.4], [1.6, 1.8]], elements = 4")
-    text = add_curves(text, "hole = { center = [1, 1], radius = 0.5, elements = 16 }")
+    text = add_curves(text, "hole = { center = [1, 1], radius = 0.5, elements = 24 }")
     model = build(change(text, ('"left"]', '"left", "hole"]')))
     assert model.crack_tips == {"crack": (False, True)}
     legs = model.curves["hole"].legs
-    assert len(legs) == 5 and sum(leg.elements for leg in legs) == 16
+    assert len(legs) == 5 and sum(leg.elements for leg in legs) == 24
     assert sum(leg.sweep for leg in legs) == pytest.approx(2 * np.pi)
     assert legs[0].end == 1.3 + 1.4j
     assert abs(complex(legs[1].point(np.array(0.5))) - (1 + 1j)) == pytest.approx(0.5)
@@ -121,6 +121,16 @@ def test_circular_crack_inside() -> None:
 def test_crack_from_side_to_side_is_told() -> None:
     model = build(with_cracks(crack="points = [[0, 1], [2, 1]], elements = 8") + "[interfaces.crack]\nfriction = 0.5\n")
     assert any("Crack 'crack' cuts region 'body' in two" in note for note in model.notes)
+
+
+def test_crack_of_one_element_has_room_for_one_tip() -> None:
+    fault = find_only_fault(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], elements = 1"))
+    assert fault.startswith("curves.crack.elements (line 11): found 1 element on crack 'crack' with two tips")
+    assert "expected at least 2, one for each tip; or tips = false" in fault
+    fault = find_only_fault(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], size = 9"))
+    assert fault.startswith("curves.crack.size")
+    build(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], elements = 1") + "[analysis]\ntips = false\n")
+    build(with_cracks(crack="points = [[0.5, 0], [1.5, 1.2]], elements = 1"))
 
 
 WRONG = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -15,21 +16,26 @@ FRICTION = 'law = "coulomb"\nfriction = 0.5'
 
 
 def test_body_without_support_is_free_in_three_ways() -> None:
-    faults = find_faults(change(SQUARE, (HELD + "\n", "")))
+    faults = find_faults(change(SQUARE, (HELD + "\n", ""), ("ty = -1.0", "ty = -1.0\ntx = -1.0")))
     text = "\n".join(map(str, faults))
     assert len(faults) == 3 and all(fault.place == "regions.body (line 11)" for fault in faults)
     assert "translation along x of 'body'" in text and "translation along y of 'body'" in text
     assert "rotation about" in text
-    assert "the tractions of stage 'load' drive it, with resultant (0, -2) and moment -2 about (0, 0)" in text
+    assert "the tractions of stage 'load' drive it, with resultant (-2, -2) and moment 2 about (0, 0)" in text
 
 
-@pytest.mark.parametrize("condition", ["uy = 0.0", "un = 0.0"])
+PUSHED = ("ty = -1.0", "ty = -1.0\ntx = -1.0")
+
+
+@pytest.mark.parametrize("condition", ["uy = 0.0", "un = 0.0", "spring = { kn = 5.0 }"])
 def test_side_held_along_its_normal_slides(condition: str) -> None:
-    assert "translation along x of 'body'" in find_only_fault(change(SQUARE, ("ux = 0.0\nuy = 0.0", condition)))
+    fault = find_only_fault(change(SQUARE, ("ux = 0.0\nuy = 0.0", condition), PUSHED))
+    assert "translation along x of 'body'" in fault and "expected displacement conditions, springs, or bonded" in fault
 
 
-def test_side_held_along_itself_leaves_two_motions() -> None:
-    faults = find_faults(change(SQUARE, ("ux = 0.0\nuy = 0.0", "ux = 0.0")))
+@pytest.mark.parametrize("condition", ["ux = 0.0", "spring = { ks = 5.0 }"])
+def test_side_held_along_itself_leaves_two_motions(condition: str) -> None:
+    faults = find_faults(change(SQUARE, ("ux = 0.0\nuy = 0.0", condition), PUSHED))
     assert "rotation about (1, 0) of 'body'" in faults[0].found
     assert "translation along y of 'body'" in faults[1].found
 
@@ -41,25 +47,56 @@ def test_side_held_along_itself_leaves_two_motions() -> None:
         "un = 0.0\nus = 0.0",
         "un = 0.0\n[boundary.left]\nun = 0.0",
         "uy = 0.0\n[boundary.left]\nux = 0.0",
+        "spring = { kn = 1.0, ks = 1e-9 }",
+        "us = 0.0\nspring = { kn = 1.0 }",
+        "spring = { kn = 1.0 }\n[boundary.left]\nspring = { kn = 1.0 }",
     ],
 )
 def test_conditions_that_hold_a_body(conditions: str) -> None:
     assert find_free_motions(build(change(SQUARE, ("ux = 0.0\nuy = 0.0", conditions)))) == ()
 
 
-def test_balanced_body_is_refused_as_not_yet_supported() -> None:
-    faults = find_faults(change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.0")))
-    assert len(faults) == 3
-    assert all("held by the balance of its loads alone is not yet supported" in fault.expected for fault in faults)
-    assert not any("drive it" in fault.found for fault in faults)
-
-
-def test_balanced_body_is_accepted_where_the_solver_can_hold_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbem.model.build.FREE_BODIES", True)
+def test_balanced_body_is_accepted_and_told() -> None:
     model = build(change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.0")))
-    assert sum("the loads balance" in note for note in model.notes) == 3
-    unbalanced = find_faults(change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.5")))
-    assert all("drive it" in fault.found for fault in unbalanced)
+    (note,) = [note for note in model.notes if "Nothing prevents" in note]
+    assert note.startswith("Nothing prevents: rotation about (1, 1) of 'body'; translation along x of 'body'; ")
+    assert note.endswith("The loads balance, and the mean displacement and rotation are set to zero.")
+
+
+def test_motion_that_the_loads_do_not_drive_is_no_fault() -> None:
+    text = change(SQUARE, (HELD, "[boundary.bottom]\nty = 1.5"))
+    assert "a free rigid motion (translation along y of 'body'): the tractions of stage" in find_only_fault(text)
+    assert "with resultant (0, 1) and moment 1 about (0, 0)" in find_only_fault(text)
+
+
+def test_weight_of_a_body() -> None:
+    heavy = change(SQUARE, ("poisson = 0.3", "poisson = 0.3\ndensity = 0.25"), ("[boundary.top]\nty = -1.0\n", ""))
+    heavy += "[gravity]\ngy = -3.0\n"
+    fault = find_only_fault(change(heavy, (HELD, "[boundary.bottom]\nty = 1.0")))
+    assert "the tractions and weight of stage 'load' drive it, with resultant (0, -1) and moment -1 about" in fault
+    notes = build(change(heavy, (HELD, "[boundary.bottom]\nty = 1.5"))).notes
+    assert any("The loads balance" in note for note in notes)
+    fault = find_only_fault(change(heavy, (HELD, "[boundary.bottom]\nty = 0.5\n[boundary.left]\nty = 1.0")))
+    assert "rotation about (1, 1) of 'body'): the tractions and weight" in fault and "resultant (0, 0)" in fault
+
+
+def test_weight_of_a_body_with_arcs_and_holes() -> None:
+    """The upper half of a disc less a hole: area and centre are known."""
+    text = f"""{MATERIAL}density = 2.0
+[curves]
+base = {{ points = [[2, 1], [4, 1]], elements = 8 }}
+arch = {{ center = [3, 1], radius = 1, angles = [0, 180], elements = 8 }}
+hole = {{ center = [3.2, 1.5], radius = 0.2, elements = 8 }}
+[regions.half]
+material = "soft"
+boundary = ["base", "arch", "hole"]
+[gravity]
+gx = 1.0
+"""
+    half, hole = math.pi / 2, 0.04 * math.pi
+    force, moment = 2 * (half - hole), -2 * (half * (1 + 4 / (3 * math.pi)) - hole * 1.5)
+    faults = "\n".join(map(str, find_faults(text)))
+    assert f"with resultant ({force:.6g}, 0) and moment {moment:.6g} about (0, 0)" in faults
 
 
 def test_fluid_that_lifts_a_block_is_a_load() -> None:
@@ -78,12 +115,14 @@ boundary = ["outer"]
 [boundary.outer]
 un = -0.1
 """
-    assert "rotation about (3, 1) of 'disc'" in find_only_fault(text)
-    assert "and moment" in find_only_fault(change(text, ("un = -0.1", "un = -0.1\nts = 1.0")))
+    (note,) = [note for note in build(text).notes if "The loads balance" in note]
+    assert "rotation about (3, 1) of 'disc'" in note
+    fault = find_only_fault(change(text, ("un = -0.1", "un = -0.1\nts = 1.0")))
+    assert "rotation about (3, 1) of 'disc'" in fault and "and moment" in fault
 
 
 def test_block_on_a_frictionless_interface_slides_off() -> None:
-    text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (FRICTION, 'law = "frictionless"'))
+    text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1\ntx = 0.1"), (FRICTION, 'law = "frictionless"'))
     fault = find_only_fault(text)
     assert fault.startswith("regions.upper") and "translation along x of 'upper'" in fault
 
@@ -96,12 +135,12 @@ def test_block_that_is_tied_is_held(law: str) -> None:
 
 @pytest.mark.parametrize("law", ['law = "open"', 'law = "coulomb"\nfriction = 0.5\ngap = 0.1'])
 def test_block_that_does_not_touch_is_free(law: str) -> None:
-    faults = find_faults(change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (FRICTION, law)))
+    faults = find_faults(change(BLOCKS, (LOADED, "[boundary.top]\nty = -1\ntx = 0.1"), (FRICTION, law)))
     assert len(faults) == 3 and all(fault.place.startswith("regions.upper") for fault in faults)
 
 
 def test_tied_blocks_move_together() -> None:
-    text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (HELD, "[boundary.bottom]\nuy = 0"))
+    text = change(BLOCKS, (LOADED, "[boundary.top]\ntx = -1"), (HELD, "[boundary.bottom]\nuy = 0"))
     assert "translation along x of 'lower', 'upper'" in find_only_fault(text)
 
 

@@ -1,0 +1,34 @@
+"""Points and normals along the sides of regions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.model.curve import Curve, Leg
+from pbem.model.intersection import inner_points
+from pbem.model.loop import side_legs
+from pbem.model.model import Side
+
+Complex = NDArray[np.complex128]
+
+
+def leg_normals(leg: Leg, points: Complex) -> Complex:
+    """Unit normals to the right of travel, outward of a region on the left, at points of the leg."""
+    if leg.center is None:
+        return np.full(points.shape, -1j * leg.tangent(at_end=False))
+    radii = points - leg.center
+    return radii / np.abs(radii) * math.copysign(1.0, leg.sweep)
+
+
+def sample_side(curves: Mapping[str, Curve], side: Side) -> tuple[Complex, Complex]:
+    """Points along a side, ends of legs among them, and the outward normals there."""
+    points, normals = [], []
+    for leg in side_legs(curves, side):
+        at = np.concatenate([[leg.start], inner_points(leg, 5), [leg.end]])
+        points.append(at)
+        normals.append(leg_normals(leg, at))
+    return np.concatenate(points), np.concatenate(normals)

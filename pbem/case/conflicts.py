@@ -73,6 +73,10 @@ def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
         ]
     if "elements" in table and "size" in table:
         findings.append(Finding((*loc, "size"), "both elements and size", "only one of them"))
+    elif "expression" in table and "elements" not in table:
+        place = (*loc, "size") if "size" in table else loc
+        found = "size with expression" if "size" in table else "an expression without elements"
+        findings.append(Finding(place, found, "elements = a number: straight elements between points of the curve"))
     elif "elements" not in table and "size" not in table:
         findings.append(Finding(loc, "neither elements nor size", "elements = a number, or size = a length"))
     return findings + _check_shape(loc, table)
@@ -85,6 +89,8 @@ def _check_shape(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
         if isinstance(points, list) and len(points) >= 2 and len(elements) != len(points) - 1:
             found = f"{len(elements)} numbers of elements for {len(points) - 1} legs"
             findings.append(Finding((*loc, "elements"), found, "one number for each leg, or one total"))
+        if "expression" in table and len(elements) != 1:
+            findings.append(Finding((*loc, "elements"), f"{len(elements)} numbers of elements", "one number"))
         if "center" in table and len(elements) != 1:
             found = f"{len(elements)} numbers of elements"
             findings.append(Finding((*loc, "elements"), found, "one number: a circle or an arc is one leg"))

@@ -37,7 +37,6 @@ class Refusal:
 
 REFUSALS = (
     Refusal("contacts", "contact between different curves", separable=False),
-    Refusal("curves.*.expression", "a curve given by an expression", separable=False),
     Refusal("interfaces.*.gap", "a gap given by an expression", _table),
     Refusal("interfaces.*.cohesion_lost", "a bond that is lost", _true),
     Refusal("interfaces.*.friction_dynamic", "slip-weakening friction"),

@@ -44,6 +44,9 @@ def grade_curves(
     result = {}
     for name, curve in curves.items():
         grading = case.curves[name].grading
+        if case.curves[name].expression:  # its legs are its elements
+            result[name] = curve
+            continue
         if grading == "auto":
             wanted = [
                 (
@@ -128,7 +131,7 @@ def _describe(case: Case, curves: Mapping[str, Curve]) -> tuple[str, ...]:
     """One sentence for all curves with the same refinement."""
     groups: dict[str, list[str]] = defaultdict(list)
     for name, curve in curves.items():
-        if case.curves[name].grading == "auto":
+        if case.curves[name].grading == "auto" and not case.curves[name].expression:
             groups[_describe_legs(curve)].append(f"'{name}'")
     return tuple(f"Grading, chosen: {text}: {list_names(names, 12)}." for text, names in groups.items())
 

@@ -11,9 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 from pbem.case import Case
-from pbem.case.schema import MOST_ELEMENTS, CurveTable
+from pbem.case.schema import LARGEST, MOST_ELEMENTS, CurveTable
 from pbem.errors import Fault
 from pbem.model.curve import Curve, Leg
+from pbem.model.expression import ExpressionError, evaluate_expression
 from pbem.model.intersection import extremes
 
 # Points nearer to each other than this part of the model's size are the same point.
@@ -39,9 +40,10 @@ def shape_curves(case: Case) -> Shapes:
     faults: list[Fault] = []
     curves: dict[str, Curve] = {}
     for name, table in case.curves.items():
-        legs = _circular_legs(table) if table.center is not None else _straight_legs(table)
+        legs = _shape_legs(table)
         if isinstance(legs, Fault):
-            faults.append(case.fault(("curves", name), legs.found, legs.expected))
+            key = ("expression",) if table.expression else ()
+            faults.append(case.fault(("curves", name, *key), legs.found, legs.expected))
             continue
         curves[name] = Curve(name, legs)
     size, tolerance = measure(curves)
@@ -52,7 +54,10 @@ def shape_curves(case: Case) -> Shapes:
     curves, short = _join(curves, tolerance)
     for name, number in short:
         loc = ("curves", name, "points", number) if case.curves[name].points else ("curves", name)
-        faults.append(case.fault(loc, "a leg without length (the same point twice)", "points that differ"))
+        found = "a leg without length (the same point twice)"
+        if case.curves[name].expression:
+            found = f"element {number} without length (the same point twice)"
+        faults.append(case.fault(loc, found, "points that differ"))
         del curves[name]
     for name, curve in list(curves.items()):
         total = sum(leg.elements for leg in curve.legs)
@@ -97,6 +102,32 @@ def _count_elements(table: CurveTable, lengths: Sequence[float]) -> list[int]:
         return list(table.elements)
     assert table.elements is not None
     return share(table.elements, lengths)
+
+
+def _shape_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
+    if table.expression is not None:
+        return _expression_legs(table)
+    return _circular_legs(table) if table.center is not None else _straight_legs(table)
+
+
+def _expression_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
+    """One straight leg for each element, between points of the curve; t is uniform unless the grading says more."""
+    assert table.expression is not None
+    count = table.elements[0] if isinstance(table.elements, tuple) else table.elements
+    assert count is not None
+    refine_start, refine_end = (table.grading in (end, "both") for end in ("start", "end"))
+    t = Leg(0j, 1 + 0j, count, refine_start, refine_end, table.power).element_fractions()
+    try:
+        x, y = (evaluate_expression(text, t=t) for text in table.expression)
+    except ExpressionError as error:
+        return Fault("", error.found, error.expected)
+    for axis, values in (("x", x), ("y", y)):
+        wrong = ~(np.abs(values) <= LARGEST)
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            return Fault("", f"{axis} = {values[at]:g} at t = {t[at]:g}", f"a number of at most {LARGEST:g} everywhere")
+    points = (x + 1j * y).tolist()
+    return tuple(Leg(a, b, 1) for a, b in pairwise(points))
 
 
 def _straight_legs(table: CurveTable) -> tuple[Leg, ...]:

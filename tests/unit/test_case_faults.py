@@ -389,11 +389,6 @@ def test_wrong_value_is_told_with_its_place(old: str, new: str, place: str, text
 UNSUPPORTED = {
     "contacts": ("[materials", '[contacts.seat]\nbetween = ["top", "bottom"]\n[materials', "contacts (line 2)"),
     "gap by expression": ("friction = 0.5", 'gap = { expression = "x" }', "interfaces.interface.gap"),
-    "curve by expression": (
-        "bottom = { points = [[0, 0], [2, 0]],",
-        'bottom = { expression = ["2*t", "0"],',
-        "curves.bottom.expression",
-    ),
     "interior": (
         "[materials",
         "[output]\ninterior = { box = [0, 0, 2, 2], shape = [3, 3] }\n[materials",

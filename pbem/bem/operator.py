@@ -76,7 +76,7 @@ def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
         own = mesh.region == region
         start, end = mesh.start[own], mesh.end[own]
         points = np.concatenate([start, end])
-        extent = max(np.ptp(points.real), np.ptp(points.imag))
+        extent = 2 * np.abs(points - points.mean()).max()  # the same however the model is turned
         sources.append(
             Sources(
                 start=start, end=end, center=mesh.center[own], sweep=mesh.sweep[own], tip=mesh.tip[own],

@@ -12,12 +12,13 @@ Far from it s and -s are taken together, since one alone loses the digits in whi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from unittest.mock import patch
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from pbem.bem import _kernels
+from pbem.bem.rows import Sources, evaluate_rows
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -58,15 +59,19 @@ def _read_factors(
     w: complex, normal: complex | None, order: int, on_element: bool, tip: int
 ) -> tuple[Complex, Complex, Complex, Complex]:
     """Factors P, Q of the density powers of the displacement, then of the traction: a -> P a + Q conj(a)."""
-    identity, none = np.eye(order + 1), np.zeros(order + 1)
-    displacement, traction = np.empty((2, 2 * order + 2)), np.zeros((2, 2 * order + 2))
-    point, on = np.array([w], dtype=complex), np.array([0 if on_element else -1])
-    start, end, no_center = (np.array([z], dtype=complex) for z in (-1, 1, 0))
-    _kernels.rows(
-        point, on, np.zeros(1), start, end, no_center, np.zeros(1), np.array([tip], dtype=np.int8), none,
-        identity, identity, identity, KAPPA, 1.0, 1.0, displacement,
-        None if normal is None else np.array([normal], dtype=complex), traction,
-    )  # fmt: skip
+    element = Sources(
+        np.array([-1 + 0j]), np.array([1 + 0j]), np.array([tip], dtype=np.int8), np.zeros(order + 1), KAPPA, 1.0, 1.0
+    )
+    one = np.eye(order + 1)
+    # In place of shapes the bare powers: combined to shapes the small ones would drown.
+    with (
+        patch("pbem.bem.rows.interpolate_shapes", lambda local: one),
+        patch("pbem.bem.rows.tip_shapes", lambda local: (one, one)),
+    ):
+        displacement, traction = evaluate_rows(
+            element, np.array([w]), np.array([0 if on_element else -1]), None if normal is None else np.array([normal])
+        )
+    assert traction is not None
     return (*_split_blocks(displacement), *_split_blocks(traction))
 
 

@@ -4,7 +4,9 @@ Points and vectors are complex numbers x + iy. kappa is Kolosov's constant: 3 - 
 (3 - nu)/(1 + nu) in plane stress. Sources:
 
     Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity (potentials, sections 32 and 33)
-    Tada, Paris, Irwin, The Stress Analysis of Cracks Handbook (straight crack in an infinite plane)
+    Tada, Paris, Irwin, The Stress Analysis of Cracks Handbook (straight crack in an infinite plane, two collinear
+        cracks, crack along an arc of a circle)
+    Kirsch, Zeitschrift des Vereines deutscher Ingenieure 42 (1898) (circular hole)
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import ellipe, ellipk
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -112,3 +115,89 @@ def crack_opening(plane_modulus: float, half_length: float, stress: float, x: Ar
     """
     x = np.asarray(x, dtype=float)
     return np.asarray(4 / plane_modulus * stress * np.sqrt(half_length**2 - x**2))
+
+
+class Intensity(NamedTuple):
+    """Stress-intensity factors, stress times the root of length."""
+
+    KI: float
+    KII: float
+
+
+def inclined_crack_intensity(half_length: float, stress: float, angle: float) -> Intensity:
+    """Open straight crack at an angle (radians) to the direction of a tension `stress` at infinity (Griffith)."""
+    root = stress * np.sqrt(np.pi * half_length)
+    return Intensity(float(root * np.sin(angle) ** 2), float(root * np.sin(angle) * np.cos(angle)))
+
+
+def arc_crack_intensity(radius: float, half_angle: float, stress: float) -> Intensity:
+    """Open crack along an arc of a circle, from -half_angle to half_angle (radians), under equal biaxial tension.
+
+    Magnitudes: at both ends the face on the concave side moves towards the tip (of a nearly full circle the plane
+    outside widens, while the disc inside hangs on to the ligament).
+    """
+    half = 0.5 * half_angle
+    root = stress * np.sqrt(np.pi * radius * np.sin(half_angle)) / (1 + np.sin(half) ** 2)
+    return Intensity(float(root * np.cos(half)), float(root * np.sin(half)))
+
+
+def collinear_cracks_intensity(inner: float, outer: float, stress: float) -> tuple[float, float]:
+    """KI at the inner and the outer tips of two cracks from inner to outer on either side of the middle, in tension."""
+    m = 1 - (inner / outer) ** 2
+    share = ellipe(m) / ellipk(m)
+    inner_factor = np.sqrt(np.pi / inner) * (outer**2 * share - inner**2) / np.sqrt(outer**2 - inner**2)
+    outer_factor = np.sqrt(np.pi) * outer**1.5 * (1 - share) / np.sqrt(outer**2 - inner**2)
+    return float(stress * inner_factor), float(stress * outer_factor)
+
+
+class ClosedCrack(NamedTuple):
+    """A closed straight crack under uniaxial compression: traction on its faces, largest slip, factor of mode II."""
+
+    normal_traction: float
+    shear: float
+    slip: float
+    KII: float
+
+
+def closed_crack(
+    plane_modulus: float, half_length: float, compression: float, angle: float, friction: float, cohesion: float = 0.0
+) -> ClosedCrack:
+    """Crack at an angle (radians) to the direction of a compression (> 0) at infinity; slip in its middle.
+
+    shear is what friction does not carry of the shear at infinity; magnitudes but for the normal traction.
+    """
+    normal = -compression * np.sin(angle) ** 2
+    shear = compression * np.sin(angle) * np.cos(angle) + friction * normal - cohesion
+    slip = 4 / plane_modulus * shear * half_length
+    return ClosedCrack(float(normal), float(shear), float(slip), float(shear * np.sqrt(np.pi * half_length)))
+
+
+def kirsch_field(kappa: float, shear_modulus: float, radius: float, stress: float) -> PlaneField:
+    """A hole about the origin in a plane under the tension `stress` along x; displacements symmetric to both axes."""
+
+    def evaluate(z: Complex) -> Potentials:
+        a = complex(radius**2)
+        phi = stress / 4 * (z + 2 * a / z)
+        phi_1 = stress / 4 * (1 - 2 * a / z**2)
+        phi_2 = stress * a / z**3
+        psi = -stress / 2 * (z + a / z - a**2 / z**3)
+        psi_1 = -stress / 2 * (1 - a / z**2 + 3 * a**2 / z**4)
+        return Potentials(*(np.asarray(part, dtype=complex) for part in (phi, phi_1, phi_2, psi, psi_1)))
+
+    return PlaneField(kappa, shear_modulus, evaluate)
+
+
+def griffith_field(kappa: float, shear_modulus: float, half_length: float, stress: float) -> PlaneField:
+    """An open crack on the x axis about the origin, under the tension `stress` along y (Westergaard); off the crack."""
+
+    def evaluate(z: Complex) -> Potentials:
+        # sqrt(z^2 - a^2) with its branch cut on the crack
+        root = np.sqrt(z - half_length) * np.sqrt(z + half_length)
+        stress_1, stress_2 = z / root, -(half_length**2) / root**3
+        phi, phi_1, phi_2 = stress / 4 * (2 * root - z), stress / 4 * (2 * stress_1 - 1), stress / 2 * stress_2
+        # On the axis s_xy = 0: psi' = -z phi'' + stress/2, so that s_yy - s_xx = stress far away.
+        psi_1 = stress / 2 - z * phi_2
+        psi = stress / 2 * z - (z * phi_1 - phi)
+        return Potentials(*(np.asarray(part, dtype=complex) for part in (phi, phi_1, phi_2, psi, psi_1)))
+
+    return PlaneField(kappa, shear_modulus, evaluate)

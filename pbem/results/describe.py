@@ -9,10 +9,11 @@ import numpy as np
 from pbem.mesh.mesh import Mesh
 from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
-from pbem.results.reader import Contact, Results
+from pbem.results.reader import Contact, Results, Tips
 from pbem.solve.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
+MOST_TIPS = 12
 
 
 def describe_model(model: Model, mesh: Mesh) -> str:
@@ -55,6 +56,7 @@ def describe_results(results: Results) -> str:
         parts.append(_section("contact at the last step", _table(
             ["interface", "pairs", "stick", "slip", "open", "max opening", "max |slip|"],
             [_contact_row(each) for each in _first(results.contact.values())]) + _left_out(len(results.contact))))
+        parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
@@ -187,6 +189,23 @@ def _contact_row(contact: Contact) -> list[str]:
     counts = [str(int((mode == which).sum())) for which in (STICK, SLIP, OPEN)]
     return [contact.name, str(contact.pairs), *counts, _number(contact.opening[-1].max()),
             _number(np.abs(contact.slip[-1]).max())]
+
+
+def _describe_tips(results: Results) -> list[str]:
+    """A table of all tips, of many those with the largest factors."""
+    found = [tip for name, tips in results.tips.items() for tip in _list_tips(name, tips)]
+    shown = found
+    if len(found) > MOST_TIPS:
+        shown = sorted(found, key=lambda tip: np.hypot(tip[2], tip[3]), reverse=True)[:MOST_TIPS]
+    rows = [[name, end, _number(opening), _number(sliding)] for name, end, opening, sliding in shown]
+    left_out = len(found) - len(shown)
+    return _table(["crack", "tip", "KI", "KII"], rows) + ([f"... and {left_out} smaller ones"] if left_out else [])
+
+
+def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float]]:
+    """Crack, end, KI, KII of every end of a crack that is a tip."""
+    factors = zip(("start", "end"), tips.KI[-1], tips.KII[-1], strict=True)
+    return [(name, end, float(opening), float(sliding)) for end, opening, sliding in factors if not np.isnan(opening)]
 
 
 def _section(title: str, lines: Iterable[str]) -> str:

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.configuration import dump_configuration
@@ -85,6 +86,11 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh) -> None:
     contact.attrs["names"] = _text(list(interfaces))
     for name, pairs in interfaces.items():
         _write_interface(_create_group(contact, name), model, mesh, name, pairs)
+    tips = file.create_group("tips")
+    tips.attrs["names"] = _text(list(model.crack_tips))
+    for name in model.crack_tips:
+        for factor in ("KI", "KII"):
+            _create_growing(tips.require_group(name), factor, (2,), "f8")
     file.create_dataset("convergence", shape=(0,), maxshape=(None,), dtype=ITERATION, chunks=(256,))
 
 
@@ -103,6 +109,8 @@ def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces) -> None:
     elements["curve"] = np.concatenate([mesh.curve, mesh.curve[crack]]).astype("i4")
     elements["sweep"] = np.concatenate([mesh.sweep, -mesh.sweep[crack]])
     elements["crack"] = np.concatenate([mesh.crack, mesh.crack[crack]]).astype("i1")
+    # The second face is travelled the other way.
+    elements["tip"] = np.concatenate([mesh.tip, np.array([0, 2, 1])[mesh.tip[crack]]]).astype("i1")
     for group in (nodes, elements):
         group["region"].attrs["names"] = _text(mesh.region_names)
         group["curve"].attrs["names"] = _text(mesh.curve_names)
@@ -114,12 +122,12 @@ def _write_interface(group: h5py.Group, model: Model, mesh: Mesh, name: str, pai
     group["arc_length"] = mesh.pairs.arc_length[pairs]
     for quantity, kind in PAIR_DATASETS.items():
         _create_growing(group, quantity, (len(pairs),), kind)
-    interface = model.interfaces[name]
-    group.attrs["first"] = interface.first
-    group.attrs["second"] = interface.second or ""
+    joint = find_joint(model, name)
+    group.attrs["first"] = joint.first
+    group.attrs["second"] = joint.second or ""
     group.attrs["crack"] = bool(mesh.pairs.crack[pairs].any())
-    group.attrs["law"] = interface.law.kind
-    for key, value in vars(interface.law).items():
+    group.attrs["law"] = joint.law.kind
+    for key, value in vars(joint.law).items():
         if key != "kind" and isinstance(value, str | bool | int | float):
             group.attrs[key] = value
 

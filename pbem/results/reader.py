@@ -47,6 +47,7 @@ class Nodes:
 class Elements:
     """vertices (e, 2, 2): start and end point in the direction of travel; region, curve (e,); crack (e,) bool.
     sweep (e,): the signed angle (radians, counter-clockwise positive) that an arc turns through, 0 if straight.
+    tip (e,): 1 or 2 where the jump has the square-root shape of a crack tip at the element's start or end, else 0.
 
     The nodes of element i are i * (order + 1) and the `order` that follow.
     """
@@ -56,6 +57,19 @@ class Elements:
     region: Integer
     curve: Integer
     crack: NDArray[np.bool_]
+    tip: Integer
+
+
+@dataclass(frozen=True)
+class Tips:
+    """Stress-intensity factors of a crack over the k stored steps: KI, KII (k, 2), at its start and at its end.
+
+    Stress times the root of length; NaN at an end that is no tip. KI >= 0 opens. KII > 0 if the face on the left of the
+    crack's direction moves along it, at both ends.
+    """
+
+    KI: Real
+    KII: Real
 
 
 @dataclass(frozen=True)
@@ -134,8 +148,9 @@ class Contact:
 class Results:
     """What a result file holds. k stored steps, n nodes.
 
-    reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; convergence: one
-    row per Newton iteration with the fields step, iteration, residual, changed, stick, slip, open, seconds.
+    reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; tips: per crack its
+    stress-intensity factors; convergence: one row per Newton iteration with the fields step, iteration, residual,
+    changed, stick, slip, open, seconds.
     failure: why the run ended early (status "failed"), otherwise empty.
     """
 
@@ -154,6 +169,7 @@ class Results:
     steps: Steps
     reactions: Mapping[str, Real]
     contact: Mapping[str, Contact]
+    tips: Mapping[str, Tips]
     convergence: NDArray[Any] = field(repr=False)
 
     @cached_property
@@ -255,10 +271,13 @@ def _read(path: Path, file: h5py.File) -> Results:
             vertices=_freeze(elements["vertices"][...]), sweep=_freeze(elements["sweep"][...]),
             region=_read_indices(elements, "region"),
             curve=_read_indices(elements, "curve"), crack=_freeze(elements["crack"][...].astype(bool)),
+            tip=_read_indices(elements, "tip"),
         ),
         steps=steps,
         reactions={name: _freeze(file["reactions"][name][:k]) for name in _names(file["reactions"])},
         contact=_Interfaces(path, _names(file["contact"]), k),
+        tips={name: Tips(*(_freeze(file["tips"][name][kind][:k]) for kind in ("KI", "KII")))
+              for name in _names(file["tips"])},
         convergence=_freeze(file["convergence"][...]),
     )
 

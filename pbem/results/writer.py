@@ -28,6 +28,7 @@ from pbem.results.layout import (
 )
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_step, truncate
+from pbem.results.tips import collect_tip_rules
 from pbem.solve.step import Iteration, Step
 
 
@@ -107,6 +108,7 @@ class ResultWriter:
         self._nodes_of_curve = {name: np.flatnonzero(faces.curve == _index(mesh.curve_names, name))
                                 for name in model.conditions}
         self._pairs_of_interface = sort_pairs(mesh)
+        self._tip_rules = collect_tip_rules(model, mesh)
         self._pending: Step | None = None
 
     def append(self, step: Step) -> None:
@@ -131,6 +133,9 @@ class ResultWriter:
             group = file["contact"][name]
             for quantity in PAIR_DATASETS:
                 append_row(group[quantity], getattr(step.contact, quantity)[pairs])
+        for name, factors in self._tip_rules.evaluate(step.contact).items():
+            for kind, factor in zip(("KI", "KII"), factors, strict=True):
+                append_row(file["tips"][name][kind], factor)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):

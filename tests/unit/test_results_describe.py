@@ -98,3 +98,25 @@ def test_a_file_without_steps_is_described(tmp_path: Path) -> None:
     text = describe_results(open_results(tmp_path / "a.h5"))
     assert "failed (linear solver: first step of press)" in text
     assert "steps stored: none" in text
+
+
+def test_tips_are_listed_and_of_many_the_largest(tmp_path: Path) -> None:
+    with ResultWriter(tmp_path / "a.h5", MODEL, MESH, 1, "3.18.5") as writer:
+        writer.append(STEPS[-1])
+    results = open_results(tmp_path / "a.h5")
+    lines = describe_results(results).splitlines()
+    at = lines.index("stress-intensity factors at the last step")
+    for end, line in enumerate(lines[at + 2 : at + 4]):
+        cells = line.split()
+        assert cells[:2] == ["crack", ("start", "end")[end]]
+        np.testing.assert_allclose([float(cells[2]), float(cells[3])],
+                                   [results.tips["crack"].KI[-1, end], results.tips["crack"].KII[-1, end]], rtol=1e-4)
+    model = make_model(cracks=30)
+    mesh = make_mesh(model)
+    with ResultWriter(tmp_path / "b.h5", model, mesh, 1, "3.18.5") as writer:
+        writer.append(make_steps(model, mesh)[-1])
+    text = describe_results(open_results(tmp_path / "b.h5"))
+    assert "... and 48 smaller ones" in text
+    tips = open_results(tmp_path / "b.h5").tips
+    largest = max(tips, key=lambda name: np.hypot(tips[name].KI[-1], tips[name].KII[-1]).max())
+    assert find_row(text, "stress-intensity factors at the last step", largest).split()[0] == largest

@@ -16,6 +16,7 @@ from pbem.errors import ConvergenceError, ResultFileError
 from pbem.mesh.mesh import list_faces
 from pbem.results.output import check_output_path
 from pbem.results.reader import open_results
+from pbem.results.tips import collect_tip_rules
 from pbem.results.writer import ResultWriter
 from pbem.solve.step import OPEN
 from tests.unit.results_sample import SOURCE, make_mesh, make_model, make_steps
@@ -260,3 +261,22 @@ def test_long_lists_of_names_and_texts_are_stored(tmp_path: Path) -> None:
     results = open_results(tmp_path / "a.h5")
     assert len(results.case) == 100_000
     assert results.nodes.curve_names[-1] == names[-1]
+
+
+def test_stress_intensity_factors_are_those_of_the_jump_at_the_tips(tmp_path: Path) -> None:
+    write(tmp_path / "a.h5").finish()
+    results = open_results(tmp_path / "a.h5")
+    rules = collect_tip_rules(MODEL, MESH)
+    assert list(results.tips) == ["crack"]
+    for k, step in enumerate(STEPS):
+        KI, KII = rules.evaluate(step.contact)["crack"]
+        np.testing.assert_array_equal(results.tips["crack"].KI[k], KI)
+        np.testing.assert_array_equal(results.tips["crack"].KII[k], KII)
+    assert results.tips["crack"].KI.shape == (6, 2)
+    # The invented crack is open at its start and closed at its end.
+    assert (results.tips["crack"].KI[:, 0] != 0).all()
+    assert (results.tips["crack"].KI[:, 1] == 0).all()
+    # A second face runs the other way, and its tips with it.
+    second = results.elements.crack.nonzero()[0][MESH.crack.sum():]
+    assert results.elements.tip[MESH.crack.nonzero()[0]].tolist() == [1, 0, 0, 0, 0, 2]
+    assert results.elements.tip[second].tolist() == [2, 0, 0, 0, 0, 1]

@@ -1,0 +1,67 @@
+"""Values between the nodes: coordinates of nodes on their elements, and the shapes that values there are read with."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.mesh import Mesh
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+
+def find_coordinates(start: Complex, end: Complex, sweep: Real, points: Complex) -> Real:
+    """The coordinates s (e, p), from -1 at the start to 1 at the end, of points (e, p) on straight elements and arcs.
+
+    Seen from the middle of its chord an arc is a fractional-linear map of the straight element.
+    """
+    middle, half = 0.5 * (start + end)[:, None], 0.5 * (end - start)[:, None]
+    quarter = np.tan(0.25 * sweep)[:, None]
+    w = (points - middle) / half
+    return np.asarray(((w + 1j * quarter) / (1 + 1j * quarter * w)).real)
+
+
+def locate_nodes(mesh: Mesh) -> Real:
+    """The coordinates s (e, p + 1) of all nodes on their elements."""
+    return find_coordinates(mesh.start, mesh.end, mesh.sweep, mesh.position.reshape(mesh.elements, -1))
+
+
+def stretch_elements(mesh: Mesh, s: Real) -> Real:
+    """Length per unit of s (e, p) at the coordinates s (e, p)."""
+    half = 0.5 * np.abs(mesh.end - mesh.start)[:, None]
+    quarter = np.tan(0.25 * mesh.sweep)[:, None]
+    return half * (1 + quarter**2) / (1 + (quarter * s) ** 2)
+
+
+def interpolate(local: Real, s: Real) -> Real:
+    """Values (e, p, j) at s (e, p) of the polynomials that are 1 at node j and 0 at others; local (e, j): the nodes."""
+    powers = np.arange(local.shape[1])
+    return np.asarray(s[..., None] ** powers @ np.linalg.inv(local[..., None] ** powers))
+
+
+def differentiate(local: Real, s: Real) -> Real:
+    """Derivatives by s of the polynomials of `interpolate`."""
+    powers = np.arange(local.shape[1])
+    by_power = powers * s[..., None] ** np.maximum(powers - 1, 0)
+    return np.asarray(by_power @ np.linalg.inv(local[..., None] ** powers))
+
+
+def interpolate_tips(tip: Integer, local: Real, s: Real) -> Real:
+    """As `interpolate`, with shapes t^(k + 1/2), t = 0 at the tip and 1 at the other end; tip (e,): 1 start, 2 end."""
+    t, nodes = _measure_from_tip(tip, s), _measure_from_tip(tip, local)
+    exponents = np.arange(local.shape[1]) + 0.5
+    return np.asarray(t[..., None] ** exponents @ np.linalg.inv(nodes[..., None] ** exponents))
+
+
+def differentiate_tips(tip: Integer, local: Real, s: Real) -> Real:
+    """Derivatives by s of the shapes of `interpolate_tips`; infinite at the tip itself."""
+    t, nodes = _measure_from_tip(tip, s), _measure_from_tip(tip, local)
+    exponents = np.arange(local.shape[1]) + 0.5
+    by_t = exponents * t[..., None] ** (exponents - 1) @ np.linalg.inv(nodes[..., None] ** exponents)
+    return np.asarray(by_t * np.where(tip == 1, 0.5, -0.5)[:, None, None])
+
+
+def _measure_from_tip(tip: Integer, s: Real) -> Real:
+    return 0.5 * (1 + np.where(tip == 1, 1, -1)[:, None] * s)

@@ -30,8 +30,8 @@ typedef struct {
     const int64_t *on;             /* element on which the point lies, or -1 */
     const double *on_local;        /* the point's coordinate s on that element */
     const double *local;           /* coordinates of an element's nodes */
-    const int8_t *tip;             /* NO_TIP, TIP_AT_START, TIP_AT_END */
-    const double *shape, *shape_tip_start, *shape_tip_end; /* coefficient of power k in shape j: [k * shapes + j] */
+    const int8_t *family;          /* BOUNDARY, TIP_AT_START, TIP_AT_END, CRACK */
+    const double *shape;           /* coefficient of power k in shape j of a family: [(family * shapes + k) * shapes + j] */
     int order;
     double kappa, shear_modulus, log_length;
     double *displacement, *traction; /* outputs: row 2 i + component, column 2 (element * shapes + j) + component */
@@ -126,10 +126,10 @@ static void evaluate_straight(const Rows *r, Py_ssize_t i, Py_ssize_t j, int tra
     const double h = cabs(half);
     const cplx e = half / h, w = (r->point[i] - middle) * conj(e) / h;
     Moments m;
-    if (r->tip[j] == NO_TIP)
-        evaluate_moments(w, r->on[i] == j, r->order, &m);
+    if (is_tip(r->family[j]))
+        evaluate_tip_moments(w, r->on[i] == j, r->order, r->family[j], &m);
     else
-        evaluate_tip_moments(w, r->on[i] == j, r->order, r->tip[j], &m);
+        evaluate_moments(w, r->on[i] == j, r->order, &m);
     if (r->normal)
         combine_traction(r, &m, h, e, r->normal[i], tractions, out);
     else
@@ -153,8 +153,8 @@ static void fill_rows(const Rows *r, const Arc *arcs)
     const Py_ssize_t width = 2 * r->elements * shapes;
     for (Py_ssize_t i = 0; i < r->points; i++) {
         for (Py_ssize_t j = 0; j < r->elements; j++) {
-            const int tip = r->tip[j], tractions = r->traction && tip == NO_TIP, is_arc = r->sweep[j] != 0;
-            const double *shape = tip == NO_TIP ? r->shape : tip == TIP_AT_START ? r->shape_tip_start : r->shape_tip_end;
+            const int family = r->family[j], tractions = r->traction && family == BOUNDARY, is_arc = r->sweep[j] != 0;
+            const double *shape = r->shape + family * shapes * shapes;
             const Py_ssize_t at = 2 * i * width + 2 * j * shapes;
             Factors f;
             if (is_arc)
@@ -176,7 +176,7 @@ static Arc *prepare_arcs(const Rows *r, Py_ssize_t *count)
     Arc *arcs = *count ? malloc(r->elements * sizeof(Arc)) : NULL;
     for (Py_ssize_t j = 0; arcs && j < r->elements; j++)
         if (r->sweep[j] != 0)
-            prepare_arc(&arcs[j], r->start[j], r->center[j], r->sweep[j], r->order, r->tip[j], r->local);
+            prepare_arc(&arcs[j], r->start[j], r->center[j], r->sweep[j], r->order, r->family[j], r->local);
     return arcs;
 }
 
@@ -188,25 +188,24 @@ static int has_length(const Py_buffer *b, Py_ssize_t bytes, const char *name)
 }
 
 PyDoc_STRVAR(rows_doc,
-"rows(point, on, on_local, start, end, center, sweep, tip, local, shape, shape_tip_start, shape_tip_end, kappa,\n"
+"rows(point, on, on_local, start, end, center, sweep, family, local, shape, kappa,\n"
 "     shear_modulus, length, displacement, normal, traction)\n\n"
 "Fill displacement and traction (float64, (2 n, 2 m shapes), C order) so that the displacement at the points (normal\n"
 "is None), or the traction on the normals there, is displacement @ u + traction @ t. traction may be None.\n"
 "point, normal (n), start, end, center (m): complex128; on: int64 (n); on_local: float64 (n); sweep: float64 (m), 0 for\n"
-"a straight element; tip: int8 (m); local: float64 (shapes); shape*: float64 (shapes, shapes), power by shape.\n"
+"a straight element; family: int8 (m): 0 boundary, 1, 2 tip at start or end, 3 crack; local: float64 (shapes), of\n"
+"boundary elements; shape: float64 (4, shapes, shapes), family by power by node.\n"
 "length: unit of the logarithm of the displacement kernel.");
 
-enum { POINT, ON, ON_LOCAL, START, END, CENTER, SWEEP, TIP, LOCAL, SHAPE, SHAPE_START, SHAPE_END, OUT, NORMAL, TRACTION,
-       BUFFERS };
+enum { POINT, ON, ON_LOCAL, START, END, CENTER, SWEEP, FAMILY, LOCAL, SHAPE, OUT, NORMAL, TRACTION, BUFFERS };
 
 static int check_lengths(const Py_buffer *b, Py_ssize_t n, Py_ssize_t m, Py_ssize_t shapes)
 {
-    const Py_ssize_t square = shapes * shapes * sizeof(double), full = 4 * n * m * shapes * sizeof(double);
+    const Py_ssize_t square = FAMILIES * shapes * shapes * sizeof(double), full = 4 * n * m * shapes * sizeof(double);
     return has_length(&b[ON], n * sizeof(int64_t), "on") && has_length(&b[ON_LOCAL], n * sizeof(double), "on_local") &&
            has_length(&b[END], m * sizeof(cplx), "end") && has_length(&b[CENTER], m * sizeof(cplx), "center") &&
-           has_length(&b[SWEEP], m * sizeof(double), "sweep") && has_length(&b[TIP], m, "tip") &&
-           has_length(&b[SHAPE], square, "shape") && has_length(&b[SHAPE_START], square, "shape_tip_start") &&
-           has_length(&b[SHAPE_END], square, "shape_tip_end") && has_length(&b[OUT], full, "displacement") &&
+           has_length(&b[SWEEP], m * sizeof(double), "sweep") && has_length(&b[FAMILY], m, "family") &&
+           has_length(&b[SHAPE], square, "shape") && has_length(&b[OUT], full, "displacement") &&
            (!b[NORMAL].buf || has_length(&b[NORMAL], n * sizeof(cplx), "normal")) &&
            (!b[TRACTION].buf || has_length(&b[TRACTION], full, "traction"));
 }
@@ -217,9 +216,8 @@ static PyObject *rows(PyObject *self, PyObject *args)
     Py_buffer b[BUFFERS];
     double kappa, shear_modulus, length;
     memset(b, 0, sizeof b);
-    if (!PyArg_ParseTuple(args, "y*y*y*y*y*y*y*y*y*y*y*y*dddw*OO", &b[POINT], &b[ON], &b[ON_LOCAL], &b[START], &b[END],
-                          &b[CENTER], &b[SWEEP], &b[TIP], &b[LOCAL], &b[SHAPE], &b[SHAPE_START], &b[SHAPE_END], &kappa,
-                          &shear_modulus, &length, &b[OUT], &normal, &traction))
+    if (!PyArg_ParseTuple(args, "y*y*y*y*y*y*y*y*y*y*dddw*OO", &b[POINT], &b[ON], &b[ON_LOCAL], &b[START], &b[END],
+                          &b[CENTER], &b[SWEEP], &b[FAMILY], &b[LOCAL], &b[SHAPE], &kappa, &shear_modulus, &length, &b[OUT], &normal, &traction))
         return NULL;
     if (normal != Py_None && PyObject_GetBuffer(normal, &b[NORMAL], PyBUF_SIMPLE) < 0) goto end;
     if (traction != Py_None && PyObject_GetBuffer(traction, &b[TRACTION], PyBUF_WRITABLE) < 0) goto end;
@@ -233,8 +231,7 @@ static PyObject *rows(PyObject *self, PyObject *args)
     const Rows r = {
         .points = n, .elements = m, .point = b[POINT].buf, .normal = b[NORMAL].buf, .start = b[START].buf,
         .end = b[END].buf, .center = b[CENTER].buf, .sweep = b[SWEEP].buf, .on = b[ON].buf, .on_local = b[ON_LOCAL].buf,
-        .local = b[LOCAL].buf, .tip = b[TIP].buf, .shape = b[SHAPE].buf, .shape_tip_start = b[SHAPE_START].buf,
-        .shape_tip_end = b[SHAPE_END].buf, .order = (int)shapes - 1, .kappa = kappa, .shear_modulus = shear_modulus,
+        .local = b[LOCAL].buf, .family = b[FAMILY].buf, .shape = b[SHAPE].buf, .order = (int)shapes - 1, .kappa = kappa, .shear_modulus = shear_modulus,
         .log_length = log(length), .displacement = b[OUT].buf, .traction = b[TRACTION].buf,
     };
     Py_ssize_t count;

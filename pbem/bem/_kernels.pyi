@@ -3,7 +3,7 @@
 from typing import Any
 
 def rows(
-    point: Any, on: Any, on_local: Any, start: Any, end: Any, center: Any, sweep: Any, tip: Any, local: Any, shape: Any,
-    shape_tip_start: Any, shape_tip_end: Any, kappa: float, shear_modulus: float, length: float, displacement: Any,
+    point: Any, on: Any, on_local: Any, start: Any, end: Any, center: Any, sweep: Any, family: Any, local: Any,
+    shape: Any, kappa: float, shear_modulus: float, length: float, displacement: Any,
     normal: Any, traction: Any, /,
 ) -> None: ...

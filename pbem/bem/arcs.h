@@ -30,7 +30,7 @@ typedef struct {
 typedef struct {
     cplx center, apex; /* apex = R a, the middle of the arc from the centre */
     double q, radius, reach, jacobian;
-    int order, tip;
+    int order, family;
     cplx infinity, origin;       /* the poles -i/q and i/q */
     Moments at_infinity, at_origin;
     cplx zeta[ARC_POINTS], dzeta[ARC_POINTS]; /* Gauss points, dzeta with weight */
@@ -52,13 +52,14 @@ static const double ARC_FAR = 2.0;
 
 static void evaluate_reference(const Arc *arc, cplx s, int on, Moments *m)
 {
-    if (arc->tip == NO_TIP)
-        evaluate_moments(s, on, arc->order, m);
+    if (is_tip(arc->family))
+        evaluate_tip_moments(s, on, arc->order, arc->family, m);
     else
-        evaluate_tip_moments(s, on, arc->order, arc->tip, m);
+        evaluate_moments(s, on, arc->order, m);
 }
 
-static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int order, int tip, const double *local)
+static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int order, int family,
+                        const double *local)
 {
     arc->center = center;
     arc->radius = cabs(start - center);
@@ -67,7 +68,7 @@ static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int ord
     arc->reach = arc->radius * fabs(sin(0.5 * sweep));
     arc->jacobian = 2 * arc->radius * fabs(arc->q);
     arc->order = order;
-    arc->tip = tip;
+    arc->family = family;
     arc->infinity = -I / arc->q;
     arc->origin = I / arc->q;
     evaluate_reference(arc, arc->infinity, 0, &arc->at_infinity);
@@ -141,7 +142,7 @@ static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMomen
         m->d[k] = d;
         m->q[k] = off * d - R * R * difference / z - turned;
         m->dq[k] = off * e - 2 * R * R * slope / z - turned1;
-        if (arc->tip != NO_TIP) continue;
+        if (arc->family != BOUNDARY) continue;
         const double l = at.l[k];
         m->n[k] = J * (l * log_B + at.n[k] - arc->at_infinity.n[k]);
         m->s[k] = J * rho * (l + r1 * at.c[k] + r2 * arc->at_origin.c[k]);
@@ -156,7 +157,7 @@ static void evaluate_arc_moments(const Arc *arc, cplx point, int on, double s_on
 {
     const cplx z = point - arc->center;
     for (int k = 0; k <= arc->order; k++) m->l[k] = arc->jacobian * ((k % 2) ? 0.0 : 2.0 / (k + 1));
-    if (arc->tip == NO_TIP && cabs(z - arc->apex) > ARC_FAR * arc->reach)
+    if (!is_tip(arc->family) && cabs(z - arc->apex) > ARC_FAR * arc->reach)
         sum_far_arc(arc, z, m);
     else
         close_near_arc(arc, z, on, s_on, m);

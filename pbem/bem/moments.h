@@ -8,7 +8,14 @@ typedef double complex cplx;
 
 #define MAX_ORDER 3
 #define MAX_SHAPES (MAX_ORDER + 1)
-enum { NO_TIP = 0, TIP_AT_START = 1, TIP_AT_END = 2 };
+/* What an element's nodal values mean: polynomials on boundaries; on cracks polynomials between other nodes, or the
+ * square-root shapes of a tip at either end. Only boundaries carry tractions. */
+enum { BOUNDARY = 0, TIP_AT_START = 1, TIP_AT_END = 2, CRACK = 3, FAMILIES = 4 };
+
+static inline int is_tip(int family)
+{
+    return family == TIP_AT_START || family == TIP_AT_END;
+}
 
 typedef struct {
     cplx c[MAX_SHAPES + 1], d[MAX_SHAPES], e[MAX_SHAPES];

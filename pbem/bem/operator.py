@@ -79,8 +79,9 @@ def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
         extent = 2 * np.abs(points - points.mean()).max()  # the same however the model is turned
         sources.append(
             Sources(
-                start=start, end=end, center=mesh.center[own], sweep=mesh.sweep[own], tip=mesh.tip[own],
-                local=mesh.local, kappa=material.kappa, shear_modulus=material.shear_modulus, length=8 * extent,
+                start=start, end=end, center=mesh.center[own], sweep=mesh.sweep[own], family=mesh.family[own],
+                local=mesh.local, crack_local=mesh.crack_local,
+                kappa=material.kappa, shear_modulus=material.shear_modulus, length=8 * extent,
             )
         )
     return sources
@@ -201,7 +202,7 @@ def _evaluate_columns(
     with_tractions = bool((~of_displacement).any())
     displacement, tractions = evaluate_rows(
         sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions,
-        mesh.local[nodes % len(mesh.local)],
+        mesh.node_local[nodes],
     )
     parts = [displacement[:, columns[of_displacement] - 2 * first]]
     if tractions is not None:

@@ -21,21 +21,23 @@ class Sources:
 
     start, end (m,): complex, region on the left; a crack element's displacement is the jump first minus second face.
     center, sweep (m,): centre and signed angle (radians) of an arc; 0 for a straight element.
-    tip (m,) int8: 1 if the displacement has the square-root shape from the start, 2 from the end, else 0.
-    local (p + 1,): node coordinates in [-1, 1]. kappa: Kolosov's constant; shear_modulus: stress.
+    family (m,) int8: 0 on boundaries, 3 on cracks, 1 and 2 on cracks with a tip's square-root shape from start or end.
+    local, crack_local (p + 1,): node coordinates in [-1, 1] on boundaries and on cracks (default: the same).
+    kappa: Kolosov's constant; shear_modulus: stress.
     length: unit of the logarithm in the displacement kernel. It must be several times the size of the region:
     where it equals the region's logarithmic capacity the single layer is singular.
     """
 
     start: Complex
     end: Complex
-    tip: NDArray[np.int8]
+    family: NDArray[np.int8]
     local: Real
     kappa: float
     shear_modulus: float
     length: float
     center: Complex | None = None
     sweep: Real | None = None
+    crack_local: Real | None = None
 
     @property
     def count(self) -> int:
@@ -61,8 +63,8 @@ def evaluate_rows(
     q = tan(sweep/4); tractions are such polynomials over 1 + q^2 s^2.
     Source: Kolosov-Muskhelishvili potentials of the single and double layer; Cauchy integrals in closed form.
     """
-    shape = interpolate_shapes(sources.local)
-    tip_start, tip_end = tip_shapes(tuple(sources.local))
+    on_crack = sources.local if sources.crack_local is None else sources.crack_local
+    shape = np.stack([interpolate_shapes(sources.local), *tip_shapes(tuple(on_crack)), interpolate_shapes(on_crack)])
     size = (2 * len(point), 2 * sources.count * len(sources.local))
     displacement = np.empty(size)
     traction = np.zeros(size) if tractions else None
@@ -77,9 +79,9 @@ def evaluate_rows(
         np.ascontiguousarray(sources.end, dtype=complex),
         np.ascontiguousarray(center, dtype=complex),
         np.ascontiguousarray(sweep, dtype=float),
-        np.ascontiguousarray(sources.tip, dtype=np.int8),
+        np.ascontiguousarray(sources.family, dtype=np.int8),
         np.ascontiguousarray(sources.local),
-        shape, tip_start, tip_end,
+        shape,
         sources.kappa, sources.shear_modulus, sources.length,
         displacement,
         None if normal is None else np.ascontiguousarray(normal, dtype=complex),

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.mesh.elements import Elements
+from pbem.mesh.shapes import place_crack_nodes, place_nodes
 
+Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
 
@@ -17,7 +19,7 @@ class Chain:
     """The elements of one curve in a region's order of travel (region on the left).
 
     forward: travelled in the curve's own direction. traction: the traction equation is collocated on its nodes.
-    first_node: number of its first node in the mesh.
+    first_node: number of its first node in the mesh. order: of the shapes on its elements.
     """
 
     region: int
@@ -27,8 +29,15 @@ class Chain:
     traction: bool
     elements: Elements
     first_node: int
+    order: int
 
-    def number_nodes(self, per_element: int) -> Integer:
+    @property
+    def local(self) -> Real:
+        """Coordinates of the nodes on each of its elements."""
+        order = self.order
+        return place_crack_nodes(order) if self.crack else place_nodes(order)
+
+    def number_nodes(self) -> Integer:
         """Numbers of its nodes in the order of the curve's own direction."""
-        numbers = self.first_node + np.arange(self.elements.count * per_element)
+        numbers = self.first_node + np.arange(self.elements.count * (self.order + 1))
         return numbers if self.forward else numbers[::-1]

@@ -52,7 +52,7 @@ class Elements:
         direction = (self.end - self.start) / np.abs(self.end - self.start)
         radii = self._radii(local)
         outward = np.sign(self.sweep)[:, None] * radii / np.where(radii == 0, 1, np.abs(radii))
-        return np.where(self.sweep[:, None] == 0, -1j * direction[:, None], outward)
+        return np.where(self.sweep[:, None] == 0, np.broadcast_to(-1j * direction[:, None], radii.shape), outward)
 
     def stretch(self, local: Real) -> Real:
         """Length of the element per unit of s (m, p) at the coordinates s."""

@@ -7,43 +7,44 @@ from collections.abc import Callable
 import numpy as np
 
 from pbem.mesh.chain import Chain
-from pbem.mesh.elements import Elements, divide_curve
+from pbem.mesh.elements import divide_curve
 from pbem.mesh.equations import explain_exceptions, uses_traction_equation
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.pairing import pair_nodes
-from pbem.mesh.shapes import place_nodes
+from pbem.mesh.shapes import place_crack_nodes, place_nodes
 from pbem.model.model import Model, Region
 
 
 def generate_mesh(model: Model) -> Mesh:
     """Divide every curve as its legs say, once for each region that it bounds, and pair the nodes of interfaces."""
-    local = place_nodes(model.analysis.order)
-    chains = _list_chains(model, len(local))
+    order = model.analysis.order
+    chains = _list_chains(model)
     counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
-    pairs, links = pair_nodes(model, chains, local)
+    pairs, links = pair_nodes(model, chains)
 
     def repeat(values: list, dtype: type) -> np.ndarray:
         return np.repeat(np.array(values, dtype=dtype), counts)
 
-    def join(take: Callable[[Elements], np.ndarray]) -> np.ndarray:
-        return np.concatenate([take(chain.elements) for chain in chains], axis=None)
+    def join(take: Callable[[Chain], np.ndarray]) -> np.ndarray:
+        return np.concatenate([take(chain) for chain in chains], axis=None)
 
     return Mesh(
-        order=model.analysis.order,
-        local=local,
-        start=join(lambda elements: elements.start),
-        end=join(lambda elements: elements.end),
-        center=join(lambda elements: elements.center),
-        sweep=join(lambda elements: elements.sweep),
+        order=order,
+        local=place_nodes(order),
+        crack_local=place_crack_nodes(order),
+        start=join(lambda chain: chain.elements.start),
+        end=join(lambda chain: chain.elements.end),
+        center=join(lambda chain: chain.elements.center),
+        sweep=join(lambda chain: chain.elements.sweep),
         region=repeat([chain.region for chain in chains], np.int64),
         curve=repeat([curve_names.index(chain.curve) for chain in chains], np.int64),
         crack=repeat([chain.crack for chain in chains], np.bool_),
         tip=np.concatenate([_mark_tips(model, chain) for chain in chains]),
-        position=join(lambda elements: elements.place(local)),
-        normal=join(lambda elements: np.broadcast_to(elements.normals(local), (elements.count, len(local)))),
-        weight=join(lambda elements: elements.weights(local)),
-        traction_equation=np.repeat(repeat([chain.traction for chain in chains], np.bool_), len(local)),
+        position=join(lambda chain: chain.elements.place(chain.local)),
+        normal=join(lambda chain: chain.elements.normals(chain.local)),
+        weight=join(lambda chain: chain.elements.weights(chain.local)),
+        traction_equation=np.repeat(repeat([chain.traction for chain in chains], np.bool_), order + 1),
         pairs=pairs,
         links=links,
         region_names=tuple(region.name for region in model.regions),
@@ -53,15 +54,16 @@ def generate_mesh(model: Model) -> Mesh:
     )
 
 
-def _list_chains(model: Model, nodes_per_element: int) -> list[Chain]:
+def _list_chains(model: Model) -> list[Chain]:
+    order = model.analysis.order
     chains: list[Chain] = []
     first_node = 0
     for number, region in enumerate(model.regions):
         for curve, forward, crack, traction in _list_sides(model, region):
             elements = divide_curve(model.curves[curve])
             elements = elements if forward else elements.reverse()
-            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node))
-            first_node += elements.count * nodes_per_element
+            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order))
+            first_node += elements.count * (order + 1)
     return chains
 
 

@@ -74,11 +74,12 @@ class Mesh:
     `sweep` that it turns through (radians); a straight element has zeros. tip is 1 or 2 where the jump has the
     square-root shape of
     a crack tip at the element's start or end, else 0. position, normal, weight, traction_equation: per node (n,).
-    local: nodes' coordinates on the element [-1, 1] (order + 1,).
+    local, crack_local (order + 1,): nodes' coordinates in [-1, 1] on boundary elements and on crack elements.
     """
 
     order: int
     local: Real
+    crack_local: Real
     start: Complex
     end: Complex
     center: Complex
@@ -105,6 +106,16 @@ class Mesh:
     @property
     def elements(self) -> int:
         return len(self.start)
+
+    @property
+    def family(self) -> NDArray[np.int8]:
+        """What the nodal values of an element mean to the kernels (e,): see bem.rows.Sources."""
+        return np.where(self.tip > 0, self.tip, np.where(self.crack, 3, 0)).astype(np.int8)
+
+    @property
+    def node_local(self) -> Real:
+        """Coordinate s of every node on its element (n,)."""
+        return np.where(self.crack[:, None], self.crack_local, self.local).ravel()
 
     @property
     def node_element(self) -> Integer:

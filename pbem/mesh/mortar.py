@@ -54,7 +54,7 @@ def couple_curves(one: Elements, other: Elements, local: Real, reach: float, ove
     for element in range(one.count):
         single = one.select(np.array([element]))
         s, weight = _divide_element(single, other)
-        seen = project_nodes(single.place(s)[0], single.normals(s)[0] + 0 * s, other, reach, overlap)
+        seen = project_nodes(single.place(s)[0], single.normals(s)[0], other, reach, overlap)
         hit = seen.element >= 0
         length = weight * single.stretch(s)[0]
         mine = (s[:, None] ** np.arange(count) @ shapes)[hit] * length[hit, None]

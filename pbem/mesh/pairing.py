@@ -20,7 +20,7 @@ Columns = dict[str, np.ndarray]
 OVERLAP = 1e-6
 
 
-def pair_nodes(model: Model, chains: Sequence[Chain], local: Real) -> tuple[Pairs, Links]:
+def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:
     """Pairs of all interfaces, cracks and contacts, each in the order of its curve, and what links their nodes."""
     sides = {(chain.curve, model.regions[chain.region].name): chain for chain in chains}
     by_curve = {chain.curve: chain for chain in chains}
@@ -30,11 +30,11 @@ def pair_nodes(model: Model, chains: Sequence[Chain], local: Real) -> tuple[Pair
     joints: list[Interface | Contact] = [*model.interfaces.values(), *model.contacts.values()]
     for number, joint in enumerate(joints):
         if isinstance(joint, Contact):
-            made, linked = _pair_contact(model, by_curve[joint.first], by_curve[joint.second], local, count)
+            made, linked = _pair_contact(model, by_curve[joint.first], by_curve[joint.second], count)
         elif joint.second is None:
-            made, linked = _pair_crack(sides[joint.name, joint.first], local), _no_links()
+            made, linked = _pair_crack(sides[joint.name, joint.first]), _no_links()
         else:
-            made, linked = _pair_interface(joint, sides, local, count)
+            made, linked = _pair_interface(joint, sides, count)
         made["interface"] = np.full(len(made["first"]), number)
         pairs.append(made)
         links.append(linked)
@@ -66,15 +66,15 @@ def _no_links() -> Columns:
     return {name: np.zeros(0, dtype=kind) for name, kind in _LINK_TYPES.items()}
 
 
-def _place_pairs(chain: Chain, local: Real) -> Columns:
+def _place_pairs(chain: Chain) -> Columns:
     """Geometry at the nodes of a chain in the curve's own direction; the normal is outward of the chain's region."""
-    elements = chain.elements if chain.forward else chain.elements.reverse()
+    elements, local = (chain.elements if chain.forward else chain.elements.reverse()), chain.local
     outward = elements.normals(local) if chain.forward else -elements.normals(local)
-    nodes = chain.number_nodes(len(local))
+    nodes = chain.number_nodes()
     return {
         "first": nodes,
         "position": elements.place(local).ravel(),
-        "normal": np.broadcast_to(outward, (elements.count, len(local))).ravel(),
+        "normal": outward.ravel(),
         "arc_length": elements.arc_lengths(local).ravel(),
         "weight": elements.weights(local).ravel(),
         "distance": np.zeros(len(nodes)),
@@ -82,18 +82,18 @@ def _place_pairs(chain: Chain, local: Real) -> Columns:
     }
 
 
-def _pair_crack(chain: Chain, local: Real) -> Columns:
-    made = _place_pairs(chain, local)
+def _pair_crack(chain: Chain) -> Columns:
+    made = _place_pairs(chain)
     return made | {"second": made["first"], "slot": made["first"], "sense": np.full(len(made["first"]), -1.0)}
 
 
 def _pair_interface(
-    joint: Interface, sides: Mapping[tuple[str, str], Chain], local: Real, count: int
+    joint: Interface, sides: Mapping[tuple[str, str], Chain], count: int
 ) -> tuple[Columns, Columns]:
     """Node to node: the second side follows the first, whose displacement is its own unknown."""
     assert joint.second is not None
-    made = _place_pairs(sides[joint.name, joint.first], local)
-    first, second = made["first"], sides[joint.name, joint.second].number_nodes(len(local))
+    made = _place_pairs(sides[joint.name, joint.first])
+    first, second = made["first"], sides[joint.name, joint.second].number_nodes()
     numbers = count + np.arange(len(first))
     links = {
         "carrier": first,
@@ -103,11 +103,12 @@ def _pair_interface(
     return made | {"second": second, "slot": second, "sense": np.ones(len(first))}, links
 
 
-def _pair_contact(model: Model, one: Chain, other: Chain, local: Real, count: int) -> tuple[Columns, Columns]:
+def _pair_contact(model: Model, one: Chain, other: Chain, count: int) -> tuple[Columns, Columns]:
     """By averages over the parts that face each other: the first curve follows the second, which carries its tractions.
 
     Nodes of the first curve that face nothing are no pairs and free of traction.
     """
+    local = one.local
     seen = couple_curves(one.elements, other.elements, local, model.size, OVERLAP * model.size)
     met = seen.cover > LEAST_COVER
     own_weight, other_weight = one.elements.weights(local).ravel(), other.elements.weights(local).ravel()
@@ -115,7 +116,7 @@ def _pair_contact(model: Model, one: Chain, other: Chain, local: Real, count: in
     first, second, product = seen.first[used], seen.second[used], seen.product[used]
 
     # Pairs follow the curve's own direction, the coupling the chain's.
-    made = _place_pairs(one, local)
+    made = _place_pairs(one)
     chain_order = made["first"] - one.first_node
     kept = {name: values[met[chain_order]] for name, values in made.items()}
     pair_of_node = np.full(len(met), -1)

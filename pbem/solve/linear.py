@@ -7,11 +7,15 @@ from contextlib import contextmanager
 from typing import Literal
 
 import numpy as np
+import petsc4py
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
-from pbem.errors import ConvergenceError
+# Signals are the shell's and MPI's business: with PETSc's handlers a closed pipe would look like a crash.
+petsc4py.init(["pbem", "-no_signal_handler"])
+from petsc4py import PETSc  # noqa: E402
+
+from pbem.errors import ConvergenceError  # noqa: E402
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]

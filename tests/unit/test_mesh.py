@@ -9,7 +9,7 @@ import pytest
 
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
-from pbem.mesh.shapes import place_nodes
+from pbem.mesh.shapes import place_crack_nodes, place_nodes
 from pbem.model.model import Model
 from tests.identities.bodies import ROCK, Body, mesh_body
 
@@ -55,7 +55,8 @@ def test_nodes_are_numbered_element_after_element_region_after_region(blocks: tu
     np.testing.assert_array_equal(mesh.node_element, np.arange(mesh.nodes) // 3)
     straight = mesh.sweep == 0
     middle, half = (mesh.start + mesh.end) / 2, (mesh.end - mesh.start) / 2
-    places = (middle[:, None] + half[:, None] * place_nodes(2)).reshape(-1, 3)
+    local = np.where(mesh.crack[:, None], place_crack_nodes(2), place_nodes(2))
+    places = middle[:, None] + half[:, None] * local
     np.testing.assert_allclose(mesh.position.reshape(-1, 3)[straight], places[straight], atol=1e-15)
 
 
@@ -193,7 +194,8 @@ def test_faces_append_the_second_face_of_every_crack(blocks: tuple[Model, Mesh])
     # as on every other element the nodes follow the direction of travel
     along = np.real((faces.position - faces.start[faces.element]) / (faces.end - faces.start)[faces.element])
     straight = np.concatenate([mesh.sweep == 0, np.ones(mesh.crack.sum(), dtype=bool)])[faces.element]
-    np.testing.assert_allclose(along[straight], np.tile((1 + mesh.local) / 2, len(faces.start))[straight], atol=1e-12)
+    local = np.concatenate([mesh.node_local, np.tile(mesh.crack_local, mesh.crack.sum())])
+    np.testing.assert_allclose(along[straight], (1 + local[straight]) / 2, atol=1e-12)
     outward = -1j * (faces.end - faces.start) / np.abs(faces.end - faces.start)
     np.testing.assert_allclose(faces.normal[straight], outward[faces.element][straight], atol=1e-14)
 

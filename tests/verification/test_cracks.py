@@ -53,14 +53,19 @@ class TwoFaces:
     def split(mesh: Mesh, sources: Sources) -> tuple[Sources, TwoFaces]:
         """The outer boundary, and the faces, of a mesh of one region."""
 
-        def select(own: NDArray[np.bool_]) -> Sources:
-            return replace(
-                sources, start=sources.start[own], end=sources.end[own], tip=sources.tip[own], center=None, sweep=None
-            )
+        # Each face is a boundary of its own, with tractions, on the crack's nodes.
+        family = np.where(sources.family == 3, 0, sources.family).astype(np.int8)
 
-        first = select(mesh.crack)
-        turned = np.array([0, 2, 1], dtype=np.int8)[first.tip]
-        return select(~mesh.crack), TwoFaces(first, replace(first, start=first.end, end=first.start, tip=turned))
+        def select(own: NDArray[np.bool_], local: Real) -> Sources:
+            return replace(
+                sources, start=sources.start[own], end=sources.end[own], family=family[own], local=local,
+                crack_local=None, center=None, sweep=None,
+            )  # fmt: skip
+
+        first = select(mesh.crack, mesh.crack_local)
+        turned = np.array([0, 2, 1], dtype=np.int8)[first.family]
+        second = replace(first, start=first.end, end=first.start, family=turned)
+        return select(~mesh.crack, mesh.local), TwoFaces(first, second)
 
 
 def evaluate_all(

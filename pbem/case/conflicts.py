@@ -147,13 +147,14 @@ def _check_law(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     if "friction" in table and "friction_angle" in table:
         findings.append(Finding((*loc, "friction_angle"), "both friction and friction_angle", "only one of them"))
-    if ("friction_dynamic" in table) != ("slip_distance" in table):
+    if table.get("law") != "frictionless" and ("friction_dynamic" in table) != ("slip_distance" in table):
         given = "friction_dynamic" if "friction_dynamic" in table else "slip_distance"
         findings.append(Finding((*loc, given), f"only {given}", "friction_dynamic and slip_distance together"))
     if table.get("law") == "frictionless":
         findings += [
             Finding((*loc, key), f"{key} = {show(table[key])} with law \"frictionless\"", 'law = "coulomb", or 0')
-            for key in ("friction", "friction_angle", "cohesion") if table.get(key)
+            for key in ("friction", "friction_angle", "cohesion", "friction_dynamic", "slip_distance")
+            if table.get(key)
         ]
     return findings
 

@@ -12,6 +12,12 @@ from pbem.case.translation import known_keys
 
 # Values that stand in for wrong ones in a draft.
 _STAND_INS: Mapping[str, float] = {"young": 1.0, "poisson": 0.25}
+# Keys of a law, and those that say how it weakens.
+_WEAKENED: Mapping[str, tuple[str, ...]] = {
+    "friction": ("friction_dynamic", "slip_distance"), "friction_angle": ("friction_dynamic", "slip_distance"),
+    "friction_dynamic": ("slip_distance",), "slip_distance": ("friction_dynamic",),
+    "cohesion": ("cohesion_lost",), "tensile_strength": ("cohesion_lost",),
+}
 
 
 def repair(raw: Mapping[str, Any], findings: list[Finding]) -> dict[str, Any] | None:
@@ -41,9 +47,16 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
         raw.pop("gravity", None)  # what weighs on what is unknown
         for stage in raw.get("stages", ()):
             stage.pop("gravity", None)
-    if table == "interfaces" and key == "law":
-        raw["interfaces"][loc[1]][key] = "coulomb"  # the law that all other keys go with
+    if table in ("interfaces", "contacts") and key == "law":
+        raw[table][loc[1]][key] = "coulomb"  # the law that all other keys go with
         return True
+    if table in ("interfaces", "contacts") and key in ("file", "parameters"):
+        raw[table][loc[1]]["law"] = "coulomb"
+        _delete(raw, (*loc[:2], "file"))
+        _delete(raw, (*loc[:2], "parameters"))
+    if table in ("interfaces", "contacts") and key in _WEAKENED:
+        for weakening in _WEAKENED[key]:  # nothing is known of what it weakens
+            _delete(raw, (*loc[:2], weakening))
     return _delete(raw, loc)
 
 

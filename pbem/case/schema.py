@@ -162,19 +162,21 @@ class ExpressionTable(Table):
 class LawTable(Table):
     """What the two faces of an interface, crack or contact do. Strengths and pressure are stresses."""
 
-    law: Literal["bonded", "coulomb", "open", "frictionless"] | None = None
+    law: Literal["bonded", "coulomb", "open", "frictionless", "custom"] | None = None
     friction: NotNegative | None = Field(None, description="friction coefficient")
     friction_angle: FrictionAngle | None = Field(None, description="degrees")
     cohesion: NotNegative = 0.0
     tensile_strength: NotNegative = Field(0.0, description="normal tension carried before the faces part")
-    cohesion_lost: Flag = False
-    friction_dynamic: NotNegative | None = None
-    slip_distance: Positive | None = None
-    normal_stiffness: Positive | None = None
-    tangential_stiffness: Positive | None = None
+    cohesion_lost: Flag = Field(False, description="cohesion and tensile strength end with the first slip or parting")
+    friction_dynamic: NotNegative | None = Field(None, description="friction coefficient after slip_distance")
+    slip_distance: Positive | None = Field(None, description="slip, length, over which friction falls")
+    normal_stiffness: Positive | None = Field(None, description="elastic joint in front of the law, stress/length")
+    tangential_stiffness: Positive | None = Field(None, description="the same along the faces")
     gap: Annotated[float | ExpressionTable, BeforeValidator(_check_gap)] = Field(0.0, description="initial opening")
     pressure: Number = Field(0.0, description="fluid pressure on the open faces")
     pressurised: Literal["open", "all"] = "open"
+    file: Text | None = Field(None, description="Python file of a custom law, relative to the case file")
+    parameters: Mapping[str, Number] = Field({}, description="numbers that the custom law is called with")
 
 
 class ContactTable(LawTable):
@@ -220,6 +222,7 @@ class StageTable(Table):
     steps: Count = 10
     boundary: Mapping[str, StageConditionTable] = {}
     interfaces: Mapping[str, StageInterfaceTable] = {}
+    contacts: Mapping[str, StageInterfaceTable] = {}
     remote: StressTable | None = None
     gravity: GravityTable | None = None
 

@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from pbem.case.finding import Finding, list_names, show, suggest
 from pbem.case.places import Loc, format_place
-from pbem.case.schema import CaseFile
+from pbem.case.schema import CaseFile, ExpressionTable
 
 
 def find_schema_findings(raw: Mapping[str, Any]) -> list[Finding]:
@@ -21,13 +21,25 @@ def find_schema_findings(raw: Mapping[str, Any]) -> list[Finding]:
     try:
         CaseFile.model_validate(raw)
     except ValidationError as error:
-        return [_translate(details) for details in error.errors(include_url=False) if not _follows(details)]
+        return [_translate(_simplify(details)) for details in error.errors(include_url=False) if not _follows(details)]
     return []
 
 
+def _simplify(details: ErrorDetails) -> ErrorDetails:
+    """The path without the member of a union that was tried."""
+    details["loc"] = tuple(part for part in details["loc"] if part != ExpressionTable.__name__)
+    return details
+
+
 def _follows(details: ErrorDetails) -> bool:
-    """A list is counted as too short by its faulty entries, each of which has its own fault."""
+    """Faults that only repeat others.
+
+    A list is counted as too short by its faulty entries, each of which has its own fault; a gap that is a table is no
+    number either.
+    """
     value = details.get("input")
+    if details["loc"][-2:] == ("gap", "float"):
+        return True
     return details["type"] == "too_short" and isinstance(value, (list, dict)) and (
         len(value) >= details["ctx"]["min_length"]
     )

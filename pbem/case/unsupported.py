@@ -18,6 +18,10 @@ def _true(value: object) -> bool:
     return value is True
 
 
+def _custom(value: object) -> bool:
+    return value == "custom"
+
+
 def _table(value: object) -> bool:
     return isinstance(value, dict)
 
@@ -43,6 +47,8 @@ REFUSALS = (
     Refusal("interfaces.*.slip_distance", "slip-weakening friction"),
     Refusal("interfaces.*.normal_stiffness", "an elastic joint"),
     Refusal("interfaces.*.tangential_stiffness", "an elastic joint"),
+    Refusal("interfaces.*.law", "a law of one's own", _custom, separable=False),
+    Refusal("stages.*.contacts", "contact between different curves"),
     Refusal("output.interior", "output at interior points"),
     Refusal("output.points", "output at interior points"),
 )

@@ -14,6 +14,7 @@ from pbem.model.crack import check_closing, check_inside, check_near_misses, che
 from pbem.model.curve import Curve
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.junction import find_crossings, split_at_junctions
+from pbem.model.law import check_gap
 from pbem.model.loading import Loading, read_loading
 from pbem.model.loop import Loops, find_loops, find_overlaps
 from pbem.model.material import Material
@@ -66,7 +67,12 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         return None, faults
     model = _compose(case, roles, loading, topology)
     faults = check_turning(case, model.curves)
-    if conditions_known:
+    gaps = [
+        fault for name, interface in model.interfaces.items()
+        for fault in check_gap(case, ("interfaces", name), interface.law, model.curves[name])
+    ]
+    faults += gaps
+    if conditions_known and not gaps:
         wrong, notes = _check_support(case, model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -11,7 +10,8 @@ from pbem.case import Case
 from pbem.case.schema import LawTable, StageConditionTable
 from pbem.errors import Fault
 from pbem.model.background import Backgrounds, read_backgrounds
-from pbem.model.model import Condition, Interface, Law, Quantity, Stage
+from pbem.model.law import read_law
+from pbem.model.model import Condition, Interface, Quantity, Stage
 from pbem.model.roles import Roles, unknown_name
 
 Loc = tuple[str | int, ...]
@@ -46,7 +46,8 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     interfaces: dict[str, Interface] = {}
     for name in [*roles.shared, *roles.cracks]:
         sides = roles.shared[name] if name in roles.shared else (roles.cracks[name], None)
-        law, wrong = _find_law(case, name, shared=name in roles.shared)
+        default: Literal["bonded", "coulomb"] = "bonded" if name in roles.shared else "coulomb"
+        law, wrong = read_law(case, ("interfaces", name), case.interfaces.get(name, LawTable()), default)
         interfaces[name] = Interface(name, sides[0], sides[1], law)
         faults += wrong
     backgrounds = read_backgrounds(case)
@@ -173,39 +174,3 @@ def _update(values: list[float], table: StageConditionTable | None) -> None:
 
 def _freeze(values: Mapping[str, list[float]]) -> dict[str, tuple[float, float]]:
     return {curve: (pair[0], pair[1]) for curve, pair in values.items()}
-
-
-def _find_law(case: Case, name: str, shared: bool) -> tuple[Law, list[Fault]]:
-    table = case.interfaces.get(name, LawTable())
-    kind = table.law or ("bonded" if shared else "coulomb")
-    faults = _check_meaning(case, name, table, kind)
-    friction = table.friction or 0.0
-    if table.friction_angle is not None:
-        friction = math.tan(math.radians(table.friction_angle))
-    gap = table.gap if isinstance(table.gap, float) else 0.0
-    if kind == "bonded":
-        return Law("bonded"), faults
-    if kind == "open":
-        return Law("open", gap=gap), faults
-    cohesion = 0.0 if kind == "frictionless" else table.cohesion
-    friction = 0.0 if kind == "frictionless" else friction
-    return Law("coulomb", friction, cohesion, table.tensile_strength, gap, table.pressurised), faults
-
-
-def _check_meaning(case: Case, name: str, table: LawTable, kind: str) -> list[Fault]:
-    """Keys without effect under the law would be a misunderstanding: refuse them unless they are zero."""
-    strengths = ("friction", "friction_angle", "cohesion", "tensile_strength")
-    without = {"bonded": (*strengths, "gap", "pressure"), "open": strengths}.get(kind, ())
-    chosen = f'law = "{kind}"' if table.law else f'law = "{kind}", the default here'
-    expected = f'law = "coulomb" with it, or no such key: it has no effect with {chosen}'
-    faults = [
-        case.fault(("interfaces", name, key), f"{key} = {getattr(table, key):g} on '{name}'", expected)
-        for key in without if getattr(table, key)
-    ]
-    if kind == "bonded":
-        faults += [
-            case.fault(("stages", number, "interfaces", name), f"a pressure in '{name}'", expected)
-            for number, stage in enumerate(case.stages)
-            if name in stage.interfaces and stage.interfaces[name].pressure
-        ]
-    return faults

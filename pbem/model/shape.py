@@ -42,8 +42,8 @@ def shape_curves(case: Case) -> Shapes:
     for name, table in case.curves.items():
         legs = _shape_legs(table)
         if isinstance(legs, Fault):
-            key = ("expression",) if table.expression else ()
-            faults.append(case.fault(("curves", name, *key), legs.found, legs.expected))
+            wrong = ("curves", name, *(["expression"] if table.expression else []))
+            faults.append(case.fault(wrong, legs.found, legs.expected))
             continue
         curves[name] = Curve(name, legs)
     size, tolerance = measure(curves)

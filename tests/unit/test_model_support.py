@@ -85,7 +85,7 @@ def test_weight_of_a_body_with_arcs_and_holes() -> None:
     text = f"""{MATERIAL}density = 2.0
 [curves]
 base = {{ points = [[2, 1], [4, 1]], elements = 8 }}
-arch = {{ center = [3, 1], radius = 1, angles = [0, 180], elements = 8 }}
+arch = {{ center = [3, 1], radius = 1, angles = [0, 180], elements = 16 }}
 hole = {{ center = [3.2, 1.5], radius = 0.2, elements = 8 }}
 [regions.half]
 material = "soft"

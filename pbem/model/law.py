@@ -1,0 +1,142 @@
+"""The laws of interfaces, cracks and contacts, from their tables; keys without effect are refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.case import Case
+from pbem.case.schema import LawTable
+from pbem.errors import Fault
+from pbem.model.curve import Curve
+from pbem.model.expression import ExpressionError, evaluate_expression
+from pbem.model.junction import format_point
+from pbem.model.model import Law
+from pbem.model.touching import find_least, sample_gap
+
+Loc = tuple[str | int, ...]
+Kind = Literal["bonded", "coulomb", "open", "frictionless", "custom"]
+
+_FRICTION = ("friction", "friction_angle", "cohesion")
+_WEAKENING = ("friction_dynamic", "slip_distance")
+_JOINT = ("normal_stiffness", "tangential_stiffness")
+# Keys of a law's table that would change nothing, by the kind of law.
+_WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
+    "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", "file", "parameters"),
+    "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, "file", "parameters"),
+    "coulomb": ("file", "parameters"),
+    "frictionless": ("file", "parameters"),
+    "custom": (*_FRICTION, *_WEAKENING),
+}
+
+
+def read_law(case: Case, loc: Loc, table: LawTable, default: Literal["bonded", "coulomb"]) -> tuple[Law, list[Fault]]:
+    """The law that a table at `loc` asks for, with its faults; `default`: its kind if the table does not say."""
+    kind: Kind = table.law or default
+    faults = [*_check_effect(case, loc, table, kind), *_check_strengths(case, loc, table, kind)]
+    friction = _find_friction(table)
+    gap = table.gap if isinstance(table.gap, float) else table.gap.expression
+    if isinstance(gap, str):
+        try:
+            evaluate_expression(gap, x=0.0, y=0.0)
+        except ExpressionError as error:
+            faults.append(case.fault((*loc, "gap"), error.found, error.expected))
+            gap = 0.0
+    joint = (table.normal_stiffness, table.tangential_stiffness)
+    if kind == "bonded":
+        return Law("bonded", normal_stiffness=joint[0], tangential_stiffness=joint[1]), faults
+    if kind == "open":
+        return Law("open", gap=gap), faults
+    path = None
+    if kind == "custom":
+        path, wrong = _find_file(case, loc, table)
+        faults += wrong
+    smooth = kind in ("frictionless", "custom")
+    law = Law(
+        kind="custom" if kind == "custom" else "coulomb",
+        friction=0.0 if smooth else friction,
+        cohesion=0.0 if smooth else table.cohesion,
+        tensile_strength=table.tensile_strength,
+        gap=gap,
+        pressurised=table.pressurised,
+        cohesion_lost=table.cohesion_lost,
+        friction_dynamic=None if smooth else table.friction_dynamic,
+        slip_distance=None if smooth else table.slip_distance,
+        normal_stiffness=joint[0],
+        tangential_stiffness=joint[1],
+        file=path,
+        parameters=dict(table.parameters) if kind == "custom" else {},
+    )
+    return law, faults
+
+
+def check_gap(case: Case, loc: Loc, law: Law, curve: Curve) -> list[Fault]:
+    """A fault if a gap by an expression is negative or without value somewhere on its curve."""
+    if not isinstance(law.gap, str):
+        return []
+
+    def evaluate(points: NDArray[np.complex128]) -> NDArray[np.float64]:
+        gap = sample_gap(law, points)
+        return np.where(np.isfinite(gap), gap, np.nan)  # the least of numbers with a nan among them is nan
+
+    least, place = find_least(curve, evaluate)
+    if math.isfinite(least) and least >= 0:
+        return []
+    what = f"{least:.6g}" if math.isfinite(least) else "no finite value"
+    found = f"a gap that is {what} at {format_point(place)} on curve '{curve.name}'"
+    return [case.fault((*loc, "gap"), found, "a finite gap >= 0 everywhere on the curve")]
+
+
+def _find_friction(table: LawTable) -> float:
+    if table.friction_angle is not None:
+        return math.tan(math.radians(table.friction_angle))
+    return table.friction or 0.0
+
+
+def _check_effect(case: Case, loc: Loc, table: LawTable, kind: Kind) -> Iterator[Fault]:
+    """Keys without effect under the law would be a misunderstanding: refuse them unless they are zero."""
+    chosen = f'law = "{kind}"' if table.law else f'law = "{kind}", the default here'
+    for key in _WITHOUT_EFFECT[kind]:
+        value = getattr(table, key)
+        if value:
+            other = "custom" if key in ("file", "parameters") else "coulomb"
+            expected = f'law = "{other}" with it, or no such key: it has no effect with {chosen}'
+            shown = f" = {value:g}" if isinstance(value, float) else ""
+            yield case.fault((*loc, key), f"{key}{shown} on '{loc[-1]}'", expected)
+    if kind == "bonded":
+        expected = f'law = "coulomb" with it, or no such key: it has no effect with {chosen}'
+        for number, stage in enumerate(case.stages):
+            pressures = stage.interfaces if loc[0] == "interfaces" else stage.contacts
+            if loc[-1] in pressures and pressures[str(loc[-1])].pressure:
+                place = ("stages", number, loc[0], loc[-1])
+                yield case.fault(place, f"a pressure in '{loc[-1]}'", expected)
+
+
+def _check_strengths(case: Case, loc: Loc, table: LawTable, kind: Kind) -> Iterator[Fault]:
+    """What of a law weakens has to be there before."""
+    if kind == "coulomb" and table.friction_dynamic is not None:
+        friction = _find_friction(table)
+        if table.friction_dynamic > friction * (1 + 1e-12):
+            found = f"friction_dynamic = {table.friction_dynamic:g} above the static friction of {friction:g}"
+            expected = "friction that falls with slip: friction_dynamic <= friction"
+            yield case.fault((*loc, "friction_dynamic"), found, expected)
+    strengths = {"coulomb": ("cohesion", "tensile_strength"), "frictionless": ("tensile_strength",)}.get(kind, ())
+    if table.cohesion_lost and strengths and not any(getattr(table, key) for key in strengths):
+        expected = f"{' or '.join(strengths)} > 0, which can be lost"
+        yield case.fault((*loc, "cohesion_lost"), "cohesion_lost on faces without strength", expected)
+
+
+def _find_file(case: Case, loc: Loc, table: LawTable) -> tuple[str | None, list[Fault]]:
+    """The law's Python file, next to the case file unless its path is absolute."""
+    if table.file is None:
+        return None, [case.fault(loc, 'law = "custom" without a file', 'file = "...", a Python file with the law')]
+    path = Path(case.source).parent / table.file
+    if path.is_file():
+        return str(path), []
+    found = f"no such file ('{path}')"
+    return None, [case.fault((*loc, "file"), found, "the path of a Python file, beside the case file or absolute")]

@@ -51,7 +51,8 @@ def measure(order: int, nodes: tuple[float, ...], elements: int) -> tuple[float,
 def main() -> None:
     """Print the table."""
     chosen = dict(shapes.CRACK_NODES)
-    print(f"{'order':5s}  {'nodes (positive ones)':24s}" + "".join(f"{f'{n} elements: K, opening':>28s}" for n in ELEMENTS))
+    heads = "".join(f"{f'{count} elements: K, opening':>28s}" for count in ELEMENTS)
+    print(f"{'order':5s}  {'nodes (positive ones)':24s}{heads}")
     for order, trials in TRIALS.items():
         for nodes in trials:
             errors = [measure(order, nodes, elements) for elements in ELEMENTS]

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.constraints import read_pair_unknowns
-from pbem.contact.laws import STICK, Linearisation, ModeState, PairState, friction_bound, linearise
+from pbem.contact.laws import STICK, ModeState, PairState, evaluate_strength, start_memory
 from pbem.contact.loads import Load
+from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.model.build import read_model
 from pbem.model.model import Model
@@ -53,8 +54,9 @@ def project(problem: Problem, trial: Real, stiffness: Real, slip_before: Real, l
     normal, tangential = trial.T
     limit = np.where(laws.bonded, np.inf, laws.tensile_strength - load.pressure)
     p_n = np.where(normal > limit, -load.pressure, normal)
-    bound, _ = friction_bound(laws, p_n, load.pressure)
-    bound = np.where(normal > limit, 0.0, np.where(laws.bonded, np.inf, bound))
+    none = np.zeros(laws.count)
+    strength = evaluate_strength(laws, p_n, none, load.pressure, none > 0)
+    bound = np.where(normal > limit, 0.0, np.where(laws.bonded, np.inf, strength.bound))
     p_s = np.clip(tangential, -bound, bound)
     return PairState(p_n, p_s, (normal - p_n) / stiffness, slip_before + (tangential - p_s) / stiffness)
 
@@ -67,7 +69,10 @@ def solve_classically(problem: Problem, tangent: Tangent, load: Load, factor: fl
     count = problem.mesh.pairs.count
     nothing = np.zeros(count)
     everywhere_stick = ModeState(np.full(count, STICK), np.ones(count))
-    elastic = linearise(problem.laws, everywhere_stick, nothing, nothing, load.pressure, problem.traction_scale)
+    rest = start_memory(problem.laws)
+    elastic = linearise(
+        problem.laws, everywhere_stick, nothing, nothing, rest, load.pressure, problem.traction_scale
+    )  # fmt: skip
     constraints = problem.constrain(elastic, load)
     tangent.update(constraints)
     scale = problem.measure(problem.apply(constraints.offset, load))

@@ -234,6 +234,11 @@ static PyObject *rows(PyObject *self, PyObject *args)
         .local = b[LOCAL].buf, .family = b[FAMILY].buf, .shape = b[SHAPE].buf, .order = (int)shapes - 1, .kappa = kappa, .shear_modulus = shear_modulus,
         .log_length = log(length), .displacement = b[OUT].buf, .traction = b[TRACTION].buf,
     };
+    for (Py_ssize_t j = 0; j < m; j++)
+        if (fabs(r.sweep[j]) > ARC_LARGEST) {
+            PyErr_SetString(PyExc_ValueError, "an element turns by more than half a circle");
+            goto end;
+        }
     Py_ssize_t count;
     Arc *arcs = prepare_arcs(&r, &count);
     if (count && !arcs) {

@@ -60,7 +60,7 @@ def evaluate_rows(
     on_local (n,): the points' coordinates on those elements, needed on arcs.
     Shapes (2 n, 2 m (p + 1)); B is None without `tractions`. Tip elements carry no traction density: zero columns.
     On an arc the densities are polynomials of s with a point at apex (1 + i q s)/(1 - i q s) from the centre,
-    q = tan(sweep/4); tractions are such polynomials over 1 + q^2 s^2.
+    q = tan(sweep/4); tractions are such polynomials times 1 + q^2 s^2.
     Source: Kolosov-Muskhelishvili potentials of the single and double layer; Cauchy integrals in closed form.
     """
     on_crack = sources.local if sources.crack_local is None else sources.crack_local

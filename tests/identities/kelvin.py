@@ -98,6 +98,30 @@ def integrate(
     return np.asarray(np.einsum("q...,qk->...k", values, density))
 
 
+def integrate_arc(
+    kernel: Callable[[Real, Real], Real], point: complex, center: complex, start: complex, sweep: float, densities: int,
+    tip: int = 0, of_tractions: bool = False,
+) -> Real:
+    """The same over a circular arc.
+
+    Its points lie at apex (1 + i q s)/(1 - i q s) from the center, the apex being its middle and q = tan(sweep/4).
+    Densities s^k or t^(k + 1/2) of that parameter; those of tractions are s^k (1 + q^2 s^2).
+    """
+    q, apex = np.tan(sweep / 4), (start - center) * np.exp(0.5j * sweep)
+    angle = np.angle((point - center) / apex) if point != center else 0.0
+    near = min(1.0, max(-1.0, float(np.tan(np.clip(angle / 2, -1.5, 1.5)) / q)))
+    distance = abs(point - center - apex * (1 + 1j * q * near) / (1 - 1j * q * near)) / (2 * abs(apex * q))
+    s, weight = graded_rule(complex(near, distance) if abs(near) < 1 else complex(near * (1 + distance)), tip)
+    radius = apex * (1 + 1j * q * s) / (1 - 1j * q * s)
+    y, normal = center + radius, np.sign(sweep) * radius / np.abs(radius)
+    r, n = (np.stack([z.real, z.imag], axis=1) for z in (y - point, normal))
+    stretch = 2 * abs(apex * q) / (1 + q**2 * s**2)
+    density = evaluate_densities(s, densities, tip) * (weight * stretch)[:, None]
+    if of_tractions:
+        density *= (1 + q**2 * s**2)[:, None]
+    return np.asarray(np.einsum("q...,qk->...k", kernel(r, n), density))
+
+
 def evaluate_densities(s: Real, count: int, tip: int = 0) -> Real:
     """s^k, or t^(k + 1/2) from a tip, (q, count)."""
     if tip == 0:

@@ -17,6 +17,7 @@ from pbem.contact.laws import (
     PairLaws,
     PairState,
     StrengthGroup,
+    commit,
     evaluate_strength,
     start_memory,
 )
@@ -26,12 +27,13 @@ from pbem.contact.modes import (
     P_N,
     P_S,
     Proposal,
+    find_failures,
     limit_changes,
     linearise,
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.strength import Strength, coulomb
+from pbem.contact.strength import Strength, coulomb, slip_weakening
 
 Real = NDArray[np.float64]
 
@@ -309,3 +311,94 @@ def test_states_differ_by_modes_and_by_the_signs_of_slip_only() -> None:
     assert modes.fingerprint() == replace(modes, sign=np.array([-1.0, 1.0])).fingerprint()
     assert modes.fingerprint() != replace(modes, sign=np.array([1.0, -1.0])).fingerprint()
     assert modes.fingerprint() != replace(modes, mode=np.array([SLIP, SLIP], dtype=np.int8)).fingerprint()
+
+
+# --- Friction that depends on slip, bonds that break, memory ----------------------------------------------------------
+
+
+def make_weakening(count: int, friction: float = 0.6, dynamic: float = 0.2, distance: float = 0.5) -> PairLaws:
+    values = {"friction": friction, "cohesion": 0.1, "friction_dynamic": dynamic, "slip_distance": distance}
+    parameters = {name: np.full(count, value) for name, value in values.items()}
+    return replace(make_laws(count), strengths=(StrengthGroup(slip_weakening, np.arange(count), parameters),))
+
+
+def test_friction_falls_linearly_with_the_slip_path_to_its_dynamic_value() -> None:
+    path = np.array([0.0, 0.125, 0.25, 0.5, 3.0])
+    p_n = np.full(5, -2.0)
+    strength = evaluate_strength(make_weakening(5), p_n, path, np.zeros(5), np.zeros(5, dtype=bool))
+    np.testing.assert_allclose(strength.bound, 0.1 + 2 * np.array([0.6, 0.5, 0.4, 0.2, 0.2]))
+    np.testing.assert_allclose(strength.by_traction, -np.array([0.6, 0.5, 0.4, 0.2, 0.2]))
+    np.testing.assert_allclose(strength.by_slip, [-1.6, -1.6, -1.6, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_tangent_of_weakening_friction_is_its_derivative(sign: float) -> None:
+    # Pairs that slip on in the sense of their friction, from different slips and paths.
+    random, count, scale, step = np.random.default_rng(2), 30, 3.0, 1e-6
+    laws = replace(make_weakening(count), compliance_s=random.uniform(0, 0.2, count))
+    modes = make_modes(SLIP, sign, count)
+    before, path = random.normal(size=count), random.uniform(0, 0.6, count)
+    memory = remember(before, count, path)
+    unknowns = np.stack([random.uniform(-1, -0.2, count), before + sign * random.uniform(0.01, 0.2, count)], axis=1)
+    none = np.zeros(count)
+
+    def evaluate(x: Real) -> Real:
+        way = path + sign * (x[:, 1] - before)
+        friction = 0.6 - 0.4 * np.clip(way / 0.5, 0, 1)
+        p_n = scale * x[:, 0]
+        p_s = sign * (0.1 - friction * p_n)
+        return np.stack([p_n, p_s, none, x[:, 1] + laws.compliance_s * p_s], axis=1)
+
+    law = linearise(laws, modes, scale * unknowns[:, 0], unknowns[:, 1], memory, none, scale)
+    np.testing.assert_allclose(np.stack(list(vars(law.evaluate(unknowns)).values()), 1), evaluate(unknowns), atol=1e-13)
+    for k in (0, 1):
+        shift = step * np.eye(2)[k]
+        by_differences = (evaluate(unknowns + shift) - evaluate(unknowns - shift)) / (2 * step)
+        np.testing.assert_allclose(law.tangent[:, :, k], by_differences, atol=1e-7)
+
+
+def test_intact_brittle_bonds_stick_whatever_they_carry() -> None:
+    laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3)
+    for state in (make_state(5.0), make_state(-0.1, 5.0)):
+        assert choose(laws, STICK, state)[0] == STICK
+
+
+def test_overloaded_brittle_bonds_fail_the_worst_first() -> None:
+    laws = make_laws(5, brittle=True, tensile_strength=0.2, cohesion=0.3, friction=0.5)
+    #                 tension +0.1, shear +1.0, shear +0.8, shear +0.5, within its strength
+    p_n = np.array([0.3, -1.0, -1.0, -1.0, -1.0])
+    p_s = np.array([0.0, 1.8, -1.6, 1.3, 0.7])
+    state = PairState(p_n, p_s, np.zeros(5), np.zeros(5))
+    failing = find_failures(laws, state, remember(0.0, 5), np.zeros(5))
+    np.testing.assert_array_equal(failing, [False, True, True, False, False])
+    # those fail once only, and without overload none does
+    broken = replace(remember(0.0, 5), broken=failing)
+    np.testing.assert_array_equal(find_failures(laws, state, broken, np.zeros(5)), [False, False, False, True, False])
+    calm = replace(state, p_n=np.full(5, -1.0), p_s=np.full(5, 0.7))
+    assert not find_failures(laws, calm, remember(0.0, 5), np.zeros(5)).any()
+    tough = replace(laws, brittle=np.zeros(5, dtype=bool))
+    assert not find_failures(tough, state, remember(0.0, 5), np.zeros(5)).any()
+
+
+def test_broken_bonds_have_friction_left_but_no_cohesion_or_strength() -> None:
+    laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3, friction=0.5)
+    broken = replace(remember(0.0), broken=np.array([True]))
+    bound = evaluate_strength(laws, np.array([-1.0]), np.zeros(1), np.zeros(1), np.array([True])).bound
+    assert bound == pytest.approx(0.5)
+    none = np.zeros(1)
+    assert propose_modes(laws, make_modes(STICK), make_state(0.1), broken, none).modes.mode[0] == OPEN
+    assert propose_modes(laws, make_modes(STICK), make_state(-1.0, 0.6), broken, none).modes.mode[0] == SLIP
+    assert propose_modes(laws, make_modes(STICK), make_state(-1.0, 0.4), broken, none).modes.mode[0] == STICK
+
+
+def test_memory_adds_up_the_way_of_slipping_pairs() -> None:
+    laws = make_laws(3, compliance_s=0.5)
+    before = remember(np.array([0.1, 0.1, 0.1]), 3, 1.0)
+    modes = ModeState(np.array([SLIP, STICK, OPEN], dtype=np.int8), np.array([-1.0, 1.0, 1.0]))
+    # jump = plastic slip + 0.5 p_s
+    state = PairState(np.array([-1.0, -2.0, 0.0]), np.array([-0.5, 0.4, 0.0]), np.zeros(3), np.array([-0.35, 0.3, 0.7]))
+    after = commit(laws, before, modes, state)
+    np.testing.assert_allclose(after.slip, [-0.1, 0.1, 0.7])
+    np.testing.assert_allclose(after.path, [1.2, 1.0, 1.0])
+    np.testing.assert_array_equal(after.normal_traction, state.p_n)
+    np.testing.assert_array_equal(before.path, 1.0)

@@ -13,9 +13,14 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.exact import PlaneField, uniform_field
+from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
+from pbem.model.build import parse_model
 from pbem.model.material import Material
-from pbem.solve.step import OPEN, SLIP, STICK, Step
+from pbem.parallel import world
+from pbem.solve.march import march
+from pbem.solve.problem import assemble_problem
+from pbem.solve.step import OPEN, SLIP, STICK, SilentReporter, Step
 from tests.identities.bodies import Body
 from tests.identities.solving import march_to_end
 
@@ -225,6 +230,67 @@ def test_a_joint_parts_where_tension_reaches_its_strength(strength: float, schem
     law: dict[str, float | str] = {"law": "coulomb", "cohesion": 1.0, "tensile_strength": strength}
     exact = bonded if holds else parted
     expect_layers(exact, make_layers(exact, None, 1.0, law, scheme=scheme), STICK if holds else OPEN, 1)
+
+
+@schemes
+def test_friction_is_followed_through_a_cycle_of_shear(scheme: str) -> None:
+    # Stick to the cone, slip, stick on the way back, slip back: between the corners all is linear in time.
+    normal, limit, slip = -0.01, 0.005, 0.004
+    corners = [(limit, 0.0), (limit, slip), (-limit, slip), (-limit, -slip), (limit, -slip)]
+    press = Layers(1.0, normal, 0.0, 0j)
+    law: dict[str, float | str] = {"law": "coulomb", "friction": FRICTION}
+    states = [press, *(Layers(1.0, normal, shear, complex(jump)) for shear, jump in corners)]
+    bodies = [make_layers(state, np.random.default_rng(8), 1.0, law, scheme=scheme) for state in states]
+    stages = []
+    for number, body in enumerate(bodies):
+        stages += ["[[stages]]", f'name = "stage{number}"', "steps = 2"]
+        for curve, values in body.conditions.items():
+            stages += [f"[stages.boundary.{curve}]", *(f"{key} = {value!r}" for key, value in values.items())]
+    text = bodies[0].write().replace("[analysis]", "\n".join([*stages, "[analysis]"]))
+    model = parse_model(text)[1]
+    mesh = generate_mesh(model)
+    found = {
+        step.stage: step for step in march(assemble_problem(model, mesh, world), SilentReporter()) if step.last_of_stage
+    }
+    path = 0.0
+    for number, state in enumerate(states):
+        lower, upper = state.fields()
+        expect_fields(mesh, found[number], {"lower": lower, "upper": upper})
+        path += abs(state.jump - states[max(number - 1, 0)].jump)
+        np.testing.assert_allclose(found[number].contact.slip, -state.jump.real, atol=1e-12)
+        np.testing.assert_allclose(found[number].contact.slip_path, path, atol=1e-12)
+
+
+COMPLIANT: dict[str, tuple[float, float, float, int]] = {
+    "pressed": (-0.01, 0.004, 0.0, STICK),
+    "slipping": (-0.01, 0.005, 0.003, SLIP),
+    "slipping back": (-0.01, -0.005, -0.003, SLIP),
+}
+
+
+@schemes
+@pytest.mark.parametrize("load", COMPLIANT.values(), ids=[name.replace(" ", "_") for name in COMPLIANT])
+def test_elastic_joints_give_way_by_compliance_times_traction(
+    load: tuple[float, float, float, int], scheme: str
+) -> None:
+    normal, shear, slip, mode = load
+    stiffness_n, stiffness_s = 7.0, 2.0
+    exact = Layers(1.0, normal, shear, slip + shear / stiffness_s + 1j * normal / stiffness_n)
+    law: dict[str, float | str] = {
+        "law": "coulomb", "friction": FRICTION, "normal_stiffness": stiffness_n, "tangential_stiffness": stiffness_s,
+    }  # fmt: skip
+    expect_layers(exact, make_layers(exact, np.random.default_rng(9), 1.0, law, scheme=scheme), mode, 1)
+
+
+@schemes
+@pytest.mark.parametrize(("slip", "friction"), [(0.02, 0.4), (0.06, 0.2), (0.1, 0.2)])
+def test_friction_weakens_with_slip(slip: float, friction: float, scheme: str) -> None:
+    # From 0.5 to 0.2 over a slip of 0.06, so slowly that the slip neither runs away nor localises.
+    exact = Layers(1.0, -0.01, 0.01 * friction, complex(slip))
+    law: dict[str, float | str] = {
+        "law": "coulomb", "friction": FRICTION, "friction_dynamic": 0.2, "slip_distance": 0.06,
+    }  # fmt: skip
+    expect_layers(exact, make_layers(exact, np.random.default_rng(2), 1.0, law, scheme=scheme), SLIP, 1)
 
 
 @schemes

@@ -32,7 +32,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
             findings += _check_law(loc, table)
     findings += _check_stages(raw)
     findings += _check_options(raw)
-    for name in ("materials", "curves", "regions"):
+    for name in ("materials", "curves", "regions", "contacts"):
         findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc)]
     return findings
 

@@ -14,18 +14,6 @@ def _given(value: object) -> bool:
     return True
 
 
-def _true(value: object) -> bool:
-    return value is True
-
-
-def _custom(value: object) -> bool:
-    return value == "custom"
-
-
-def _table(value: object) -> bool:
-    return isinstance(value, dict)
-
-
 @dataclass(frozen=True)
 class Refusal:
     """A key (``*`` stands for any name) that is refused when its value is as `when` says.
@@ -41,13 +29,6 @@ class Refusal:
 
 REFUSALS = (
     Refusal("contacts", "contact between different curves", separable=False),
-    Refusal("interfaces.*.gap", "a gap given by an expression", _table),
-    Refusal("interfaces.*.cohesion_lost", "a bond that is lost", _true),
-    Refusal("interfaces.*.friction_dynamic", "slip-weakening friction"),
-    Refusal("interfaces.*.slip_distance", "slip-weakening friction"),
-    Refusal("interfaces.*.normal_stiffness", "an elastic joint"),
-    Refusal("interfaces.*.tangential_stiffness", "an elastic joint"),
-    Refusal("interfaces.*.law", "a law of one's own", _custom, separable=False),
     Refusal("stages.*.contacts", "contact between different curves"),
     Refusal("output.interior", "output at interior points"),
     Refusal("output.points", "output at interior points"),

@@ -76,7 +76,8 @@ def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex
 def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[float, float]]:
     if curve in model.conditions:
         return model.conditions[curve], stage.boundary[curve]
-    return Condition(curve, "local"), (-stage.pressure[curve], 0.0)
+    name = next((name for name, one in model.contacts.items() if curve in (one.first, one.second)), curve)
+    return Condition(curve, "local"), (-stage.pressure[name], 0.0)
 
 
 def _tractions(condition: Condition, values: tuple[float, float], normals: np.ndarray) -> np.ndarray:

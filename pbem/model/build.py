@@ -13,12 +13,14 @@ from pbem.model.balance import describe_unbalance
 from pbem.model.crack import check_closing, check_inside, check_near_misses, check_tip_elements, find_tips
 from pbem.model.curve import Curve
 from pbem.model.grading import check_turning, grade_curves
+from pbem.model.interior import list_interior_points
 from pbem.model.junction import find_crossings, split_at_junctions
 from pbem.model.law import check_gap
 from pbem.model.loading import Loading, read_loading
-from pbem.model.loop import Loops, find_loops, find_overlaps
+from pbem.model.loop import Loops, find_loops
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shape import shape_curves
 from pbem.model.support import find_free_motions
@@ -62,14 +64,19 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
     roles = resolve_roles(case)
     loading = read_loading(case, roles)
     topology = _find_topology(case, roles)
-    faults = [*roles.faults, *topology.faults, *loading.faults]
+    interior, wrong = list_interior_points(case)
+    faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
         return None, faults
-    model = _compose(case, roles, loading, topology)
+    model = replace(_compose(case, roles, loading, topology), interior_points=interior)
     faults = check_turning(case, model.curves)
     gaps = [
         fault for name, interface in model.interfaces.items()
         for fault in check_gap(case, ("interfaces", name), interface.law, model.curves[name])
+    ]
+    gaps += [
+        fault for name, contact in model.contacts.items()
+        for fault in check_gap(case, ("contacts", name), contact.law, model.curves[contact.first])
     ]
     faults += gaps
     if conditions_known and not gaps:
@@ -84,12 +91,17 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     split = split_at_junctions(shapes.curves, shapes.tolerance)
     curves = split.curves
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
-    crossings = find_crossings(case, curves, cracks, shapes.tolerance)
+    # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.
+    touching = {
+        frozenset(pair) for pair in roles.contacts.values() if roles.outer[pair[0]] != roles.outer[pair[1]]
+    }
+    crossings = find_crossings(case, curves, cracks, shapes.tolerance, touching)
     loops, wrong = find_loops(case, curves, shapes.tolerance, check_nesting=not crossings)
     faults = [*shapes.faults, *crossings, *wrong]
     notes = list(split.notes)
     if not crossings:
-        faults += find_overlaps(case, curves, loops)
+        faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
+        faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(case, curves, cracks, shapes.size)
         closing, cuts = check_closing(case, curves, cracks, loops)
@@ -108,8 +120,10 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
     behaviour |= {
         name: (interface.first, interface.second, interface.law) for name, interface in loading.interfaces.items()
     }
+    behaviour |= {curve: ("contact", name) for curve, name in roles.in_contact.items()}
     with_tips = frozenset(roles.cracks) if case.analysis.tips else frozenset()
-    curves, grading = grade_curves(case, topology.curves, topology.breaks, behaviour, with_tips)
+    partners = {curve: other for pair in roles.contacts.values() for curve, other in (pair, pair[::-1])}
+    curves, grading = grade_curves(case, topology.curves, topology.breaks, behaviour, with_tips, partners)
     materials = {
         name: Material(name, table.young, table.poisson, table.plane, table.density)
         for name, table in case.materials.items()
@@ -128,8 +142,10 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
             dict(case.petsc),
         ),
         output_every=case.output.every, size=topology.size,
+        interior_grid=case.output.interior.shape if case.output.interior else None,
         notes=(*topology.notes, *grading, *_note_choices(case)),
         initial_stress=loading.initial_stress,
+        contacts=loading.contacts,
     )
 
 

@@ -34,13 +34,20 @@ def grade_curves(
     breaks: Places,
     behaviour: Mapping[str, Hashable],
     tip_elements: frozenset[str],
+    partners: Mapping[str, str],
 ) -> tuple[dict[str, Curve], tuple[str, ...]]:
     """Set the refined ends of every leg, and say in sentences which were chosen.
 
     behaviour: what a curve does, equal for two curves if the solution may go on smoothly from one to the other;
-    tip_elements: cracks whose tips have elements of their own shape and need no refinement.
+    tip_elements: cracks whose tips have elements of their own shape and need no refinement; partners: curve to the one
+    that it is in contact with, which it may pass by.
     """
     meetings = _collect(curves)
+
+    def is_singular(name: str, point: complex) -> bool:
+        meeting = _leave_out_partner(meetings[point], partners.get(name))
+        return _is_singular(meeting, behaviour, tip_elements)
+
     result = {}
     for name, curve in curves.items():
         grading = case.curves[name].grading
@@ -49,11 +56,7 @@ def grade_curves(
             continue
         if grading == "auto":
             wanted = [
-                (
-                    _is_singular(meetings[leg.start], behaviour, tip_elements),
-                    _is_singular(meetings[leg.end], behaviour, tip_elements),
-                )
-                for leg in curve.legs
+                (is_singular(name, leg.start), is_singular(name, leg.end)) for leg in curve.legs
             ]
         else:
             wanted = _explicit(curve, grading, breaks.get(name, ()), case.curves[name].center is not None)
@@ -98,6 +101,14 @@ def _collect(curves: Mapping[str, Curve]) -> dict[complex, list[_LegEnd]]:
             meetings[leg.start].append(_LegEnd(name, leg.tangent(at_end=False)))
             meetings[leg.end].append(_LegEnd(name, -leg.tangent(at_end=True)))
     return meetings
+
+
+def _leave_out_partner(meeting: list[_LegEnd], partner: str | None) -> list[_LegEnd]:
+    """Two bodies that touch do not disturb each other at a vertex which one of them passes smoothly."""
+    passing = [end.ray for end in meeting if end.curve == partner]
+    if len(passing) != 2 or abs(turning_angle(-passing[0], passing[1])) > SMOOTH:
+        return meeting
+    return [end for end in meeting if end.curve != partner]
 
 
 def _is_singular(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -91,14 +91,23 @@ def _split_leg(leg: Leg, points: Mapping[complex, float]) -> list[Leg]:
     ]
 
 
-def find_crossings(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], tolerance: float) -> list[Fault]:
-    """Every place where legs cross, touch or coincide other than at points where curves may meet."""
+def find_crossings(
+    case: Case,
+    curves: Mapping[str, Curve],
+    cracks: Mapping[str, str],
+    tolerance: float,
+    touching: Set[frozenset[str]] = frozenset(),
+) -> list[Fault]:
+    """Every place where legs cross, touch or coincide other than at points where curves may meet.
+
+    touching: pairs of curves that are left out, as they may touch anywhere.
+    """
     legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
     found: dict[tuple[str, str], Fault] = {}
     boxes = Boxes([leg for _, leg in legs], tolerance)
     for i, j in boxes.pairs():
         (name, leg), (other, other_leg) = legs[i], legs[j]
-        if (name, other) in found:
+        if (name, other) in found or {name, other} in touching:
             continue
         if coincide(leg, other_leg, tolerance):
             found[name, other] = _overlap(case, name, other, leg)
@@ -107,6 +116,8 @@ def find_crossings(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str,
         if points:
             found[name, other] = _crossing(case, name, other, points[0], cracks)
     for pair, point in _meeting_vertices(curves, cracks).items():
+        if frozenset(pair) in touching:
+            continue
         found.setdefault(pair, _crossing(case, *pair, point, cracks))
     return list(found.values())
 

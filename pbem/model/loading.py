@@ -11,7 +11,7 @@ from pbem.case.schema import LawTable, StageConditionTable
 from pbem.errors import Fault
 from pbem.model.background import Backgrounds, read_backgrounds
 from pbem.model.law import read_law
-from pbem.model.model import Condition, Interface, Quantity, Stage
+from pbem.model.model import Condition, Contact, Interface, Quantity, Stage
 from pbem.model.roles import Roles, unknown_name
 
 Loc = tuple[str | int, ...]
@@ -30,6 +30,7 @@ class Loading:
 
     conditions: Mapping[str, Condition]
     interfaces: Mapping[str, Interface]
+    contacts: Mapping[str, Contact]
     stages: tuple[Stage, ...]
     initial_stress: Mapping[str, tuple[float, float, float]]
     faults: tuple[Fault, ...]
@@ -39,7 +40,7 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     """Conditions of every outer curve, laws of every interface and crack, and complete values for every stage."""
     faults = _check_names(case, roles)
     conditions = {}
-    for name in roles.outer:
+    for name in (name for name in roles.outer if name not in roles.in_contact):
         condition, wrong = _find_condition(case, name)
         conditions[name] = condition
         faults += wrong
@@ -50,10 +51,15 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         law, wrong = read_law(case, ("interfaces", name), case.interfaces.get(name, LawTable()), default)
         interfaces[name] = Interface(name, sides[0], sides[1], law)
         faults += wrong
+    contacts: dict[str, Contact] = {}
+    for name, (first, second) in roles.contacts.items():
+        law, wrong = read_law(case, ("contacts", name), case.contacts[name], "coulomb")
+        contacts[name] = Contact(name, first, second, law)
+        faults += wrong
     backgrounds = read_backgrounds(case)
     faults += backgrounds.faults
-    stages = _find_stages(case, conditions, interfaces, backgrounds)
-    return Loading(conditions, interfaces, stages, backgrounds.initial_stress, tuple(faults))
+    stages = _find_stages(case, conditions, [*interfaces, *contacts], backgrounds)
+    return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress, tuple(faults))
 
 
 def _given(table: StageConditionTable) -> dict[str, float]:
@@ -87,6 +93,10 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
                 kind = "an interface" if name in roles.shared else "a crack"
                 expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
                 faults.append(case.fault(loc, f"conditions on '{name}', {kind}", expected))
+            elif name in roles.in_contact:
+                expected = f"conditions on other curves: what it does is told in [contacts.{roles.in_contact[name]}]"
+                found = f"conditions on '{name}', which is in contact '{roles.in_contact[name]}'"
+                faults.append(case.fault(loc, found, expected))
             elif name not in case.curves:
                 faults.append(unknown_name(case, loc, name, "curve", roles.outer or case.curves))
     places = [((), case.interfaces)]
@@ -99,6 +109,11 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
                 faults.append(case.fault(loc, found, "a curve shared by two regions, or a crack"))
             elif name not in case.curves:
                 faults.append(unknown_name(case, loc, name, "interface or crack", two_sided))
+    for number, stage in enumerate(case.stages):
+        faults += [
+            unknown_name(case, ("stages", number, "contacts", name), name, "contact", case.contacts)
+            for name in stage.contacts if name not in case.contacts
+        ]
     return faults
 
 
@@ -143,15 +158,17 @@ def _is_late(case: Case, curve: str, order: int) -> bool:
 
 
 def _find_stages(
-    case: Case, conditions: Mapping[str, Condition], interfaces: Mapping[str, Interface], backgrounds: Backgrounds
+    case: Case, conditions: Mapping[str, Condition], joints: list[str], backgrounds: Backgrounds
 ) -> tuple[Stage, ...]:
+    """joints: names of the interfaces, cracks and contacts."""
     values = {name: [0.0, 0.0] for name in conditions}
-    pressure = {name: 0.0 for name in interfaces}
+    pressure = {name: 0.0 for name in joints}
+    laws = {**case.contacts, **case.interfaces}
     for name in conditions:
         _update(values[name], case.boundary.get(name))
-    for name in interfaces:
-        if name in case.interfaces:
-            pressure[name] = case.interfaces[name].pressure
+    for name in joints:
+        if name in laws:
+            pressure[name] = laws[name].pressure
     fields = list(zip(backgrounds.remote, backgrounds.gravity, strict=True))
     if not case.stages:
         return (Stage("load", case.analysis.steps, _freeze(values), pressure, *fields[0]),)
@@ -159,9 +176,10 @@ def _find_stages(
     for number, stage in enumerate(case.stages):
         for name in conditions:
             _update(values[name], stage.boundary.get(name))
-        for name in interfaces:
-            if name in stage.interfaces:
-                pressure[name] = stage.interfaces[name].pressure
+        changes = {**stage.contacts, **stage.interfaces}
+        for name in joints:
+            if name in changes:
+                pressure[name] = changes[name].pressure
         name = stage.name or f"stage {number + 1}"
         stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number]))
     return tuple(stages)

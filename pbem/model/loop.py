@@ -216,33 +216,3 @@ def _nest(
                 expected = "inner loops side by side: what lies inside a hole is another region"
                 faults.append(case.fault(loc, found, expected))
     return tuple(Loop(chain.sides, i == outer) for i, chain in enumerate(turned)), faults
-
-
-def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops) -> list[Fault]:
-    """Regions that lie on the same side of a shared curve, or one inside another that does not have it as a hole."""
-    faults = []
-    names = list(loops)
-    for number, first in enumerate(names):
-        for second in names[number + 1:]:
-            both = [case.regions[name].infinite for name in (first, second)]
-            found = "" if all(both) else _overlap(curves, loops[first], loops[second])
-            if found:
-                expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
-                loc = ("regions", second, "boundary")
-                faults.append(case.fault(loc, f"region '{second}' overlapping region '{first}' ({found})", expected))
-    return faults
-
-
-def _overlap(curves: Mapping[str, Curve], first: tuple[Loop, ...], second: tuple[Loop, ...]) -> str:
-    sides = [{side.curve: side.forward for loop in loops for side in loop.sides} for loops in (first, second)]
-    common = [curve for curve in sides[0] if curve in sides[1]]
-    for curve in common:
-        if sides[0][curve] == sides[1][curve]:
-            return f"both lie on the same side of '{curve}'"
-    for one, other in ((0, 1), (1, 0)):
-        for curve in sides[other]:
-            if curve not in common:
-                points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
-                if is_inside(curves, (first, second)[one], points).any():
-                    return f"'{curve}' lies inside"
-    return ""

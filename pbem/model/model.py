@@ -154,7 +154,7 @@ class Model:
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
-    grid first, x fastest, then single points.
+    grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
@@ -177,3 +177,4 @@ class Model:
     initial_stress: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     interior_points: tuple[complex, ...] = ()
+    interior_grid: tuple[int, int] | None = None

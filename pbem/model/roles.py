@@ -14,13 +14,20 @@ from pbem.errors import Fault
 class Roles:
     """Every mapping is in the order of the curves in the file; curves with a faulty use are left out.
 
-    outer: curve to its region; shared: curve to its two regions; cracks: curve to its region.
+    outer: curve to its region; shared: curve to its two regions; cracks: curve to its region; contacts: name of a
+    contact to its two curves, which are outer ones.
     """
 
     outer: Mapping[str, str]
     shared: Mapping[str, tuple[str, str]]
     cracks: Mapping[str, str]
+    contacts: Mapping[str, tuple[str, str]]
     faults: tuple[Fault, ...]
+
+    @property
+    def in_contact(self) -> dict[str, str]:
+        """Curve to the contact that it is part of."""
+        return {curve: name for name, pair in self.contacts.items() for curve in pair}
 
 
 def unknown_name(case: Case, loc: tuple[str | int, ...], name: str, what: str, known: Iterable[str]) -> Fault:
@@ -63,7 +70,39 @@ def resolve_roles(case: Case) -> Roles:
             shared[name] = (bounds[name][0], bounds[name][1])
         else:
             outer[name] = bounds[name][0]
-    return Roles(outer, shared, cracks, tuple(faults))
+    kinds = {name: "an interface" for name in shared} | {name: "a crack" for name in cracks}
+    contacts, wrong = _resolve_contacts(case, outer, kinds)
+    return Roles(outer, shared, cracks, contacts, tuple(faults + wrong))
+
+
+def _resolve_contacts(
+    case: Case, outer: Mapping[str, str], kinds: Mapping[str, str]
+) -> tuple[dict[str, tuple[str, str]], list[Fault]]:
+    """kinds: what the curves are that are no outer ones; curves with faults of their own are in neither mapping."""
+    faults: list[Fault] = []
+    contacts: dict[str, tuple[str, str]] = {}
+    taken: dict[str, str] = {}
+    for name, table in case.contacts.items():
+        if name in kinds:
+            found = f"the name '{name}', which is that of {kinds[name]}"
+            faults.append(case.fault(("contacts", name), found, "a name of its own, under which results are stored"))
+        for index, curve in enumerate(table.between):
+            loc = ("contacts", name, "between", index)
+            if curve not in case.curves:
+                faults.append(unknown_name(case, loc, curve, "curve", outer or case.curves))
+            elif curve in kinds:
+                expected = "curves that bound one region each; what touches along one curve is told in [interfaces]"
+                faults.append(case.fault(loc, f"curve '{curve}', {kinds[curve]}", expected))
+            elif index and curve == table.between[0]:
+                faults.append(case.fault(loc, f"curve '{curve}' twice", "two different curves"))
+            elif curve in taken:
+                expected = "a curve in one contact only: split it where another body begins"
+                faults.append(case.fault(loc, f"curve '{curve}', which is in contact '{taken[curve]}' too", expected))
+            else:
+                taken[curve] = name
+        if all(curve in outer and taken.get(curve) == name for curve in table.between):
+            contacts[name] = table.between
+    return contacts, faults
 
 
 def _check_use(case: Case, name: str, bounds: list[str], inside: list[str]) -> Fault | None:

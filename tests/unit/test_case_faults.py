@@ -388,16 +388,12 @@ def test_wrong_value_is_told_with_its_place(old: str, new: str, place: str, text
 # Keys that are right and cannot be computed yet.
 UNSUPPORTED = {
     "contacts": ("[materials", '[contacts.seat]\nbetween = ["top", "bottom"]\n[materials', "contacts (line 2)"),
-    "gap by expression": ("friction = 0.5", 'gap = { expression = "x" }', "interfaces.interface.gap"),
     "interior": (
         "[materials",
         "[output]\ninterior = { box = [0, 0, 2, 2], shape = [3, 3] }\n[materials",
         "output.interior",
     ),
     "points": ("[materials", "[output]\npoints = [[0.5, 0.5]]\n[materials", "output.points (line 3)"),
-    "normal stiffness": ("friction = 0.5", "normal_stiffness = 1", "interfaces.interface.normal_stiffness"),
-    "tangential stiffness": ("friction = 0.5", "tangential_stiffness = 1", "interfaces.interface.tangential_stiffness"),
-    "cohesion lost": ("friction = 0.5", "cohesion_lost = true", "interfaces.interface.cohesion_lost"),
 }
 
 
@@ -406,17 +402,6 @@ def test_what_cannot_be_computed_yet_is_refused_once(old: str, new: str, place: 
     fault = find_only_fault(change(BLOCKS, (old, new)))
     assert fault.startswith(place)
     assert "not yet supported" in fault
-
-
-def test_slip_weakening_is_refused_for_each_key() -> None:
-    faults = find_faults(
-        change(BLOCKS, ("friction = 0.5", "friction = 0.5\nfriction_dynamic = 0.2\nslip_distance = 1e-4"))
-    )
-    assert [fault.place for fault in faults] == [
-        "interfaces.interface.friction_dynamic (line 29)",
-        "interfaces.interface.slip_distance (line 30)",
-    ]
-    assert all("not yet supported" in fault.expected for fault in faults)
 
 
 def test_half_of_slip_weakening_is_a_fault() -> None:

@@ -152,6 +152,10 @@ def test_json_schema_knows_every_key() -> None:
     assert "spring" in schema["$defs"]["ConditionTable"]["properties"]
     assert "spring" not in schema["$defs"]["StageConditionTable"]["properties"]
     assert schema["$defs"]["AnalysisTable"]["properties"]["tips"]["default"] is True
+    assert {"between", "friction", "gap", "file"} <= set(schema["$defs"]["ContactTable"]["properties"])
+    assert schema["$defs"]["ContactTable"]["required"] == ["between"]
+    stage = schema["$defs"]["StageTable"]["properties"]
+    assert {"boundary", "interfaces", "contacts", "remote", "gravity"} <= set(stage)
     assert {"law", "friction", "friction_angle", "cohesion", "gap", "pressure", "pressurised"} <= set(law)
     assert schema["$defs"]["MaterialTable"]["properties"]["young"]["exclusiveMinimum"] == 0
 

@@ -13,11 +13,6 @@ from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only
 DEFAULT = 'law = "coulomb"\nfriction = 0.5'
 
 
-@pytest.fixture(autouse=True)
-def everything_is_supported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbem.case.unsupported.REFUSALS", ())
-
-
 def with_law(lines: str) -> str:
     return change(BLOCKS, (DEFAULT, lines))
 
@@ -175,7 +170,7 @@ WRONG = {
     "gap with another key": (
         DEFAULT + '\ngap = { expression = "x", expr = "x" }',
         "interfaces.interface.gap.expr (line 29)",
-        "unknown key 'expr'; did you mean 'expression'?",
+        "unknown key 'expr'; expected one of: expression",
     ),
     "gap of nothing": (DEFAULT + "\ngap = {}", "interfaces.interface.gap.expression", "found no expression"),
     "gap with a number": (DEFAULT + "\ngap = { expression = 3 }", "interfaces.interface.gap", "a text in quotes"),

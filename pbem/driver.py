@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from pbem.errors import PbemError
+from pbem.errors import ConvergenceError, PbemError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.build import read_model
@@ -15,6 +16,7 @@ from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.output import check_output_path
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
+from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
 from pbem.solve.problem import assemble_problem
@@ -59,19 +61,20 @@ def _solve(
 ) -> None:
     """March through the load history; the first rank writes."""
 
+    interior = InteriorField(model, mesh, world) if model.interior_points else None
+    region = None if interior is None else interior.location.region
+
     def open_writer() -> ResultWriter | None:
         create = ResultWriter.resume if resume else ResultWriter
         flat = [f"{name}={value}" for name, value in options.items()]
-        return create(target, model, mesh, world.size, petsc_version(), flat)
+        return create(target, model, mesh, world.size, petsc_version(), flat, region)
 
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)
     try:
         problem = assemble_problem(model, mesh, world)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-        for step in march(problem, listener, start):
-            if writer:
-                writer.append(step)
+        store_steps(march(problem, listener, start), model.output_every, interior, writer)
     except BaseException as error:
         if writer:
             writer.__exit__(type(error), error, error.__traceback__)
@@ -79,3 +82,25 @@ def _solve(
     if writer:
         writer.finish()
     world.Barrier()
+
+
+def store_steps(
+    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None
+) -> None:
+    """Write the steps as they come, those that are stored with the field at the interior points."""
+    waiting: Step | None = None
+    try:
+        for step in steps:
+            stored = interior is not None and step.is_due(every)
+            waiting = None if stored else step
+            if interior is not None and stored:
+                step = replace(step, interior=interior.evaluate(step))
+            if writer:
+                writer.append(step)
+    except ConvergenceError:
+        # All ranks are here together: the last step reached is stored as well.
+        if interior is not None and waiting is not None:
+            field = interior.evaluate(waiting)
+            if writer:
+                writer.complete(field)
+        raise

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.mesh import Mesh
+from pbem.mesh.mesh import Mesh, second_face_nodes
 
 Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 
@@ -48,14 +47,14 @@ def differentiate(local: Real, s: Real) -> Real:
     return np.asarray(by_power @ np.linalg.inv(local[..., None] ** powers))
 
 
-def interpolate_tips(tip: Integer, local: Real, s: Real) -> Real:
+def interpolate_tips(tip: NDArray[np.integer], local: Real, s: Real) -> Real:
     """As `interpolate`, with shapes t^(k + 1/2), t = 0 at the tip and 1 at the other end; tip (e,): 1 start, 2 end."""
     t, nodes = _measure_from_tip(tip, s), _measure_from_tip(tip, local)
     exponents = np.arange(local.shape[1]) + 0.5
     return np.asarray(t[..., None] ** exponents @ np.linalg.inv(nodes[..., None] ** exponents))
 
 
-def differentiate_tips(tip: Integer, local: Real, s: Real) -> Real:
+def differentiate_tips(tip: NDArray[np.integer], local: Real, s: Real) -> Real:
     """Derivatives by s of the shapes of `interpolate_tips`; infinite at the tip itself."""
     t, nodes = _measure_from_tip(tip, s), _measure_from_tip(tip, local)
     exponents = np.arange(local.shape[1]) + 0.5
@@ -63,5 +62,14 @@ def differentiate_tips(tip: Integer, local: Real, s: Real) -> Real:
     return np.asarray(by_t * np.where(tip == 1, 0.5, -0.5)[:, None, None])
 
 
-def _measure_from_tip(tip: Integer, s: Real) -> Real:
+def _measure_from_tip(tip: NDArray[np.integer], s: Real) -> Real:
     return 0.5 * (1 + np.where(tip == 1, 1, -1)[:, None] * s)
+
+
+def split_faces(mesh: Mesh, values: Complex) -> tuple[Complex, Complex]:
+    """Values (f,) on the nodes of `list_faces(mesh)` at every mesh node (nodes,): those of the first face, and those of
+    the face across a crack (elsewhere the same)."""
+    first = values[: mesh.nodes]
+    opposite = first.copy()
+    opposite[second_face_nodes(mesh)] = values[mesh.nodes :]
+    return first, opposite

@@ -66,8 +66,11 @@ def write_attributes(
             del file.attrs[name]
 
 
-def write_header(file: h5py.File, model: Model, mesh: Mesh) -> None:
-    """Write all that does not change with the steps, and create the datasets that grow, without entries."""
+def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDArray[np.int64]) -> None:
+    """Write all that does not change with the steps, and create the datasets that grow, without entries.
+
+    interior_region (q,): index of the region of every interior point, -1 outside of all.
+    """
     faces = list_faces(mesh)
     _write_nodes(file, mesh, faces)
     steps = file.create_group("steps")
@@ -77,6 +80,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh) -> None:
     fields = file.create_group("fields")
     for name in ("displacement", "traction"):
         _create_growing(fields, name, (len(faces.position), 2), "f8")
+    _create_growing(fields, "hoop_stress", (len(faces.position),), "f8")
     reactions = file.create_group("reactions")
     reactions.attrs["names"] = _text(list(model.conditions))
     for name in model.conditions:
@@ -91,6 +95,12 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh) -> None:
     for name in model.crack_tips:
         for factor in ("KI", "KII"):
             _create_growing(tips.require_group(name), factor, (2,), "f8")
+    if model.interior_points:
+        interior = file.create_group("interior")
+        interior["position"] = to_columns(np.array(model.interior_points))
+        interior["region"] = interior_region.astype("i4")
+        _create_growing(interior, "displacement", (len(interior_region), 2), "f8")
+        _create_growing(interior, "stress", (len(interior_region), 3), "f8")
     file.create_dataset("convergence", shape=(0,), maxshape=(None,), dtype=ITERATION, chunks=(256,))
 
 

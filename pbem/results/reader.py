@@ -145,12 +145,37 @@ class Contact:
 
 
 @dataclass(frozen=True)
+class Interior:
+    """The q interior points: position (q, 2); region (q,), index into `Nodes.region_names`, -1 outside of all.
+
+    displacement (k, q, 2), stress (k, q, 3): sxx, syy, sxy, NaN outside of all regions; loaded at first use.
+    """
+
+    path: Path
+    position: Real
+    region: Integer
+    steps: int
+
+    @cached_property
+    def displacement(self) -> Real:
+        return self._load("displacement")
+
+    @cached_property
+    def stress(self) -> Real:
+        return self._load("stress")
+
+    def _load(self, name: str) -> Real:
+        with _open(self.path) as file:
+            return _freeze(file["interior"][name][: self.steps])
+
+
+@dataclass(frozen=True)
 class Results:
     """What a result file holds. k stored steps, n nodes.
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; tips: per crack its
-    stress-intensity factors; convergence: one row per Newton iteration with the fields step, iteration, residual,
-    changed, stick, slip, open, seconds.
+    stress-intensity factors; interior: points inside, None if the case has none; convergence: one row per Newton
+    iteration with the fields step, iteration, residual, changed, stick, slip, open, seconds.
     failure: why the run ended early (status "failed"), otherwise empty.
     """
 
@@ -170,6 +195,7 @@ class Results:
     reactions: Mapping[str, Real]
     contact: Mapping[str, Contact]
     tips: Mapping[str, Tips]
+    interior: Interior | None
     convergence: NDArray[Any] = field(repr=False)
 
     @cached_property
@@ -181,6 +207,11 @@ class Results:
     def traction(self) -> Real:
         """(k, n, 2) at the nodes, in units of stress, global axes."""
         return self._load("fields/traction")
+
+    @cached_property
+    def hoop_stress(self) -> Real:
+        """(k, n) normal stress along the boundary, at the nodes, in units of stress."""
+        return self._load("fields/hoop_stress")
 
     def displacement_at(self, step: int) -> Real:
         """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
@@ -278,6 +309,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         contact=_Interfaces(path, _names(file["contact"]), k),
         tips={name: Tips(*(_freeze(file["tips"][name][kind][:k]) for kind in ("KI", "KII")))
               for name in _names(file["tips"])},
+        interior=_read_interior(path, file, k),
         convergence=_freeze(file["convergence"][...]),
     )
 
@@ -305,6 +337,13 @@ def _read_contact(path: Path, file: h5py.File, name: str, steps: int) -> Contact
         path=path, name=name, first=str(group.attrs["first"]), second=str(group.attrs["second"]) or None, law=law,
         steps=steps, pairs=len(group["arc_length"]),
     )
+
+
+def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:
+    if "interior" not in file:
+        return None
+    group = file["interior"]
+    return Interior(path, _freeze(group["position"][...]), _read_indices(group, "region"), steps)
 
 
 def _read_indices(group: h5py.Group, name: str) -> Integer:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
+from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.errors import ConvergenceError, ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
@@ -29,7 +32,8 @@ from pbem.results.layout import (
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_step, truncate
 from pbem.results.tips import collect_tip_rules
-from pbem.solve.step import Iteration, Step
+from pbem.solve.backgrounds import evaluate_backgrounds
+from pbem.solve.step import Interior, Iteration, Step
 
 
 class ResultWriter:
@@ -42,12 +46,15 @@ class ResultWriter:
     Leaving the context sets the status to "finished"; leaving it by an exception, to "failed" with the attribute
     `failure` (text) and `failure_reason` (short name).
 
+    interior_region (q,): index of the region of every interior point (-1 outside of all), from `InteriorField`; needed
+    if the model has such points.
+
     last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one.
     """
 
     def __init__(
         self, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
-        petsc_options: Sequence[str] = (),
+        petsc_options: Sequence[str] = (), interior_region: NDArray[np.int64] | None = None,
     ) -> None:
         """Raises ResultFileError if the file cannot be written there."""
         target = check_output_path(path)
@@ -55,7 +62,8 @@ class ResultWriter:
         try:
             file = open_file(temporary, "w")
             try:
-                write_header(file, model, mesh)
+                regions = np.full(len(model.interior_points), -1) if interior_region is None else interior_region
+                write_header(file, model, mesh, regions)
                 write_attributes(file, model, ranks, petsc_version, petsc_options)
                 file.flush()
                 temporary.replace(target)
@@ -70,7 +78,7 @@ class ResultWriter:
     @classmethod
     def resume(
         cls, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
-        petsc_options: Sequence[str] = (),
+        petsc_options: Sequence[str] = (), interior_region: NDArray[np.int64] | None = None,
     ) -> ResultWriter:
         """A writer that goes on after the last step stored in an existing file of the same case.
 
@@ -100,6 +108,7 @@ class ResultWriter:
 
     def _start(self, path: Path, file: h5py.File, model: Model, mesh: Mesh, last_step: Step | None) -> None:
         self.path = path
+        self._model, self._mesh = model, mesh
         self.last_step = last_step
         self._file = file
         self._every = max(1, model.output_every)
@@ -115,15 +124,30 @@ class ResultWriter:
         """Store the step if it is its turn, and its iterations in any case; flush."""
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
-        if step.last_of_stage or step.number % self._every == 0:
+        if step.is_due(self._every):
             self._store(step)
         else:
             self._pending = step
         self._file.flush()
 
+    def complete(self, interior: Interior) -> None:
+        """The interior points of the step that was appended last, if it was not its turn to be stored."""
+        if self._pending is not None:
+            self._pending = replace(self._pending, interior=interior)
+
     def _store(self, step: Step) -> None:
         self._pending = None
         file = self._file
+        backgrounds = evaluate_backgrounds(self._model, step.stage, step.factor)
+        initial = [balanced for balanced, _ in backgrounds]
+        hoop_stress = evaluate_hoop_stress(self._mesh, initial, step.displacement, step.traction)
+        append_row(file["fields/hoop_stress"], hoop_stress)
+        if "interior" in file:
+            count = len(self._model.interior_points)
+            none = Interior(np.full(count, np.nan + 0j), np.full((count, 3), np.nan))
+            interior = step.interior or none
+            append_row(file["interior/displacement"], to_columns(interior.displacement))
+            append_row(file["interior/stress"], interior.stress)
         append_row(file["fields/displacement"], to_columns(step.displacement))
         append_row(file["fields/traction"], to_columns(step.traction))
         for name, nodes in self._nodes_of_curve.items():

@@ -43,12 +43,20 @@ class ContactState:
 
 
 @dataclass(frozen=True)
+class Interior:
+    """At the model's interior points (q,): displacement (q,) complex; stress sxx, syy, sxy (q, 3). NaN outside."""
+
+    displacement: NDArray[np.complex128]
+    stress: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class Step:
     """A converged load step.
 
     number: from 1 on, sub-steps counted; stage: index; factor: fraction of the stage reached, in (0, 1].
     displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
-    last_of_stage: True at factor 1.
+    interior: at the interior points, once evaluated. last_of_stage: True at factor 1.
     """
 
     number: int
@@ -59,10 +67,15 @@ class Step:
     displacement: NDArray[np.complex128]
     traction: NDArray[np.complex128]
     contact: ContactState
+    interior: Interior | None = None
 
     @property
     def last_of_stage(self) -> bool:
         return self.factor == 1.0
+
+    def is_due(self, every: int) -> bool:
+        """Whether the step is stored when every n-th is, and the last of each stage."""
+        return self.last_of_stage or self.number % every == 0
 
 
 class Reporter(Protocol):

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -61,7 +62,7 @@ def make_plane(
     order: int = 2,
     tips: bool = True,
     stages: tuple[Stage, ...] = (),
-    points: Sequence[complex] = (),
+    points: Sequence[complex] | NDArray[np.complex128] = (),
     size: float = 2.0,
 ) -> Model:
     """An infinite plane under a stress at infinity, with cracks in it and a hole that may hold an inclusion.

@@ -1,0 +1,76 @@
+"""Hoop stress, the normal stress along the boundary, at the nodes of all faces: from the stretch and Hooke's law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.background import Background
+from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_nodes, split_faces, stretch_elements
+from pbem.mesh.mesh import Mesh, second_face_nodes
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+def evaluate_hoop_stress(
+    mesh: Mesh, initial: Sequence[Background], displacement: Complex, traction: Complex
+) -> Real:
+    """Normal stress along the boundary (f,) at the nodes of `list_faces(mesh)`.
+
+    displacement, traction (f,) complex, at these nodes. initial: per region its material and in-situ stress, which has
+    no displacement. The stretch is the derivative of each element's own polynomial; on a crack's faces that of their
+    mean displacement, and plus or minus half that of the jump, which at a tip has the square-root shape: the hoop
+    stress then grows like 1/sqrt(distance) in mode II, as it should. Elements of order 0 have no stretch of their own:
+    there it is the difference between neighbours on the same curve.
+    """
+    second = second_face_nodes(mesh)
+    first, opposite = split_faces(mesh, displacement)
+    mean = _differentiate_along(mesh, 0.5 * (first + opposite), False)
+    half_jump = _differentiate_along(mesh, 0.5 * (first - opposite), True)
+    along = 1j * mesh.normal
+    stretch = np.concatenate([mean + half_jump, (mean - half_jump)[second]])
+    direction = np.concatenate([along, along[second]])
+    region = np.concatenate([mesh.node_region, mesh.node_region[second]])
+    position = np.concatenate([mesh.position, mesh.position[second]])
+    normal = -1j * direction * np.where(np.arange(len(region)) < mesh.nodes, 1.0, -1.0)
+    strain = (np.conj(direction) * stretch).real
+    stress = np.empty(len(region))
+    for number, background in enumerate(initial):
+        own = region == number
+        n, e = normal[own], direction[own]
+        at_rest = Background(background.material, initial=background.initial)
+        rest_n = (np.conj(n) * at_rest.traction(position[own], n)).real
+        rest_s = (np.conj(e) * at_rest.traction(position[own], e)).real
+        kappa = background.material.kappa
+        lateral = (3 - kappa) / (1 + kappa)  # Poisson's ratio of the plane problem
+        pressed = (np.conj(n) * traction[own]).real - rest_n
+        stress[own] = rest_s + background.material.plane_modulus * strain[own] + lateral * pressed
+    return stress
+
+
+def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Complex:
+    """Derivative of nodal values (nodes,) by the length in the direction of travel."""
+    if mesh.order == 0:
+        return _difference_neighbours(mesh, values)
+    local = locate_nodes(mesh)
+    shapes = differentiate(local, local)
+    tips = np.flatnonzero(mesh.tip)
+    if with_tips and len(tips):
+        shapes[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
+    by_local = np.einsum("epj,ej->ep", shapes, values.reshape(mesh.elements, -1))
+    return np.asarray(by_local / stretch_elements(mesh, local)).ravel()
+
+
+def _difference_neighbours(mesh: Mesh, values: Complex) -> Complex:
+    """Differences along chains of elements of the same curve, of second order inside of them."""
+    follows = (mesh.start[1:] == mesh.end[:-1]) & (mesh.region[1:] == mesh.region[:-1])
+    follows &= mesh.curve[1:] == mesh.curve[:-1]
+    result = np.zeros_like(values)
+    for chain in np.split(np.arange(mesh.elements), np.flatnonzero(~follows) + 1):
+        if len(chain) > 1:
+            length = mesh.weight[chain]
+            result[chain] = np.gradient(values[chain], np.cumsum(length) - 0.5 * length)
+    return result

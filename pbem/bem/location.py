@@ -1,0 +1,83 @@
+"""Where points of the plane lie: in which region, or on which element of the boundary."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.mesh import Mesh
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# A point lies on an element if it is nearer to it than this part of half its length, or if it is inside and this near
+# to one of the element's ends, where the polynomials of neighbours differ.
+TOUCHING = 1e-8
+NEAR_END = 1e-3
+CHUNK_BYTES = 32_000_000
+
+
+@dataclass(frozen=True)
+class Location:
+    """region (q,): index, -1 outside of all. element (q,): on which the point lies, or -1; s (q,): coordinate there.
+
+    A point on an interface belongs to the first of its regions, on a crack to the first face.
+    """
+
+    region: Integer
+    element: Integer
+    s: Real
+
+
+def locate_points(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> Location:
+    """Location of points (q,); infinite: per region, whether it is the outside of its loops.
+
+    By winding numbers: the angles that a region's elements subtend add up to a turn about the points inside. They are
+    exact for straight elements and arcs, so that no point is on the wrong side of a curved boundary.
+    """
+    most = max(1, CHUNK_BYTES // (16 * 4 * mesh.elements))
+    parts = [_locate_chunk(mesh, infinite, points[k : k + most]) for k in range(0, len(points), most)]
+    if not parts:
+        none = np.zeros(0, dtype=np.int64)
+        return Location(none, none, np.zeros(0))
+    return Location(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+
+def _locate_chunk(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> tuple[Integer, Integer, Real]:
+    half, middle = 0.5 * (mesh.end - mesh.start), 0.5 * (mesh.end + mesh.start)
+    w = (points[:, None] - middle) / half  # the chord from -1 to 1
+    quarter = np.tan(0.25 * mesh.sweep)
+    straight = np.divide(w + 1j * quarter, 1 + 1j * quarter * w)  # the element itself from -1 to 1
+    off = np.maximum(np.abs(straight.imag), np.abs(straight.real) - 1)
+    off = np.where(np.isfinite(off), off, np.inf)
+    nearest = np.argmin(off, axis=1)
+    row = np.arange(len(points))
+    touches = off[row, nearest] < TOUCHING
+    s = np.clip(straight.real[row, nearest], -1, 1)
+    turns = _add_angles(mesh, points, w, len(infinite))
+    inside = turns + np.array(infinite) == 1
+    region = np.where(inside.any(axis=1), np.argmax(inside, axis=1), -1)
+    region = np.where(touches, mesh.region[nearest], region)
+    element = np.where(touches, nearest, -1)
+    near_end = (np.abs(np.abs(straight.real) - 1 + 1j * straight.imag) < NEAR_END) & ~mesh.crack
+    near_end &= (mesh.region == region[:, None]) & ~touches[:, None]
+    close = near_end.any(axis=1)
+    element[close] = np.argmax(near_end[close], axis=1)
+    s[close] = np.clip(straight.real[close, element[close]], -1, 1)
+    return region, element, np.where(element >= 0, s, 0.0)
+
+
+def _add_angles(mesh: Mesh, points: Complex, w: Complex, regions: int) -> Integer:
+    """Winding numbers (q, regions) of the regions' loops about the points."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.angle((w - 1) / (w + 1))
+    # A point between an arc and its chord, which lies on the left of the arc and on the right of the chord.
+    bulging = np.where(mesh.sweep > 0, w.imag < 0, w.imag > 0)
+    between = (np.abs(points[:, None] - mesh.center) < np.abs(mesh.start - mesh.center)) & bulging & (mesh.sweep != 0)
+    angle = np.where(mesh.crack, 0.0, angle + 2 * np.pi * np.where(between, np.sign(mesh.sweep), 0.0))
+    turns = np.stack([angle[:, mesh.region == k].sum(axis=1) for k in range(regions)], axis=1)
+    return np.rint(np.nan_to_num(turns) / (2 * np.pi)).astype(np.int64)

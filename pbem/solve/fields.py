@@ -1,0 +1,70 @@
+"""The whole field at the interior points of a model, their evaluation shared by the ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from pbem.bem.hoop import evaluate_hoop_stress
+from pbem.bem.interior import InteriorRows, Values
+from pbem.bem.location import Location, locate_points
+from pbem.mesh.interpolation import split_faces
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.parallel import gather_parts
+from pbem.solve.backgrounds import evaluate_backgrounds
+from pbem.solve.step import Interior, Step
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+class InteriorField:
+    """The model's interior points, each rank with its share of them.
+
+    location: of all points, on every rank.
+    """
+
+    def __init__(self, model: Model, mesh: Mesh, comm: MPI.Intracomm) -> None:
+        points = np.array(model.interior_points, dtype=complex)
+        shares = np.linspace(0, len(points), comm.size + 1).astype(int)
+        own = points[shares[comm.rank] : shares[comm.rank + 1]]
+        self._model, self._mesh, self._comm = model, mesh, comm
+        self._points = own
+        self._location = locate_points(mesh, [region.infinite for region in model.regions], own)
+        self._rows = InteriorRows(mesh, [region.material for region in model.regions], own, self._location)
+        parts = [self._location.region, self._location.element, self._location.s]
+        region, element, s = (gather_parts(comm, np.asarray(part, dtype=float)) for part in parts)
+        self.location = Location(region.astype(np.int64), element.astype(np.int64), s)
+
+    def evaluate(self, step: Step) -> Interior:
+        """Displacement and stress at all points after a step, on every rank; all ranks call this together.
+
+        Inside, the sum of the region's backgrounds and of what the representation makes of the boundary values less the
+        balanced background. The far field is not taken from them: it goes on through the holes, so that from outside
+        the representation makes nothing of its part. On the boundary, the limits of the nodes' values.
+        """
+        mesh, backgrounds = self._mesh, evaluate_backgrounds(self._model, step.stage, step.factor)
+        first, opposite = split_faces(mesh, step.displacement)
+        displacement = np.where(mesh.node_crack, first - opposite, first)
+        traction = step.traction[: mesh.nodes].copy()
+        moved, stress = np.zeros_like(self._points), np.zeros((len(self._points), 3))
+        for region, (balanced, far) in enumerate(backgrounds):
+            nodes = np.flatnonzero((mesh.node_region == region) & ~mesh.node_crack)
+            displacement[nodes] -= balanced.displacement(mesh.position[nodes])
+            traction[nodes] -= balanced.traction(mesh.position[nodes], mesh.normal[nodes])
+            inside = (self._location.region == region) & (self._location.element < 0)
+            for background in (balanced, far):
+                moved[inside] += background.displacement(self._points[inside])
+                stress[inside] += background.stress(self._points[inside])
+        elastic = self._rows.evaluate(displacement, traction)
+        hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
+        limit = self._rows.evaluate_boundary(step.displacement, step.traction, hoop_stress)
+        return self._gather(Values(moved + elastic.displacement + limit.displacement,
+                                   stress + elastic.stress + limit.stress))
+
+    def _gather(self, part: Values) -> Interior:
+        flat = np.column_stack([part.displacement.real, part.displacement.imag, part.stress])
+        whole = gather_parts(self._comm, flat.ravel()).reshape(-1, 5)
+        return Interior(whole[:, 0] + 1j * whole[:, 1], whole[:, 2:])

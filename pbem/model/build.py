@@ -170,4 +170,5 @@ def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
         expected = "displacement conditions, springs, or bonded or touching neighbours, that prevent it"
         faults.append(case.fault(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
     sentence = "Nothing prevents: {}. The loads balance, and the mean displacement and rotation are set to zero."
-    return faults, [sentence.format("; ".join(balanced))] if balanced else []
+    listed = [*balanced[:6], *([f"and {len(balanced) - 6} more"] if len(balanced) > 6 else [])]
+    return faults, [sentence.format("; ".join(listed))] if balanced else []

@@ -27,6 +27,13 @@ def extremes(leg: Leg) -> NDArray[np.complex128]:
     return np.array(points)
 
 
+def surround(legs: Sequence[Leg]) -> tuple[complex, complex]:
+    """Lower left and upper right corner of the box around some legs."""
+    points = np.concatenate([extremes(leg) for leg in legs])
+    x, y = points.real, points.imag
+    return complex(x.min(), y.min()), complex(x.max(), y.max())
+
+
 def fraction_of_arc(leg: Leg, point: complex) -> float:
     """Fraction of the sweep where the ray from the center to the point cuts the circle; not in [0, 1] off the arc."""
     assert leg.center is not None

@@ -16,7 +16,7 @@ from pbem.case import Case
 from pbem.case.finding import list_names
 from pbem.errors import Fault
 from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, winding_number
+from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
 from pbem.model.junction import format_point
 from pbem.model.model import Loop, Side
 
@@ -199,12 +199,17 @@ def _nest(
     ]
     faults = []
     loc = ("regions", region, "boundary")
+    boxes = [surround(chain.legs) for chain in chains]
+    low, high = (np.array(corners) for corners in zip(*boxes, strict=True))
     for i, chain in enumerate(turned):
         names = list_names([side.curve for side in chain.sides], 4)
         points = np.concatenate([inner_points(leg, 3) for leg in chain.legs])
-        for j, other in enumerate(turned):
+        near = (low.real <= high[i].real) & (low.imag <= high[i].imag)
+        near &= (high.real >= low[i].real) & (high.imag >= low[i].imag)
+        for j in (int(number) for number in np.flatnonzero(near | (np.arange(len(chains)) == outer))):
             if i == j:
                 continue
+            other = turned[j]
             around = list_names([side.curve for side in other.sides], 4)
             inside = winding_number(other.legs, points) != 0
             if j == outer and not inside.all():

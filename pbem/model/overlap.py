@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from pbem.case import Case
 from pbem.errors import Fault
 from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import extremes, inner_points, measure_distances, meeting_points, project, winding_number
+from pbem.model.intersection import (
+    inner_points,
+    measure_distances,
+    meeting_points,
+    project,
+    surround,
+    winding_number,
+)
 from pbem.model.junction import format_point
 from pbem.model.loop import Loops, loop_legs
 from pbem.model.model import Loop
@@ -43,14 +50,8 @@ class _Body:
 def _make_body(case: Case, curves: Mapping[str, Curve], name: str, loops: tuple[Loop, ...]) -> _Body:
     legs = loop_legs(curves, loops)
     infinite = case.regions[name].infinite
-    low, high = (complex(-np.inf, -np.inf), complex(np.inf, np.inf)) if infinite else _surround(legs)
+    low, high = (complex(-np.inf, -np.inf), complex(np.inf, np.inf)) if infinite else surround(legs)
     return _Body(name, {side.curve: side.forward for loop in loops for side in loop.sides}, legs, infinite, low, high)
-
-
-def _surround(legs: Sequence[Leg]) -> tuple[complex, complex]:
-    points = np.concatenate([extremes(leg) for leg in legs])
-    x, y = points.real, points.imag
-    return complex(x.min(), y.min()), complex(x.max(), y.max())
 
 
 def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: float) -> list[Fault]:
@@ -60,7 +61,7 @@ def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: 
     """
     faults = []
     bodies = [_make_body(case, curves, name, own) for name, own in loops.items()]
-    boxes = {name: _surround(curve.legs) for name, curve in curves.items()}
+    boxes = {name: surround(curve.legs) for name, curve in curves.items()}
     touching = {curve: other for pair in roles.contacts.values() for curve, other in (pair, pair[::-1])}
     for first, second in _pair_near(bodies):
         found = _overlap(curves, boxes, first, second, touching, tolerance)

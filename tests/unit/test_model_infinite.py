@@ -213,6 +213,19 @@ def test_initial_stress_of_materials() -> None:
     assert [fault.place.split(" ")[0] for fault in find_faults(text)] == ["initial_stress.hard", "initial_stress.sotf"]
 
 
+def test_many_inclusions_side_by_side() -> None:
+    names = [f"rim{i}{j}" for i in range(5) for j in range(5)]
+    curves = [f"{n} = {{ center = [{n[3]}, {n[4]}], radius = 0.3, elements = 8 }}" for n in names]
+    regions = [f'[regions.{n}]\nmaterial = "soft"\nboundary = ["{n}"]\n' for n in names]
+    laws = [f'[interfaces.{n}]\nlaw = "frictionless"\n' for n in names]
+    listed = ", ".join(f'"{n}"' for n in names)
+    host = f'[regions.host]\nmaterial = "soft"\ninfinite = true\nboundary = [{listed}]\n'
+    model = build(MATERIAL + "[curves]\n" + "\n".join(curves) + "\n" + "".join([host, *regions, *laws]))
+    assert len(model.regions[0].loops) == 25 and len(find_free_motions(model)) == 25
+    (note,) = [note for note in model.notes if "Nothing prevents" in note]
+    assert note.count("rotation about") == 6 and "; and 19 more. The loads balance" in note
+
+
 def test_frictionless_inclusion_in_a_plane_turns_freely_and_balances() -> None:
     text = f"""{MATERIAL}
 [curves]

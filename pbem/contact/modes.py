@@ -88,14 +88,16 @@ def slip_path(modes: ModeState, memory: Memory, slip: Real) -> Real:
     return memory.path + np.maximum(ahead, 0.0)
 
 
-def measure_law_error(laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real) -> float:
-    """Largest distance of a slipping pair's p_s from the bound at its state, relative to the largest traction."""
+def measure_law_error(
+    laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0
+) -> float:
+    """Largest distance of a slipping pair's p_s from its bound, relative to the largest traction or the floor."""
     slips = modes.mode == SLIP
     admissible = np.minimum(state.p_n, tensile_limit(laws, memory) - pressure)
     path = slip_path(modes, memory, plastic_slip(laws, state))
     bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
     error = np.abs(state.p_s - modes.sign * bound)[slips]
-    scale = _largest_traction(state)
+    scale = max(_largest_traction(state), floor)
     return float(error.max(initial=0.0) / scale) if scale > 0 else 0.0
 
 
@@ -120,20 +122,28 @@ ROUNDING = 1e-10
 
 
 def propose_modes(
-    laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, softening: float = 1.0
+    laws: PairLaws,
+    modes: ModeState,
+    state: PairState,
+    memory: Memory,
+    pressure: Real,
+    softening: float = 1.0,
+    floor: float = 0.0,
 ) -> Proposal:
     """Choose modes from trial values (semi-smooth Newton); a mode is kept while rounding could decide.
 
     Open if p_n + pressure exceeds the tensile strength, or if r g_n > 0 in a pair that is open already; else slip if
     |p_s + r (slip - slip before)| exceeds the friction bound, with the sign of that trial; else stick. softening
-    multiplies r. Brittle bonds that are not lost stick: `find_failures` tells when they fail.
+    multiplies r; floor: a stress of the size of modulus times strain, where tractions are all but gone. Brittle bonds
+    that are not lost stick: `find_failures` tells when they fail.
     """
     stiffness = softening * laws.stiffness
     is_open = modes.mode == OPEN
     slip = plastic_slip(laws, state)
     normal = state.p_n + stiffness * np.where(is_open, state.g_n - laws.compliance_n * state.p_n, 0.0)
     tangential = state.p_s + stiffness * np.where(modes.mode == STICK, 0.0, slip - memory.slip)
-    margin = ROUNDING * max(_largest_traction(state), *(np.abs(a).max(initial=0.0) for a in (normal, tangential)))
+    trials = (np.abs(a).max(initial=0.0) for a in (normal, tangential))
+    margin = ROUNDING * max(_largest_traction(state), floor, *trials)
     # The strength is that of faces in touch: a pair that is open comes back only when its faces meet again.
     limit = tensile_limit(laws, memory)
     parting = normal + pressure - np.where(is_open, 0.0, limit)
@@ -168,10 +178,12 @@ def limit_changes(modes: ModeState, proposal: Proposal, share: float) -> ModeSta
 FAIL_TOGETHER = 0.7
 
 
-def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Real) -> Bool:
+def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0) -> Bool:
     """The intact brittle bonds (m,) that fail next: those overloaded most."""
     strength = evaluate_strength(laws, np.minimum(state.p_n, 0.0), memory.path, pressure, memory.broken)
     overload = np.maximum(state.p_n + pressure - laws.tensile_strength, np.abs(state.p_s) - strength.bound)
     overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)
     worst = overload.max(initial=0.0)
-    return overload >= FAIL_TOGETHER * worst if worst > ROUNDING * _largest_traction(state) else overload < -np.inf
+    if worst <= ROUNDING * max(_largest_traction(state), floor):
+        return np.zeros(laws.count, dtype=bool)
+    return overload >= FAIL_TOGETHER * worst

@@ -52,6 +52,9 @@ class Caution:
     share: float
 
 
+# Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
+STRAIN_FLOOR = 0.1
+
 # Each cycle of modes moves one level down; the last changes one pair at a time.
 CAUTIONS = (Caution(1.0, 0.0), Caution(0.1, 0.0), Caution(0.01, 0.3), Caution(0.01, 1.0))
 
@@ -75,13 +78,14 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
         law = linearise(laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale)
         unknowns, v, residual = _solve_linearised(problem, tangent, modes, law, load)
         pairs = evaluate_pairs(problem.mesh, law, unknowns)
-        proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening)
-        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure)
+        floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(unknowns).max())
+        proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening, floor)
+        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-        failing = find_failures(laws, pairs, memory, load.pressure)
+        failing = find_failures(laws, pairs, memory, load.pressure, floor)
         if settled and failing.any():
             memory = replace(memory, broken=memory.broken | failing)
-            proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening)
+            proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening, floor)
             search.restart(modes)
         iterations.append(_record(len(iterations) + 1, residual, modes, proposal, begin))
         reporter.iterate(iterations[-1])

@@ -9,6 +9,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
 
 from pbem.bem.operator import (
     Block,
@@ -166,9 +167,13 @@ class Tangent:
         for block, columns in zip(operator.blocks, problem.block_columns, strict=True):
             lengths[block.rows] = len(columns)
         self.solver.allocate(lengths)
+        self.formed: sparse.csr_matrix | None = None
 
     def update(self, constraints: ConstraintMap) -> None:
-        """Form K for a constraint map."""
+        """Form K for a constraint map; K and its factors stay if no pair has changed its mode since the last time."""
+        if self.formed is not None and _are_equal(self.formed, constraints.matrix):
+            return
+        self.formed = constraints.matrix
         operator = self.problem.operator
         for block, columns in zip(operator.blocks, self.problem.block_columns, strict=True):
             self.solver.fill(block.rows, columns, operator.multiply_block(block, constraints.matrix, columns))
@@ -180,3 +185,9 @@ class Tangent:
 
     def destroy(self) -> None:
         self.solver.destroy()
+
+
+def _are_equal(one: sparse.csr_matrix, other: sparse.csr_matrix) -> bool:
+    """Whether two constraint maps are the same numbers in the same places."""
+    parts = ((one.indptr, other.indptr), (one.indices, other.indices), (one.data, other.data))
+    return all(np.array_equal(mine, yours) for mine, yours in parts)

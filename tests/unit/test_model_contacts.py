@@ -155,6 +155,31 @@ def test_cylinder_on_a_plane(order: str) -> None:
     assert len(find_free_motions(raised)) == 3
 
 
+def test_cap_that_grazes_between_all_samples() -> None:
+    """The lowest point of the arc is neither an end of a leg nor a sample of one."""
+    begin, end = (0.123 + cmath.exp(1j * math.radians(angle)) for angle in (190, 340))
+
+    def lower(depth: float) -> str:
+        rim = "rim = { center = [0, 1], radius = 1, elements = 32 }"
+        low = 1 - depth
+        left, right = (f"[{point.real!r}, {point.imag + low!r}]" for point in (begin, end))
+        arc = f"rim = {{ center = [0.123, {low!r}], radius = 1, angles = [190, 340], elements = 32 }}"
+        top = f"top = {{ points = [{left}, [0, 2.5], {right}], elements = 8 }}"
+        return change(CYLINDER, (rim, f"{arc}\n{top}"), ('boundary = ["rim"]', 'boundary = ["rim", "top"]'))
+
+    assert list(build(lower(0.0)).contacts) == ["seat"]
+    assert "0.0001 deep at (" in find_only_fault(lower(1e-4))
+
+
+def test_two_curves_of_one_body() -> None:
+    facing = change(write(lift=0.1), ('["punch_face", "base_face"]', '["left", "right"]'))
+    assert build(facing).contacts["seat"].first == "left"
+    # They may not cross, as the body would not be one.
+    line = next(line for line in facing.splitlines() if line.startswith("left"))
+    crossed = change(facing, (line, "left = { points = [[0.0, 1.0], [4.0, 0.5], [0.0, 0.0]], elements = 8 }"))
+    assert "crossing or touching curve 'right'" in find_faults(crossed)[0].found
+
+
 def test_vertex_of_the_circle_that_touches_is_no_fault() -> None:
     for center in ("[0.123, 1]", "[-0.7, 1]"):
         assert list(build(change(CYLINDER, ("center = [0, 1]", f"center = {center}"))).contacts) == ["seat"]

@@ -56,6 +56,27 @@ def test_displacement_that_only_the_first_stage_gives() -> None:
     assert [stage.boundary["top"] for stage in model.stages] == [(0.0, -1.0), (2.0, -1.0)]
 
 
+def test_springs() -> None:
+    text = change(SQUARE, ("ty = -1.0", "spring = { kn = 30, ks = 0.5 }"))
+    condition = build(text).conditions["top"]
+    assert (condition.frame, condition.known, condition.stiffness) == ("local", ("traction", "traction"), (30.0, 0.5))
+    for extra, values in (("tn = 2\nts = 3", (2.0, 3.0)), ("pressure = 4", (-4.0, 0.0)), ("", (0.0, 0.0))):
+        assert build(change(text, ("spring", f"{extra}\nspring"))).stages[0].boundary["top"] == values
+    held = build(change(text, ("spring = { kn = 30, ks = 0.5 }", "us = 0.1\nspring = { kn = 30 }"))).conditions["top"]
+    assert held.known == ("traction", "displacement") and held.stiffness == (30.0, 0.0)
+
+
+def test_load_on_a_spring_over_the_stages() -> None:
+    text = change(SQUARE, ("ty = -1.0", "spring = { kn = 30 }"))
+    model = build(with_stages(text, "[stages.boundary.top]\npressure = 2", "", "[stages.boundary.top]\ntn = 0"))
+    assert [stage.boundary["top"] for stage in model.stages] == [(-2.0, 0.0), (-2.0, 0.0), (0.0, 0.0)]
+    assert model.conditions["top"].stiffness == (30.0, 0.0)
+    fault = find_only_fault(with_stages(text, "[stages.boundary.top]\nun = 2"))
+    assert fault.startswith("stages[1].boundary.top.un") and "'un' where 'spring' was given before" in fault
+    fault = find_only_fault(with_stages(text, "[stages.boundary.top]\nty = 2"))
+    assert "'ty', a global component; expected local components as before" in fault
+
+
 WRONG = {
     "another kind later": (
         "[stages.boundary.top]\ntx = 1.0",

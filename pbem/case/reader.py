@@ -17,7 +17,6 @@ from pbem.case.places import Loc, find_line, find_lines, format_place
 from pbem.case.repair import repair
 from pbem.case.schema import CaseFile
 from pbem.case.translation import find_schema_findings
-from pbem.case.unsupported import find_refusals
 from pbem.errors import CaseError, Fault
 
 
@@ -96,14 +95,10 @@ def parse_draft(text: str, source: str = "case") -> Draft:
         return _refuse("the file", "nothing (an empty file)", "the tables [materials.*], [curves] and [regions.*]")
     lines = find_lines(text)
     findings = _order(find_conflicts(raw) + find_schema_findings(raw), lines)
-    wrong = {finding.loc for finding in findings}
-    refusals = [(refusal, finding) for refusal, finding in find_refusals(raw) if not _touches(finding.loc, wrong)]
-    every = _order([*findings, *(finding for _, finding in refusals)], lines)
     faults = tuple(
-        Fault(format_place(f.loc, find_line(lines, f.loc)), f.found, f.expected) for f in every
+        Fault(format_place(f.loc, find_line(lines, f.loc)), f.found, f.expected) for f in findings
     )
-    separable = all(refusal.separable for refusal, _ in refusals)
-    case = _compose_draft(raw, every, text, source, lines) if separable else None
+    case = _compose_draft(raw, findings, text, source, lines)
     return Draft(case, faults, not any(_concerns_loads(finding.loc) for finding in findings))
 
 
@@ -121,11 +116,6 @@ def _concerns_loads(loc: Loc) -> bool:
         return loc[-1] == "density"
     return bool(loc) and (loc[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
                           loc[0] not in CaseFile.model_fields)
-
-
-def _touches(loc: Loc, wrong: set[Loc]) -> bool:
-    """A fault at the key, or in it (spring = { kx = 1 }), comes before its refusal."""
-    return any(other[: len(loc)] == loc for other in wrong)
 
 
 def _order(findings: list[Finding], lines: Mapping[Loc, int]) -> list[Finding]:

@@ -386,24 +386,6 @@ def test_wrong_value_is_told_with_its_place(old: str, new: str, place: str, text
 
 
 # Keys that are right and cannot be computed yet.
-UNSUPPORTED = {
-    "contacts": ("[materials", '[contacts.seat]\nbetween = ["top", "bottom"]\n[materials', "contacts (line 2)"),
-    "interior": (
-        "[materials",
-        "[output]\ninterior = { box = [0, 0, 2, 2], shape = [3, 3] }\n[materials",
-        "output.interior",
-    ),
-    "points": ("[materials", "[output]\npoints = [[0.5, 0.5]]\n[materials", "output.points (line 3)"),
-}
-
-
-@pytest.mark.parametrize(("old", "new", "place"), UNSUPPORTED.values(), ids=UNSUPPORTED.keys())
-def test_what_cannot_be_computed_yet_is_refused_once(old: str, new: str, place: str) -> None:
-    fault = find_only_fault(change(BLOCKS, (old, new)))
-    assert fault.startswith(place)
-    assert "not yet supported" in fault
-
-
 def test_half_of_slip_weakening_is_a_fault() -> None:
     text = change(BLOCKS, ("friction = 0.5", "friction = 0.5\nslip_distance = 1e-4"))
     assert "friction_dynamic and slip_distance together" in find_only_fault(text)

@@ -134,8 +134,7 @@ def test_explicit_grading_of_a_circle_is_at_its_seam() -> None:
     assert refined(model, "hole") == [START, NEITHER, NEITHER, END]
 
 
-def test_bodies_in_contact_do_not_disturb_each_other_where_they_pass_smoothly(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbem.case.unsupported.REFUSALS", ())
+def test_bodies_in_contact_do_not_disturb_each_other_where_they_pass_smoothly() -> None:
     text = change(SQUARE, ("[regions.body]", "disc = { center = [1, 3], radius = 1, elements = 8 }\n[regions.body]"))
     text += '[regions.disc]\nmaterial = "soft"\nboundary = ["disc"]\n[contacts.seat]\nbetween = ["disc", "top"]\n'
     text = change(text, ("[[2, 2], [0, 2]]", "[[2, 2], [1, 2], [0, 2]]"), ("[boundary.top]\nty = -1.0\n", ""))

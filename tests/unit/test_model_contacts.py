@@ -12,11 +12,6 @@ from pbem.model.support import find_free_motions
 from tests.unit.case_sample import MATERIAL, build, change, find_faults, find_only_fault
 
 
-@pytest.fixture(autouse=True)
-def everything_is_supported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbem.case.unsupported.REFUSALS", ())
-
-
 def write(angle: float = 0.0, scale: float = 1.0, lift: float = 0.0, left: float = 1.0, right: float = 2.0) -> str:
     """A punch on a base; the punch stands from x = left to right, `lift` above the base's top at y = 1."""
     turn = scale * cmath.exp(1j * math.radians(angle))

@@ -7,11 +7,6 @@ import pytest
 from tests.unit.case_sample import SQUARE, build, find_faults, find_only_fault
 
 
-@pytest.fixture(autouse=True)
-def everything_is_supported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pbem.case.unsupported.REFUSALS", ())
-
-
 def with_output(lines: str) -> str:
     return f"{SQUARE}[output]\n{lines}\n"
 

@@ -44,11 +44,20 @@ class Linearisation:
 
 
 def linearise(
-    laws: PairLaws, modes: ModeState, p_n: Real, slip: Real, memory: Memory, pressure: Real, traction_scale: float
+    laws: PairLaws,
+    modes: ModeState,
+    p_n: Real,
+    slip: Real,
+    memory: Memory,
+    pressure: Real,
+    traction_scale: float,
+    frozen: bool = False,
 ) -> Linearisation:
     """The affine law of every pair in its mode; a traction is traction_scale times its unknown, a jump the unknown.
 
     p_n, slip (m,): normal tractions and plastic slips at which the friction bound is taken; pressure (m,): of fluid.
+    frozen: leave out how the bound changes with slip. Where friction weakens faster than the bodies unload, the tangent
+    sends the slip backwards; taken step by step with a fixed bound it runs on until it finds the next equilibrium.
     """
     tangent = np.zeros((laws.count, 4, 2))
     offset = np.zeros((laws.count, 4))
@@ -63,7 +72,7 @@ def linearise(
     # Rounding must not put a pair without cohesion beyond the apex of its cone, where friction has no slope.
     admissible = np.minimum(p_n, tensile_limit(laws, memory) - pressure)
     strength = evaluate_strength(laws, admissible, slip_path(modes, memory, slip), pressure, memory.broken)
-    by_n, by_s = modes.sign * strength.by_traction, strength.by_slip
+    by_n, by_s = modes.sign * strength.by_traction, np.zeros(laws.count) if frozen else strength.by_slip
     p_s = modes.sign * strength.bound
     along = np.stack([by_n * traction_scale, by_s], axis=1)
     constant = p_s - by_n * admissible - by_s * slip

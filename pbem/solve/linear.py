@@ -72,19 +72,19 @@ class LinearSolver:
         right = PETSc.Vec().createMPI(self.shape[0], comm=self.comm)
         return right, right.duplicate()
 
-    def allocate(self, row_lengths: Integer) -> None:
-        """Make the matrix; row_lengths (local_rows,): the number of columns in which each row can be non-zero."""
+    def allocate(self, inside: Integer, outside: Integer) -> None:
+        """Make the matrix; inside, outside (local_rows,): numbers of columns in which each row can be non-zero.
+
+        Inside are the columns with the numbers of this rank's rows.
+        """
         if self.method == "lu":
             self.matrix = PETSc.Mat().createDense(self.shape, comm=self.comm)
             self.matrix.setUp()
             return
-        begin = int(self.comm.exscan(self.shape[0][0]) or 0)
-        first, last = begin, begin + self.shape[0][0]
         self.matrix = PETSc.Mat().create(comm=self.comm)
         self.matrix.setSizes(self.shape)
         self.matrix.setType("aij")
-        inside = np.minimum(row_lengths, last - first).astype(PETSc.IntType)
-        self.matrix.setPreallocationNNZ((inside, row_lengths.astype(PETSc.IntType)))
+        self.matrix.setPreallocationNNZ((inside.astype(PETSc.IntType), outside.astype(PETSc.IntType)))
         self.matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, True)
 
     def fill(self, rows: Integer, columns: Integer, values: Real) -> None:

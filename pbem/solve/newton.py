@@ -46,17 +46,21 @@ class Solution:
 
 @dataclass(frozen=True)
 class Caution:
-    """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest."""
+    """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest.
+
+    frozen: friction that depends on slip is taken as it is at the last iterate.
+    """
 
     softening: float
     share: float
+    frozen: bool = False
 
 
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
 # Each cycle of modes moves one level down; the last changes one pair at a time.
-CAUTIONS = (Caution(1.0, 0.0), Caution(0.1, 0.0), Caution(0.01, 0.3), Caution(0.01, 1.0))
+CAUTIONS = (Caution(1.0, 0.0), Caution(0.1, 0.0, True), Caution(0.01, 0.3, True), Caution(0.01, 1.0, True))
 
 
 def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
@@ -75,7 +79,9 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
-        law = linearise(laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale)
+        law = linearise(
+            laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale, search.caution.frozen
+        )
         unknowns, v, residual = _solve_linearised(problem, tangent, modes, law, load)
         pairs = evaluate_pairs(problem.mesh, law, unknowns)
         floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(unknowns).max())

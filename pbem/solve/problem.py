@@ -163,10 +163,11 @@ class Tangent:
         self.solver = LinearSolver(
             problem.comm, method, operator.rows, problem.unknowns, reuse=options.linear == "gmres"
         )
-        lengths = np.zeros(operator.rows, dtype=np.int64)
+        inside, outside = np.zeros((2, operator.rows), dtype=np.int64)
         for block, columns in zip(operator.blocks, problem.block_columns, strict=True):
-            lengths[block.rows] = len(columns)
-        self.solver.allocate(lengths)
+            own = (columns >= 2 * operator.first_node) & (columns < 2 * operator.last_node)
+            inside[block.rows], outside[block.rows] = own.sum(), (~own).sum()
+        self.solver.allocate(inside, outside)
         self.formed: sparse.csr_matrix | None = None
 
     def update(self, constraints: ConstraintMap) -> None:

@@ -61,7 +61,7 @@ def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Comple
     if with_tips and len(tips):
         shapes[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
     by_local = np.einsum("epj,ej->ep", shapes, values.reshape(mesh.elements, -1))
-    return np.asarray(by_local / stretch_elements(mesh, local)).ravel()
+    return np.asarray(by_local / stretch_elements(mesh, np.arange(mesh.elements), local)).ravel()
 
 
 def _difference_neighbours(mesh: Mesh, values: Complex) -> Complex:

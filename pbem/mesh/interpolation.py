@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
 Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 
@@ -27,10 +28,10 @@ def locate_nodes(mesh: Mesh) -> Real:
     return find_coordinates(mesh.start, mesh.end, mesh.sweep, mesh.position.reshape(mesh.elements, -1))
 
 
-def stretch_elements(mesh: Mesh, s: Real) -> Real:
-    """Length per unit of s (e, p) at the coordinates s (e, p)."""
-    half = 0.5 * np.abs(mesh.end - mesh.start)[:, None]
-    quarter = np.tan(0.25 * mesh.sweep)[:, None]
+def stretch_elements(mesh: Mesh, elements: Integer, s: Real) -> Real:
+    """Length per unit of s (k, p) at the coordinates s (k, p) of some elements (k,)."""
+    half = 0.5 * np.abs(mesh.end - mesh.start)[elements, None]
+    quarter = np.tan(0.25 * mesh.sweep)[elements, None]
     return half * (1 + quarter**2) / (1 + (quarter * s) ** 2)
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from pbem.mesh.mesh import Mesh
 from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
-from pbem.results.reader import Contact, Results, Tips
+from pbem.results.contents import Tips
+from pbem.results.reader import Contact, Results
 from pbem.solve.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
-MOST_TIPS = 12
+MOST_TIPS = 10
 
 
 def describe_model(model: Model, mesh: Mesh) -> str:
@@ -57,6 +58,7 @@ def describe_results(results: Results) -> str:
             ["interface", "pairs", "stick", "slip", "open", "max opening", "max |slip|"],
             [_contact_row(each) for each in _first(results.contact.values())]) + _left_out(len(results.contact))))
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
+        parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
@@ -189,6 +191,15 @@ def _contact_row(contact: Contact) -> list[str]:
     counts = [str(int((mode == which).sum())) for which in (STICK, SLIP, OPEN)]
     return [contact.name, str(contact.pairs), *counts, _number(contact.opening[-1].max()),
             _number(np.abs(contact.slip[-1]).max())]
+
+
+def _describe_energy(results: Results) -> list[str]:
+    """The balance, and what it lacks: a measure of the mesh."""
+    external, elastic, dissipated = (float(each[-1]) for each in vars(results.energy).values())
+    scale = max(abs(external), abs(elastic), dissipated)
+    lacks = (external - elastic - dissipated) / scale if scale else 0.0
+    return [f"external work {_number(external)} = elastic {_number(elastic)} + dissipated {_number(dissipated)}, "
+            f"to {abs(lacks):.1e} of the largest"]
 
 
 def _describe_tips(results: Results) -> list[str]:

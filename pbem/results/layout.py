@@ -27,6 +27,7 @@ PAIR_DATASETS = {
     "mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8",
     "slip_path": "f8", "broken": "?",
 }
+ENERGIES = ("external", "elastic", "dissipated")
 CHUNK_BYTES = 32768
 
 
@@ -95,6 +96,9 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     for name in model.crack_tips:
         for factor in ("KI", "KII"):
             _create_growing(tips.require_group(name), factor, (2,), "f8")
+    energy = file.create_group("energy")
+    for name in ENERGIES:
+        _create_growing(energy, name, (), "f8")
     if model.interior_points:
         interior = file.create_group("interior")
         interior["position"] = to_columns(np.array(model.interior_points))

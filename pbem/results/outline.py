@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.results.reader import Elements, Nodes
+from pbem.results.contents import Elements, Nodes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -14,77 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError
+from pbem.results.contents import Elements, Energies, Nodes, Steps, Tips, Units
+from pbem.results.layout import ENERGIES
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
 STATUSES = ("running", "finished", "failed")
-
-
-@dataclass(frozen=True)
-class Units:
-    """Labels of the units of length and stress, as the case gives them."""
-
-    length: str
-    stress: str
-
-
-@dataclass(frozen=True)
-class Nodes:
-    """Collocation nodes of all regions, both faces of every crack: position, normal (n, 2); indices (n,)."""
-
-    position: Real
-    normal: Real
-    region: Integer
-    curve: Integer
-    element: Integer
-    order: int
-    region_names: tuple[str, ...]
-    curve_names: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Elements:
-    """vertices (e, 2, 2): start and end point in the direction of travel; region, curve (e,); crack (e,) bool.
-    sweep (e,): the signed angle (radians, counter-clockwise positive) that an arc turns through, 0 if straight.
-    tip (e,): 1 or 2 where the jump has the square-root shape of a crack tip at the element's start or end, else 0.
-
-    The nodes of element i are i * (order + 1) and the `order` that follow.
-    """
-
-    vertices: Real
-    sweep: Real
-    region: Integer
-    curve: Integer
-    crack: NDArray[np.bool_]
-    tip: Integer
-
-
-@dataclass(frozen=True)
-class Tips:
-    """Stress-intensity factors of a crack over the k stored steps: KI, KII (k, 2), at its start and at its end.
-
-    Stress times the root of length; NaN at an end that is no tip. KI >= 0 opens. KII > 0 if the face on the left of the
-    crack's direction moves along it, at both ends.
-    """
-
-    KI: Real
-    KII: Real
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Of every stored step (k,): its number (from 1), stage (index), factor in (0, 1], Newton iterations, residual."""
-
-    number: Integer
-    stage: Integer
-    factor: Real
-    iterations: Integer
-    residual: Real
-    stage_names: tuple[str, ...]
-
-    def __len__(self) -> int:
-        return len(self.factor)
 
 
 @dataclass(frozen=True)
@@ -174,8 +110,8 @@ class Results:
     """What a result file holds. k stored steps, n nodes.
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; tips: per crack its
-    stress-intensity factors; interior: points inside, None if the case has none; convergence: one row per Newton
-    iteration with the fields step, iteration, residual, changed, stick, slip, open, seconds.
+    stress-intensity factors; energy: the balance; interior: points inside, None if the case has none; convergence: one
+    row per Newton iteration with the fields step, iteration, residual, changed, stick, slip, open, seconds.
     failure: why the run ended early (status "failed"), otherwise empty.
     """
 
@@ -195,6 +131,7 @@ class Results:
     reactions: Mapping[str, Real]
     contact: Mapping[str, Contact]
     tips: Mapping[str, Tips]
+    energy: Energies
     interior: Interior | None
     convergence: NDArray[Any] = field(repr=False)
 
@@ -309,6 +246,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         contact=_Interfaces(path, _names(file["contact"]), k),
         tips={name: Tips(*(_freeze(file["tips"][name][kind][:k]) for kind in ("KI", "KII")))
               for name in _names(file["tips"])},
+        energy=Energies(*(_freeze(file["energy"][kind][:k]) for kind in ENERGIES)),
         interior=_read_interior(path, file, k),
         convergence=_freeze(file["convergence"][...]),
     )

@@ -10,7 +10,8 @@ import numpy as np
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
-from pbem.results.layout import ITERATION, PAIR_DATASETS, STEP_DATASETS, sort_pairs, to_columns
+from pbem.results.energy import Energy
+from pbem.results.layout import ENERGIES, ITERATION, PAIR_DATASETS, STEP_DATASETS, sort_pairs, to_columns
 from pbem.solve.step import ContactState, Step
 
 
@@ -43,6 +44,12 @@ def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
         number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
         iterations=(), residual=float(steps["residual"][k - 1]), contact=ContactState(**contact), **fields,
     )
+
+
+def read_last_energy(file: h5py.File) -> Energy:
+    """The energies at the last step that was stored completely."""
+    k = min(len(file["steps"][name]) for name in STEP_DATASETS)
+    return Energy(**{kind: float(file["energy"][kind][k - 1]) for kind in ENERGIES})
 
 
 def truncate(file: h5py.File, last_number: int) -> None:

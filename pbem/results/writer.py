@@ -17,7 +17,9 @@ from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.errors import ConvergenceError, ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
+from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.layout import (
+    ENERGIES,
     ITERATION,
     PAIR_DATASETS,
     STEP_DATASETS,
@@ -30,7 +32,7 @@ from pbem.results.layout import (
     write_header,
 )
 from pbem.results.output import check_output_path
-from pbem.results.resume import check_same_case, read_last_step, truncate
+from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Interior, Iteration, Step
@@ -73,7 +75,7 @@ class ResultWriter:
                 raise
         except OSError as error:
             raise ResultFileError(str(path), f"cannot be written ({error})") from error
-        self._start(target, file, model, mesh, None)
+        self._start(target, file, model, mesh, None, None)
 
     @classmethod
     def resume(
@@ -94,6 +96,7 @@ class ResultWriter:
         try:
             check_same_case(str(path), file, model, mesh)
             last_step = read_last_step(file, mesh)
+            reached = None if last_step is None else read_last_energy(file)
             truncate(file, 0 if last_step is None else last_step.number)
             write_attributes(file, model, ranks, petsc_version, petsc_options)
             file.flush()
@@ -103,10 +106,12 @@ class ResultWriter:
                 raise ResultFileError(str(path), f"is not a complete result file ({error})") from error
             raise
         writer = cls.__new__(cls)
-        writer._start(target, file, model, mesh, last_step)
+        writer._start(target, file, model, mesh, last_step, reached)
         return writer
 
-    def _start(self, path: Path, file: h5py.File, model: Model, mesh: Mesh, last_step: Step | None) -> None:
+    def _start(
+        self, path: Path, file: h5py.File, model: Model, mesh: Mesh, last_step: Step | None, reached: Energy | None
+    ) -> None:
         self.path = path
         self._model, self._mesh = model, mesh
         self.last_step = last_step
@@ -118,12 +123,14 @@ class ResultWriter:
                                 for name in model.conditions}
         self._pairs_of_interface = sort_pairs(mesh)
         self._tip_rules = collect_tip_rules(model, mesh)
+        self._balance = EnergyBalance(model, mesh, last_step, reached)
         self._pending: Step | None = None
 
     def append(self, step: Step) -> None:
         """Store the step if it is its turn, and its iterations in any case; flush."""
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
+        self._energy = self._balance.add(step)
         if step.is_due(self._every):
             self._store(step)
         else:
@@ -160,6 +167,8 @@ class ResultWriter:
         for name, factors in self._tip_rules.evaluate(step.contact).items():
             for kind, factor in zip(("KI", "KII"), factors, strict=True):
                 append_row(file["tips"][name][kind], factor)
+        for kind in ENERGIES:
+            append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):

@@ -1,0 +1,218 @@
+"""The energy balance: work of loads and conditions, stored elastic energy, dissipation; all by sums over the boundary.
+
+Notation: t, u traction and displacement on the faces, outward normals; t0 the traction of the in-situ stress s0; b the
+weight per volume; (t, u)_f a field of unit body force f, (t, u)_j one of unit uniform stress j. The energy stored in a
+region since before any load is the integral of (s0 + s)/2 : strain, by the divergence theorem
+
+    W = 1/2 sum (t + t0) . u + 1/2 b . I,
+    I_f = integral of f . u = sum [(t - t0) . u_f - t_f . u] + integral of b . u_f
+
+where I is Betti's theorem for the field and that of the unit force. In an infinite region W is the excess over the same
+plane without holes and cracks, with dead tractions far away, and the far stress has the work-conjugate S:
+
+    W = 1/2 sum (t + t0) . u + 1/2 (2 s0 + far) . S,    S_j = sum [(t - t0) . u_j - t_j . u]
+
+again Betti's theorem, between the boundary and a large circle. The work in a step is (old + new)/2 times an increment:
+t times that of u on outer curves, b times that of I, s0 + far times that of S. Together they are the increment of W and
+the same sum over the pairs, tractions times jumps, as exactly as the discrete fields obey Betti's theorem from step to
+step; in one step from rest, exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.background import Background
+from pbem.contact.laws import collect_laws
+from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.mesh.interpolation import interpolate_tips, locate_nodes, stretch_elements
+from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
+from pbem.model.model import Model
+from pbem.results.dissipation import PairRecord, measure_stored, measure_work, record_pairs, record_pairs_at_rest
+from pbem.solve.backgrounds import evaluate_backgrounds
+from pbem.solve.step import Step
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+# Gauss points along tip elements, in the root of the distance from the tip.
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Per unit of thickness (stress times length squared), since before any load.
+
+    external: work of prescribed tractions and displacements, fluid pressure, weight, and stress far away.
+    elastic: stored in the regions, in springs under outer curves and in the elastic joints of interfaces.
+    dissipated: by friction and by bonds that parted; it never falls.
+    """
+
+    external: float
+    elastic: float
+    dissipated: float
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """Fields of unit forces or unit stresses in one region: its faces (k,), their traction and displacement (c, k),
+    and the integral (c,) of the displacement over a finite region."""
+
+    faces: Integer
+    traction: Complex
+    displacement: Complex
+    integral: Complex
+
+    def conjugate(self, weight: Real, traction: Complex, displacement: Complex) -> Real:
+        """Betti's sum (c,) for the field with these tractions and displacements on all faces (f,)."""
+        w, t, u = weight[self.faces], traction[self.faces], displacement[self.faces]
+        return np.asarray((w * (t * np.conj(self.displacement) - np.conj(self.traction) * u)).real.sum(axis=1))
+
+
+@dataclass(frozen=True)
+class _State:
+    """t, u (f,) on all faces; load and conjugate (c,): weights and far stresses of all regions, and what they work on;
+    stored: in the regions; springs: stored in springs; pairs."""
+
+    traction: Complex
+    displacement: Complex
+    load: Real
+    conjugate: Real
+    stored: float
+    springs: float
+    pairs: PairRecord
+
+
+class EnergyBalance:
+    """Adds up the energies step by step: all steps of a run in turn, also those that are not stored."""
+
+    def __init__(self, model: Model, mesh: Mesh, last: Step | None = None, reached: Energy | None = None) -> None:
+        """Begins at rest, or after the step `last` with the energies that were reached by then."""
+        self._model, self._mesh = model, mesh
+        self._laws = collect_laws(model, mesh)
+        self._outer = collect_outer_nodes(model, mesh)
+        self._weight = weigh_faces(mesh)
+        self._faces = list_faces(mesh)
+        self._forces = [
+            self._refer(number, [Background(each.material, force=force) for force in (1, 1j)])
+            for number, each in enumerate(model.regions) if each.material.density and not each.infinite
+        ]  # fmt: skip
+        self._stresses = [
+            self._refer(number, [Background(each.material, remote=stress) for stress in UNIT_STRESSES])
+            for number, each in enumerate(model.regions) if each.infinite
+        ]  # fmt: skip
+        self._in_situ = self._sample_in_situ()
+        self._reached = reached or Energy(0.0, 0.0, 0.0)
+        self._state = self._describe_rest() if last is None else self._describe(last)
+
+    def add(self, step: Step) -> Energy:
+        """The energies after the next step."""
+        old, new = self._state, self._describe(step)
+        nodes = self._outer.node
+        moved = (new.displacement - old.displacement)[nodes]
+        work = _dot(self._weight[nodes], 0.5 * (old.traction + new.traction)[nodes], moved)
+        work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
+        pairs = measure_work(self._laws, self._pair_weight, old.pairs, new.pairs)
+        # What springs take from the boundary they store. What pairs take is stored, dissipated, or was done by fluid;
+        # where a pair changed within the step, the trapezoid on the boundary is off by as much as on the pair.
+        work += new.springs - old.springs + pairs.stored + pairs.dissipated - pairs.trapezoid
+        self._state = new
+        self._reached = Energy(
+            external=self._reached.external + work,
+            elastic=new.stored + new.springs + measure_stored(self._pair_weight, new.pairs),
+            dissipated=self._reached.dissipated + pairs.dissipated,
+        )
+        return self._reached
+
+    @property
+    def _pair_weight(self) -> Real:
+        pairs = self._mesh.pairs
+        return np.where(pairs.crack, self._weight[pairs.first], pairs.weight)
+
+    def _describe_rest(self) -> _State:
+        nothing = np.zeros(len(self._weight), dtype=complex)
+        pairs = record_pairs_at_rest(self._laws, self._mesh, self._in_situ[: self._mesh.nodes])
+        return self._compose(self._in_situ, nothing, 0, 0.0, pairs)
+
+    def _describe(self, step: Step) -> _State:
+        pressure = evaluate_load(self._model, self._mesh, self._outer, step.stage, step.factor).pressure
+        pairs = record_pairs(self._laws, step.contact, pressure)
+        return self._compose(step.traction, step.displacement, step.stage, step.factor, pairs)
+
+    def _compose(
+        self, traction: Complex, displacement: Complex, stage: int, factor: float, pairs: PairRecord
+    ) -> _State:
+        backgrounds = evaluate_backgrounds(self._model, stage, factor)
+        elastic = traction - self._in_situ
+        loads, conjugates = [np.zeros(0)], [np.zeros(0)]
+        stored = 0.5 * _dot(self._weight, traction + self._in_situ, displacement)
+        for reference in self._forces:
+            balanced, _ = backgrounds[self._faces.region[reference.faces[0]]]
+            force = np.array([balanced.force.real, balanced.force.imag])
+            moved = reference.conjugate(self._weight, elastic, displacement)
+            moved += (np.conj(balanced.force) * reference.integral).real
+            loads.append(force)
+            conjugates.append(moved)
+            stored += 0.5 * float(force @ moved)
+        for reference in self._stresses:
+            balanced, far = backgrounds[self._faces.region[reference.faces[0]]]
+            initial, remote = np.array(balanced.initial), np.array(far.remote)
+            strained = reference.conjugate(self._weight, elastic, displacement)
+            loads.append(initial + remote)
+            conjugates.append(strained)
+            stored += 0.5 * float((2 * initial + remote) @ strained)
+        springs = 0.5 * self._measure_springs(displacement)
+        return _State(traction, displacement, np.concatenate(loads), np.concatenate(conjugates), stored, springs, pairs)
+
+    def _measure_springs(self, displacement: Complex) -> float:
+        outer = self._outer
+        along = (np.conj(outer.direction) * displacement[outer.node][:, None]).real
+        return float(self._weight[outer.node] @ (outer.stiffness * along**2).sum(axis=1))
+
+    def _sample_in_situ(self) -> Complex:
+        """Traction of the in-situ stress on all faces (f,)."""
+        traction = np.zeros(len(self._weight), dtype=complex)
+        for number, (balanced, _) in enumerate(evaluate_backgrounds(self._model, 0, 0.0)):
+            own = self._faces.region == number
+            at_rest = Background(balanced.material, initial=balanced.initial)
+            traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
+        return traction
+
+    def _refer(self, region: int, fields: Sequence[Background]) -> _Reference:
+        faces = np.flatnonzero(self._faces.region == region)
+        z, n = self._faces.position[faces], self._faces.normal[faces]
+        # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
+        second_moment = 0.5 * (self._weight[faces] * n * z**2 * np.conj(z)).sum()
+        return _Reference(
+            faces,
+            np.array([field.traction(z, n) for field in fields]),
+            np.array([field.displacement(z) for field in fields]),
+            np.array([complex(field.displacement(np.array([1 + 0j]))[0]) * second_moment for field in fields]),
+        )
+
+
+def weigh_faces(mesh: Mesh) -> Real:
+    """Weights (f,) at the nodes of `list_faces(mesh)` that integrate a traction times a displacement.
+
+    On tip elements they integrate the square-root shapes exactly, elsewhere they are those of the mesh.
+    """
+    weight = mesh.weight.copy()
+    tips = np.flatnonzero(mesh.tip)
+    if len(tips):
+        root = 0.5 * (1 + POINTS)
+        s = np.where(mesh.tip[tips] == 1, 1, -1)[:, None] * (2 * root**2 - 1)
+        length = 2 * WEIGHTS * root * stretch_elements(mesh, tips, s)
+        shapes = interpolate_tips(mesh.tip[tips], locate_nodes(mesh)[tips], s)
+        nodes = tips[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
+        weight[nodes] = np.einsum("eq,eqj->ej", length, shapes)
+    return np.concatenate([weight, weight[second_face_nodes(mesh)]])
+
+
+def _dot(weight: Real, traction: Complex, displacement: Complex) -> float:
+    return float(weight @ (traction * np.conj(displacement)).real)

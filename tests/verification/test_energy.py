@@ -1,0 +1,330 @@
+"""The energy balance against closed-form energies, and how exactly it closes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.contact.laws import OPEN, SLIP, STICK, PairLaws, collect_laws
+from pbem.mesh.generate import generate_mesh
+from pbem.model.curve import Curve
+from pbem.model.material import Material
+from pbem.model.model import (
+    Analysis,
+    Condition,
+    Interface,
+    Law,
+    Loop,
+    Model,
+    Quantity,
+    Region,
+    Side,
+    SolverOptions,
+    Stage,
+)
+from pbem.results.dissipation import PairRecord, PairWork, measure_work
+from pbem.results.energy import Energy, EnergyBalance, weigh_faces
+from pbem.results.reader import open_results
+from pbem.results.writer import ResultWriter
+from tests.verification.planes import FREE, ROCK, make_arc, make_circle, make_plane, make_straight, solve
+
+Real = NDArray[np.float64]
+SLATE = Material("slate", 25e3, 0.25)
+HELD: tuple[Quantity, Quantity] = ("displacement", "displacement")
+ROLLING_X: tuple[Quantity, Quantity] = ("displacement", "traction")
+UNHELD: tuple[Quantity, Quantity] = ("traction", "traction")
+
+
+def add_energies(model: Model) -> list[Energy]:
+    mesh, steps = solve(model)
+    balance = EnergyBalance(model, mesh)
+    return [balance.add(step) for step in steps]
+
+
+def measure_gap(energies: list[Energy]) -> float:
+    """Largest lack of balance, relative to the largest work."""
+    gaps = [abs(each.external - each.elastic - each.dissipated) for each in energies]
+    return max(gaps) / max(abs(each.external) for each in energies)
+
+
+def expect_energy(found: Energy, external: float, elastic: float, dissipated: float, tolerance: float) -> None:
+    np.testing.assert_allclose(
+        [found.external, found.elastic, found.dissipated], [external, elastic, dissipated], rtol=tolerance, atol=1e-14
+    )
+
+
+def stack_blocks(
+    stages: tuple[Stage, ...],
+    law: Law,
+    elements: tuple[int, int] = (4, 4),
+    power: float | None = None,
+    order: int = 2,
+    materials: tuple[Material, Material] = (Material("soft", 3e3, 0.2), Material("hard", 2e3, 0.3)),
+    top: tuple[Quantity, Quantity] = HELD,
+    origin: complex = 0j,
+) -> Model:
+    """Two blocks 2 x 1 that meet at y = 1 from the origin on, held at the bottom; the top follows the stages.
+
+    elements: of every outer side, and of the joint.
+    """
+    corners = {
+        "bottom": (0j, 2 + 0j), "right_lower": (2 + 0j, 2 + 1j), "left_lower": (1j, 0j), "joint": (1j, 2 + 1j),
+        "right_upper": (2 + 1j, 2 + 2j), "top": (2 + 2j, 2j), "left_upper": (2j, 1j),
+    }  # fmt: skip
+    curves = {
+        name: Curve(name, (make_straight(origin + start, origin + end, elements[name == "joint"], power),))
+        for name, (start, end) in corners.items()
+    }
+    lower = [Side("bottom", True), Side("right_lower", True), Side("joint", False), Side("left_lower", True)]
+    upper = [Side(name, True) for name in ("joint", "right_upper", "top", "left_upper")]
+    conditions = {name: Condition(name) for name in corners if name != "joint"}
+    conditions |= {"bottom": Condition("bottom", known=HELD), "top": Condition("top", known=top)}
+    return Model(
+        title="blocks", units_length="m", units_stress="MPa", source="",
+        regions=(
+            Region("lower", materials[0], (Loop(tuple(lower), True),)),
+            Region("upper", materials[1], (Loop(tuple(upper), True),)),
+        ),
+        curves=curves, interfaces={"joint": Interface("joint", "lower", "upper", law)}, conditions=conditions,
+        crack_tips={}, stages=stages, analysis=Analysis("SST", order), solver=SolverOptions(), output_every=1, size=2.0,
+    )  # fmt: skip
+
+
+def shear_and_back(steps: int = 5) -> tuple[Stage, ...]:
+    return (
+        Stage("press", 2, {"top": (0.0, -0.001)}, {}),
+        Stage("shear", steps, {"top": (0.005, -0.001)}, {}),
+        Stage("back", steps, {"top": (-0.003, -0.0005)}, {}),
+    )
+
+
+# Without lateral strain: blocks without Poisson's ratio.
+COLUMN = (Material("one", 3e3, 0.0), Material("two", 2e3, 0.0))
+
+
+def test_a_column_stores_what_presses_it() -> None:
+    model = stack_blocks((Stage("press", 3, {"top": (0.0, -0.001)}, {}),), Law("bonded"), materials=COLUMN)
+    stored = 0.5 * 2 * 0.001**2 / (1 / 3e3 + 1 / 2e3)
+    expect_energy(add_energies(model)[-1], stored, stored, 0.0, 1e-10)
+
+
+def test_elastic_joints_store_their_part() -> None:
+    law = Law("bonded", normal_stiffness=1e3, tangential_stiffness=1e3)
+    model = stack_blocks((Stage("press", 3, {"top": (0.0, -0.001)}, {}),), law, materials=COLUMN)
+    stored = 0.5 * 2 * 0.001**2 / (1 / 3e3 + 1 / 2e3 + 1 / 1e3)
+    expect_energy(add_energies(model)[-1], stored, stored, 0.0, 1e-10)
+
+
+def test_springs_store_their_part() -> None:
+    stages = (Stage("press", 2, {"top": (0.0, -1.0)}, {}),)
+    model = stack_blocks(stages, Law("bonded"), materials=COLUMN, top=UNHELD)
+    bed = Condition("bottom", known=ROLLING_X, stiffness=(0.0, 500.0))
+    model = replace(model, conditions={**model.conditions, "bottom": bed})
+    stored = 0.5 * 2 * (1 / 500 + 1 / 3e3 + 1 / 2e3)
+    expect_energy(add_energies(model)[-1], stored, stored, 0.0, 1e-10)
+
+
+def test_weight_does_work() -> None:
+    # Columns between smooth sides, both of the same material: sinking by b/M (H y - y^2/2).
+    heavy = Material("heavy", 1e3, 0.25, density=2.0)
+    stages = (Stage("weight", 2, {}, {}, gravity=(0.0, -3.0)), Stage("half", 1, {}, {}, gravity=(0.0, -1.5)))
+    model = stack_blocks(stages, Law("bonded"), materials=(heavy, heavy), top=UNHELD, origin=3 - 1j)
+    sides = {name: Condition(name, known=ROLLING_X) for name in model.conditions if name not in ("top", "bottom")}
+    model = replace(model, conditions={**model.conditions, **sides})
+    modulus = heavy.shear_modulus * (heavy.kappa + 1) / (heavy.kappa - 1)
+    stored = 0.5 * 2 * (2.0 * 3.0) ** 2 / modulus * 2**3 / 3
+    energies = add_energies(model)
+    expect_energy(energies[1], stored, stored, 0.0, 1e-9)
+    expect_energy(energies[2], stored / 4, stored / 4, 0.0, 1e-9)
+
+
+def test_release_of_in_situ_stress_in_a_finite_body() -> None:
+    # s0 = -p along y in a column whose top is free: it stretches by p/E and the energy of the stress is gone.
+    soft = COLUMN[0]
+    model = stack_blocks((Stage("wait", 1, {}, {}),), Law("bonded"), materials=(soft, soft), top=UNHELD)
+    model = replace(model, initial_stress={"one": (0.0, -6.0, 0.0)})
+    lost = -0.5 * 6.0**2 / 3e3 * 4
+    expect_energy(add_energies(model)[-1], lost, lost, 0.0, 1e-9)
+
+
+def test_excess_of_a_hole_far_stress() -> None:
+    # A dilute array of holes has the compliance (1 + 3 c)/E': the excess of one is 3/2 of its area times S^2/E'.
+    energy = add_energies(make_plane((2.0, 0.0, 0.0), hole=make_circle(1.5, 48)))[-1]
+    excess = 1.5 * math.pi * 1.5**2 * 2.0**2 / ROCK.plane_modulus
+    expect_energy(energy, excess, excess, 0.0, 1e-6)
+
+
+def test_excavation_of_a_hole() -> None:
+    # The excess of the hole, and the energy 1/2 of its area times S^2/E' that its ground had.
+    model = replace(make_plane((0.0, 0.0, 0.0), hole=make_circle(1.5, 48)), initial_stress={"rock": (2.0, 0.0, 0.0)})
+    change = 2.0 * math.pi * 1.5**2 * 2.0**2 / ROCK.plane_modulus
+    expect_energy(add_energies(model)[-1], change, change, 0.0, 1e-6)
+
+
+def test_a_filled_hole_is_no_excess() -> None:
+    hole = make_circle(1.5, 16)
+    same = replace(ROCK, name="same")
+    energy = add_energies(make_plane((2.0, 1.0, 0.3), hole=hole, inclusion=same))[-1]
+    scale = math.pi * 1.5**2 * 2.0**2 / ROCK.plane_modulus
+    assert abs(energy.external) < 1e-5 * scale
+    assert abs(energy.elastic) < 1e-5 * scale
+
+
+@pytest.mark.parametrize("steps", [1, 3])
+def test_excess_of_a_crack_under_far_tension_or_fluid_pressure(steps: int) -> None:
+    # Griffith: pi a^2 s^2 / E', whether the stress comes from far away or from a fluid inside.
+    crack = {"crack": [make_straight(-1.3, 1.3, 8)]}
+    far = (Stage("pull", steps, {}, {}, remote=(0.0, 2.0, 0.0)),)
+    fluid = (Stage("press", steps, {}, {"crack": 2.0}),)
+    excess = math.pi * 1.3**2 * 2.0**2 / ROCK.plane_modulus
+    for stages in (far, fluid):
+        energies = add_energies(make_plane((0.0, 0.0, 0.0), crack, FREE, stages=stages))
+        expect_energy(energies[-1], excess, excess, 0.0, 1e-4)
+
+
+def make_closed_crack(stages: tuple[Stage, ...]) -> tuple[Model, float, float, float]:
+    """A crack at 20 degrees to a compression along y; shear and friction on it per unit of compression, and the
+    integral of its slip per unit of shear."""
+    psi, friction = math.radians(20.0), math.tan(math.radians(30.0))
+    along = np.exp(1j * (math.pi / 2 - psi))
+    model = make_plane(
+        (0.0, 0.0, 0.0), {"crack": [make_straight(-along, along, 8)]}, Law("coulomb", friction), material=SLATE,
+        stages=stages,
+    )  # fmt: skip
+    slip = math.pi / 2 * 4 / SLATE.plane_modulus
+    return model, math.sin(psi) * math.cos(psi), friction * math.sin(psi) ** 2, slip
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_friction_of_a_closed_crack(steps: int) -> None:
+    model, shear, friction, per_shear = make_closed_crack((Stage("press", steps, {}, {}, remote=(0.0, -100.0, 0.0)),))
+    slip = per_shear * 100 * (shear - friction)
+    external, dissipated = 0.5 * 100 * shear * slip, 0.5 * 100 * friction * slip
+    expect_energy(add_energies(model)[-1], external, external - dissipated, dissipated, 1e-4)
+
+
+def test_a_closed_crack_that_is_unloaded_slips_back() -> None:
+    steps = 60
+    model, shear, friction, per_shear = make_closed_crack(
+        (
+            Stage("press", steps, {}, {}, remote=(0.0, -100.0, 0.0)),
+            Stage("release", steps, {}, {}, remote=(0.0, 0.0, 0.0)),
+        )
+    )
+    slip = per_shear * 100 * (shear - friction)
+    # It sticks until the shear locked in exceeds the friction of what compression is left.
+    turn = (shear - friction) / (shear + friction)
+    dissipated = 0.5 * 100 * friction * slip * (1 + turn)
+    energies = add_energies(model)
+    np.testing.assert_allclose(energies[-1].dissipated, dissipated, rtol=1e-3)
+    assert abs(energies[-1].elastic) < 1e-12 * dissipated
+    assert (np.diff([each.dissipated for each in energies]) >= 0).all()
+    assert measure_gap(energies) < 1e-12
+
+
+def test_one_step_from_rest_balances_exactly() -> None:
+    model = stack_blocks((Stage("all", 1, {"top": (0.002, -0.001)}, {}),), Law("coulomb", 0.4, 0.1))
+    energies = add_energies(model)
+    assert energies[-1].dissipated > 0.01 * energies[-1].external
+    assert measure_gap(energies) < 1e-12
+
+
+# elements of the outer sides and of the joint, order, lack of balance over a history with slip, reversal and parting
+BALANCES = [((6, 10), 2, 2e-4), ((12, 20), 2, 2e-5), ((12, 20), 3, 2e-7)]
+
+
+@pytest.mark.parametrize("elements, order, gap", BALANCES)
+def test_the_balance_converges_with_the_mesh(elements: tuple[int, int], order: int, gap: float) -> None:
+    energies = add_energies(stack_blocks(shear_and_back(), Law("coulomb", 1.0), elements, 3.0, order))
+    assert energies[-1].dissipated > 0.1 * energies[-1].external
+    assert (np.diff([each.dissipated for each in energies]) >= 0).all()
+    assert measure_gap(energies) < gap
+
+
+def test_more_steps_change_little() -> None:
+    few, many = (
+        add_energies(stack_blocks(shear_and_back(steps), Law("coulomb", 1.0), (6, 10), 3.0))[-1] for steps in (5, 40)
+    )
+    np.testing.assert_allclose(few.dissipated, many.dissipated, rtol=0.02)
+
+
+def test_weights_of_tip_elements_integrate_the_root() -> None:
+    for leg in (make_straight(0, 2, 2), make_arc(2 + 0j, 1.3, 2)):
+        mesh = generate_mesh(make_plane((0.0, 0.0, 0.0), {"crack": [leg]}))
+        per_element = mesh.order + 1
+        along, length = mesh.pairs.arc_length[:per_element], leg.length / 2
+        weight = weigh_faces(mesh)
+        np.testing.assert_allclose(weight[:per_element] @ np.sqrt(along), 2 / 3 * length**1.5, rtol=2e-3)
+        assert (weight > 0).all()
+        np.testing.assert_allclose(weight[mesh.nodes :], weight[: mesh.nodes][::-1].reshape(2, -1)[::-1].ravel())
+
+
+def make_record(mode: np.int8, p_n: float, p_s: float, g_n: float, slip: float, broken: bool = False) -> PairRecord:
+    p, s, g, h, zero = (np.array([float(value)]) for value in (p_n, p_s, g_n, slip, 0))
+    return PairRecord(np.array([mode]), p, s, g, h, g, h, zero, zero, np.array([broken]))
+
+
+def measure_one(old: PairRecord, new: PairRecord, law: Law) -> PairWork:
+    model = stack_blocks((Stage("none", 1, {}, {}),), law, (1, 1), order=0)
+    laws: PairLaws = collect_laws(model, generate_mesh(model))
+    return measure_work(laws, np.array([2.0]), old, new)
+
+
+# before, after, law, dissipated per unit length
+PAIRS: dict[str, tuple[PairRecord, PairRecord, Law, float]] = {
+    "goes on slipping": (
+        make_record(SLIP, -10, 5, 0, 1), make_record(SLIP, -12, 6, 0, 3), Law("coulomb", 0.5), 11.0),
+    "begins to slip": (
+        make_record(STICK, -10, 1, 0, 1), make_record(SLIP, -12, 6, 0, 3), Law("coulomb", 0.5), 11.0),
+    "turns back": (
+        make_record(SLIP, -10, 5, 0, 1), make_record(SLIP, -10, -5, 0, -1), Law("coulomb", 0.5), 10.0),
+    "sticks": (make_record(SLIP, -10, 5, 0, 1), make_record(STICK, -10, 3, 0, 1), Law("coulomb", 0.5), 0.0),
+    "parts": (make_record(STICK, -10, 0, 0, 0), make_record(OPEN, 0, 0, 1, 0), Law("coulomb", 0.5), 0.0),
+    "closes": (make_record(OPEN, 0, 0, 1, 0), make_record(STICK, -10, 0, 0, 0), Law("coulomb", 0.5), 0.0),
+    "closes and slips": (make_record(OPEN, 0, 0, 1, 0), make_record(SLIP, -10, 5, 0, 2), Law("coulomb", 0.5), 5.0),
+    "closes and slips with cohesion": (
+        make_record(OPEN, 0, 0, 1, 0), make_record(SLIP, -10, 8, 0, 2), Law("coulomb", 0.5, 3.0), 8.0),
+    "a bond is torn": (
+        make_record(STICK, 4, 0, 0, 0), make_record(OPEN, 0, 0, 3, 0, True),
+        Law("coulomb", 0.5, 9.0, 5.0, cohesion_lost=True), 6.0),
+    "a bond is sheared off": (
+        make_record(STICK, -10, 8, 0, 0), make_record(SLIP, -10, 5, 0, 2, True),
+        Law("coulomb", 0.5, 9.0, 5.0, cohesion_lost=True), 13.0),
+    "cohesion": (
+        make_record(STICK, 0, 0, 0, 0), make_record(SLIP, 0, -3, 0, -2), Law("coulomb", 0.5, 3.0), 6.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", PAIRS.values(), ids=[name.replace(" ", "_") for name in PAIRS])
+def test_dissipation_of_one_pair(case: tuple[PairRecord, PairRecord, Law, float]) -> None:
+    old, new, law, dissipated = case
+    found = measure_one(old, new, law)
+    np.testing.assert_allclose(found.dissipated, 2 * dissipated, atol=1e-14)
+    assert found.stored == 0.0
+
+
+def test_energies_in_the_file_count_all_steps_and_go_on_after_a_stop(tmp_path: Path) -> None:
+    model = stack_blocks(shear_and_back(), Law("coulomb", 1.0))
+    mesh, steps = solve(model)
+    balance = EnergyBalance(model, mesh)
+    expected = [balance.add(step) for step in steps]
+    for every, stop in ((1, 4), (3, 9)):
+        rare = replace(model, output_every=every)
+        path = tmp_path / f"every{every}.h5"
+        first = ResultWriter(path, rare, mesh, 1, "")
+        for step in steps[:stop]:
+            first.append(step)
+        first.fail("stopped", "")
+        with ResultWriter.resume(path, rare, mesh, 1, "") as second:
+            assert second.last_step is not None and second.last_step.number == stop
+            for step in steps[stop:]:
+                second.append(step)
+        results = open_results(path)
+        for kind, values in vars(results.energy).items():
+            wanted = [getattr(expected[number - 1], kind) for number in results.steps.number]
+            np.testing.assert_allclose(values, wanted, rtol=1e-12, atol=1e-18)

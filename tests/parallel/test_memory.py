@@ -1,0 +1,73 @@
+"""What a rank holds falls with the number of ranks: rows of matrices are shared, only vectors are on every rank."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.cases.bundled import CASES
+from tests.parallel.launch import launch_snippet
+
+# Bytes of all arrays that a rank's problem and tangent operator hold, those of dense rows apart; from all ranks.
+MEASURE = """
+import json, sys
+import numpy as np
+from petsc4py import PETSc
+from scipy import sparse
+from pbem.mesh.generate import generate_mesh
+from pbem.model.build import read_model
+from pbem.parallel import world
+from pbem.solve.problem import Tangent, assemble_problem
+
+def list_arrays(item, seen):
+    if id(item) in seen:
+        return
+    seen.add(id(item))
+    if isinstance(item, np.ndarray):
+        yield item
+    elif sparse.issparse(item):
+        yield from (item.data, item.indices, item.indptr)
+    elif isinstance(item, dict):
+        yield from (array for part in item.values() for array in list_arrays(part, seen))
+    elif isinstance(item, (tuple, list)):
+        yield from (array for part in item for array in list_arrays(part, seen))
+    elif hasattr(item, "__dict__"):
+        yield from list_arrays(vars(item), seen)
+
+model = read_model(sys.argv[1])[1]
+problem = assemble_problem(model, generate_mesh(model), world)
+tangent = Tangent(problem)
+blocks = [*problem.operator.blocks, *problem.crack_rows]
+dense = sum(block.matrix.nbytes for block in blocks)
+matrix = tangent.solver.matrix.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"] * 8
+rest = sum(array.nbytes for array in list_arrays(problem, set())) - dense
+found = world.gather({"dense": dense, "matrix": matrix, "rest": rest, "unknowns": problem.unknowns})
+if world.rank == 0:
+    print(json.dumps(found))
+"""
+
+
+def measure(ranks: int, case: str) -> list[dict[str, float]]:
+    """Per rank the bytes of its dense rows, of its part of the tangent operator, and of all other arrays."""
+    run = launch_snippet(ranks, MEASURE, CASES[case])
+    assert run.returncode == 0, run.stderr
+    found: list[dict[str, float]] = json.loads(run.stdout)
+    assert len(found) == ranks
+    return found
+
+
+# One region, dense factors, crack rows; several regions of different size, sparse factors.
+@pytest.mark.parametrize("case", ["crack_field", "layers_push"])
+def test_matrices_are_shared_among_the_ranks(case: str) -> None:
+    (alone,) = measure(1, case)
+    square = 8 * alone["unknowns"] ** 2
+    assert alone["dense"] > 0.3 * square
+    for ranks in (2, 4):
+        shares = measure(ranks, case)
+        for kind in ("dense", "matrix"):
+            parts = [share[kind] for share in shares]
+            assert sum(parts) == pytest.approx(alone[kind], rel=0.01), kind
+            assert max(parts) < 1.15 * alone[kind] / ranks, kind
+        # Vectors and what is as sparse as they are: less than a hundred numbers per unknown.
+        assert max(share["rest"] for share in shares) < min(0.05 * square, 800 * alone["unknowns"])

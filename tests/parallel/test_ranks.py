@@ -1,0 +1,128 @@
+"""Every bundled case gives the same results on any number of ranks: the same modes, fields equal but for rounding."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.cases.bundled import CASES
+from tests.parallel.launch import launch_snippet
+
+# One launch for all cases: starting costs more than most of them.
+RUN_ALL = """
+import sys
+from pathlib import Path
+import pbem
+folder = Path(sys.argv[1])
+for case in sys.argv[2:]:
+    pbem.run(case, folder / (Path(case).stem + ".h5"))
+"""
+# Of the largest value in the file: rounding, times the condition of the equations.
+ROUNDING = 1e-9
+
+# What belongs together has one scale: a field that vanishes but for rounding has none of its own.
+SCALES = {
+    "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
+    "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
+    "KI": "intensity", "KII": "intensity",
+}  # fmt: skip
+GROUPS = {"reactions": "force", "energy": "energy"}
+
+Array = NDArray[Any]
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """Where the result files of all cases are, by the number of ranks that were launched so far."""
+    return {1: launch_all(tmp_path_factory.mktemp("ranks_1"), 1)}
+
+
+def launch_all(folder: Path, ranks: int) -> Path:
+    """Run all cases on so many ranks; returns the folder."""
+    run = launch_snippet(ranks, RUN_ALL, folder, *CASES.values(), timeout=600)
+    assert run.returncode == 0, run.stderr
+    return folder
+
+
+def read_results(path: Path) -> dict[str, Array]:
+    """All datasets of a result file, by their path in it."""
+    found = {}
+    with h5py.File(path, "r") as file:
+        file.visititems(lambda name, item: found.update({name: item[...]}) if isinstance(item, h5py.Dataset) else None)
+    return found
+
+
+def measure_scales(results: dict[str, Array]) -> dict[str, float]:
+    """The largest magnitude of each kind of field."""
+    scales: dict[str, float] = {}
+    for name, values in results.items():
+        kind = find_kind(name)
+        if kind:
+            scales[kind] = max(scales.get(kind, 0.0), float(np.nanmax(np.abs(values), initial=0.0)))
+    return scales
+
+
+def find_kind(name: str) -> str | None:
+    """The kind of a field that has rounding errors; None for what has to be the same."""
+    group, _, field = name.rpartition("/")
+    return GROUPS.get(group) or SCALES.get(field)
+
+
+def find_differences(one: dict[str, Array], other: dict[str, Array]) -> list[str]:
+    """What two runs of a case do not have in common."""
+    if one.keys() != other.keys():
+        return [f"datasets {sorted(one.keys() ^ other.keys())}"]
+    scales = measure_scales(one)
+    faults = []
+    for name, values in one.items():
+        kind = find_kind(name)
+        if name == "steps/residual":
+            continue
+        if name == "convergence":
+            same = [column for column in values.dtype.names if column not in ("residual", "seconds")]
+            equal = all(np.array_equal(values[column], other[name][column]) for column in same)
+        elif kind is None:
+            equal = np.array_equal(values, other[name])
+        else:
+            allowed = ROUNDING * scales[kind]
+            equal = np.allclose(values, other[name], rtol=0, atol=allowed, equal_nan=True)
+        if not equal:
+            faults.append(name)
+    return faults
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 4])
+def test_ranks_do_not_change_the_results(
+    ranks: int, folders: dict[int, Path], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folders[ranks] = launch_all(tmp_path_factory.mktemp(f"ranks_{ranks}"), ranks)
+    faults = {
+        name: differences
+        for name in CASES
+        if (differences := find_differences(*(read_results(folders[n] / f"{name}.h5") for n in (1, ranks))))
+    }
+    assert not faults
+
+
+def test_a_difference_is_found(folders: dict[int, Path]) -> None:
+    results = read_results(folders[1] / "two_blocks.h5")
+    assert find_differences(results, results) == []
+    scales = measure_scales(results)
+    assert scales.keys() >= {"length", "stress", "force"}
+    for name in ("fields/traction", "contact/interface/slip", "reactions/top", "fields/displacement"):
+        kind = find_kind(name)
+        assert kind is not None
+        changed = results | {name: results[name] + 2 * ROUNDING * scales[kind]}
+        assert find_differences(results, changed) == [name]
+    modes = results["contact/interface/mode"].copy()
+    modes[0, 0] = 2
+    assert find_differences(results, results | {"contact/interface/mode": modes}) == ["contact/interface/mode"]
+    history = results["convergence"].copy()
+    history["stick"][0] += 1
+    assert find_differences(results, results | {"convergence": history}) == ["convergence"]
+    assert find_differences(results, {"steps/stage": results["steps/stage"]}) != []

@@ -11,6 +11,7 @@ from pbem.exact import (
     arc_crack_intensity,
     collinear_cracks_intensity,
     crack_opening,
+    griffith_field,
     inclined_crack_intensity,
 )
 from tests.verification.proofs.proof import Outcome, Proof, Solved, Table, largest_error, line, solve_case
@@ -51,6 +52,17 @@ def griffith_opening(loading: str, order: int, elements: int) -> Outcome:
     exact = crack_opening(PLANE_MODULUS, 1.3, 2.0, solved.mesh.pairs.position.real)
     middle = float(crack_opening(PLANE_MODULUS, 1.3, 2.0, 0.0))
     return Outcome(largest_error(solved.last.contact.opening, exact, middle), solved.unknowns)
+
+
+def griffith_stress() -> Outcome:
+    """Stress inside, from a hundredth of the half-length off the tip on; relative to the largest there."""
+    solved = solve_griffith("tension", 2, 8)
+    reach = 1.3 * np.array([0.01, 0.03, 0.1, 0.3, 1.0, 10.0])
+    points = 1.3 + (reach[:, None] * np.exp(1j * np.linspace(-0.8, 0.8, 6) * np.pi)).ravel()
+    kappa, shear_modulus = 3 - 4 * ROCK["poisson"], ROCK["young"] / (2 + 2 * ROCK["poisson"])
+    exact = griffith_field(kappa, shear_modulus, 1.3, 2.0).stress(points).T
+    scale = np.abs(exact).max(axis=1)[:, None]
+    return Outcome(float((np.abs(solved.interior(points).stress - exact) / scale).max()), solved.unknowns)
 
 
 def inclined_crack(degrees: float) -> Outcome:
@@ -190,6 +202,7 @@ PROOFS = (
         for name, loading in (("crack under tension", "tension"), ("crack under pressure", "pressure"))
         for what, run in (("KI", griffith_factor), ("opening", griffith_opening))
     ),
+    Proof("crack under tension, order 2, 8 elements: stress inside", "Westergaard 1939", 5e-3, griffith_stress),
     *(Proof(f"inclined crack, {angle:g} degrees: KI, KII", SNEDDON, 1e-3, partial(inclined_crack, angle))
       for angle in (15.0, 30.0, 45.0, 60.0, 75.0, 105.0, 150.0)),
     *(Proof(f"two collinear cracks, 0.05 to 1: K at the {tips} tips", TADA, 5e-3, partial(collinear_cracks, tips))

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.laws import collect_laws
+from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.build import parse_model
 from pbem.model.model import Model
 from pbem.parallel import world
+from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.tips import collect_tip_rules
+from pbem.solve.backgrounds import evaluate_backgrounds
+from pbem.solve.fields import InteriorField
 from pbem.solve.march import march
 from pbem.solve.problem import assemble_problem
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.step import Interior, SilentReporter, Step
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -83,9 +86,21 @@ class Solved:
         nodes = self.nodes(curve)
         return complex(self.mesh.weight[nodes] @ self.steps[step].traction[nodes])
 
-    def gap(self) -> Real:
-        """Initial opening of all pairs."""
-        return collect_laws(self.model, self.mesh).gap
+    def interior(self, points: Complex, step: int = -1) -> Interior:
+        """Displacement and stress at points (q,)."""
+        model = replace(self.model, interior_points=tuple(complex(point) for point in points))
+        return InteriorField(model, self.mesh, world).evaluate(self.steps[step])
+
+    def hoop_stress(self, step: int = -1) -> Real:
+        """At the nodes of all faces."""
+        one = self.steps[step]
+        initial = [each for each, _ in evaluate_backgrounds(self.model, one.stage, one.factor)]
+        return evaluate_hoop_stress(self.mesh, initial, one.displacement, one.traction)
+
+    def energies(self) -> list[Energy]:
+        """After every step."""
+        balance = EnergyBalance(self.model, self.mesh)
+        return [balance.add(step) for step in self.steps]
 
 
 def solve_model(model: Model) -> Solved:

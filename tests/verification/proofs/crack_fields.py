@@ -1,0 +1,144 @@
+"""Fields of 150 random cracks that open, slide and stick, and the trap of a trial stiffness that is too large."""
+
+from __future__ import annotations
+
+import cmath
+import math
+import random
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from pbem.contact import laws
+from pbem.errors import ConvergenceError
+from pbem.model.build import parse_model
+from pbem.solve import newton
+from pbem.solve.step import OPEN, SLIP, STICK, ContactState
+from tests.verification.proofs.proof import Outcome, Proof, Solved, line, solve_model, solve_text, write_case
+
+COUNT, DENSITY, CLEARANCE = 150, 0.15, 0.1
+FRICTION = 0.6
+STIFF_COUNT = 60
+
+
+def scatter_cracks(seed: int, count: int = COUNT) -> list[tuple[complex, complex]]:
+    """Ends of cracks of half-length 1 in a square, in random directions, none nearer than CLEARANCE to another."""
+    draw = random.Random(seed)
+    side = math.sqrt(count / DENSITY)
+    cracks: list[tuple[complex, complex]] = []
+    while len(cracks) < count:
+        center = complex(side * draw.random(), side * draw.random())
+        half = cmath.rect(1.0, math.pi * draw.random())
+        crack = center - half, center + half
+        if all(measure_distance(crack, other) >= CLEARANCE for other in cracks):
+            cracks.append(crack)
+    return cracks
+
+
+def measure_distance(one: tuple[complex, complex], other: tuple[complex, complex]) -> float:
+    """Least distance of two segments, 0 if they cross."""
+
+    def side(line: tuple[complex, complex], point: complex) -> float:
+        return ((line[1] - line[0]).conjugate() * (point - line[0])).imag
+
+    def distance(point: complex, line: tuple[complex, complex]) -> float:
+        along = line[1] - line[0]
+        fraction = ((point - line[0]) * along.conjugate()).real / abs(along) ** 2
+        return abs(point - line[0] - min(max(fraction, 0.0), 1.0) * along)
+
+    crosses = [side(a, b[0]) * side(a, b[1]) < 0 for a, b in ((one, other), (other, one))]
+    if all(crosses):
+        return 0.0
+    return min(*(distance(end, other) for end in one), *(distance(end, one) for end in other))
+
+
+def write_field(seed: int, count: int = COUNT, order: int = 1) -> str:
+    """The case: compression 1 along y, tension 0.3 along x, in one step that may not be halved."""
+    cracks = {f"c{k}": line(*ends, 4) for k, ends in enumerate(scatter_cracks(seed, count))}
+    return write_case(
+        {
+            "materials": {"rock": {"young": 1e3, "poisson": 0.2}},
+            "curves": cracks,
+            "regions": {"plane": {"material": "rock", "infinite": True, "cracks": list(cracks)}},
+            "interfaces": {name: {"friction": FRICTION} for name in cracks},
+            "remote": {"sxx": 0.3, "syy": -1.0},
+            "analysis": {"order": order, "steps": 1},
+            "solver": {"min_step": 1.0},
+        }
+    )
+
+
+def measure_violation(contact: ContactState) -> float:
+    """Largest breach of the contact conditions, relative to the largest jump or traction."""
+    mode, opening, slip = contact.mode, contact.opening, contact.slip
+    normal, tangential = contact.traction_n, contact.traction_s
+    stick, slips, is_open = (mode == kind for kind in (STICK, SLIP, OPEN))
+    stress = max(np.abs(normal).max(), np.abs(tangential).max())
+    length = max(np.abs(opening).max(), np.abs(slip).max())
+    excess = np.abs(tangential) + FRICTION * normal
+    breaches = {
+        "penetration": -opening / length,
+        "opening of a closed pair": np.where(is_open, 0, np.abs(opening)) / length,
+        "traction of an open pair": np.where(is_open, np.hypot(normal, tangential), 0) / stress,
+        "tension": normal / stress,
+        "friction beyond the cone": np.where(is_open, 0, excess) / stress,
+        "slip within the cone": np.where(slips, np.abs(excess), 0) / stress,
+        "slip of a sticking pair": np.where(stick, np.abs(slip), 0) / length,
+        "slip against friction": np.where(slips, np.maximum(-slip * np.sign(tangential), 0), 0) / length,
+    }
+    return float(max(values.max() for values in breaches.values()))
+
+
+def random_field(seed: int, order: int) -> Outcome:
+    """Breach of the contact conditions of one field."""
+    solved = solve_text(write_field(seed, order=order))
+    (step,) = solved.steps
+    counts = [int((step.contact.mode == kind).sum()) for kind in (STICK, SLIP, OPEN)]
+    assert min(counts) > 0.01 * sum(counts)
+    remark = f"{len(step.iterations)} iterations; {counts[0]} stick, {counts[1]} slip, {counts[2]} open"
+    return Outcome(measure_violation(step.contact), solved.unknowns, remark)
+
+
+def solve_stiffly(text: str, factor: float, cautions: Any) -> Solved | str:
+    """The solution with the trial stiffness of the mode choice multiplied; the reason if there is none."""
+    usual = laws.SOFTNESS, newton.CAUTIONS
+    laws.SOFTNESS, newton.CAUTIONS = factor * usual[0], cautions
+    try:
+        return solve_model(parse_model(text)[1])
+    except ConvergenceError as error:
+        return error.reason
+    finally:
+        laws.SOFTNESS, newton.CAUTIONS = usual
+
+
+def stiff_trials(factor: float) -> Outcome:
+    """Share of the pairs with other modes than usual, where switching without caution goes round for ever."""
+    text = write_field(1, STIFF_COUNT)
+    usual = solve_text(text)
+    assert solve_stiffly(text, factor, newton.CAUTIONS[:1]) == "mode cycle"
+    solved = solve_stiffly(text, factor, newton.CAUTIONS)
+    if isinstance(solved, str):
+        return Outcome(1.0, usual.unknowns, solved)
+    other = float((solved.last.contact.mode != usual.last.contact.mode).mean())
+    return Outcome(other, solved.unknowns, f"{len(solved.last.iterations)} iterations")
+
+
+def stiffest_trials() -> Outcome:
+    """Beyond all caution the run ends with the reason: 0; with anything else: 1."""
+    text = write_field(1, STIFF_COUNT)
+    solved = solve_stiffly(text, 1e6, newton.CAUTIONS)
+    reason = solved if isinstance(solved, str) else "converged"
+    return Outcome(float(reason != "mode cycle"), solve_text(text).unknowns, reason)
+
+
+PROOFS = (
+    *(Proof(f"field of {COUNT} random cracks, order {order}, number {seed}: contact conditions", "complementarity",
+            1e-8, partial(random_field, seed, order))
+      for order, seeds in ((1, range(1, 11)), (2, (1,)))
+      for seed in seeds),
+    *(Proof(f"trial stiffness {factor:g} times too large: pairs in other modes", "usual stiffness", 0.0,
+            partial(stiff_trials, factor))
+      for factor in (80.0, 800.0, 8000.0)),
+    Proof("trial stiffness too large for all caution: ends with the reason", "mode cycle", 0.0, stiffest_trials),
+)  # fmt: skip

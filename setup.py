@@ -41,7 +41,7 @@ setup(
         Extension(
             "pbem.bem._kernels",
             sources=["pbem/bem/_kernels.c"],
-            depends=["pbem/bem/arcs.h", "pbem/bem/moments.h"],
+            depends=["pbem/bem/arcs.h", "pbem/bem/moments.h", "pbem/bem/straight.h"],
             extra_compile_args=["-O3", *select_processor_flags(), *MATH_FLAGS],
             libraries=["m"],
         )

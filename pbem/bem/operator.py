@@ -28,7 +28,7 @@ Bool = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 
 # Scratch memory of one call of the kernels, in bytes.
-CHUNK_BYTES = 32_000_000
+CHUNK_BYTES = 8_000_000
 
 
 @dataclass(frozen=True)

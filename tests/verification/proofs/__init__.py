@@ -7,6 +7,7 @@ from tests.verification.proofs import (
     cracks,
     hertz,
     inclusions,
+    invariance,
     layers,
     panels,
     samples,
@@ -24,6 +25,7 @@ PROOFS: tuple[Proof, ...] = (
     *samples.PROOFS,
     *panels.PROOFS,
     *layers.PROOFS,
+    *invariance.PROOFS,
     *crack_fields.PROOFS,
 )
 

@@ -27,8 +27,8 @@ Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 
-# Scratch memory of one call of the kernels, in bytes.
-CHUNK_BYTES = 8_000_000
+# Scratch memory of one call of the kernels, in bytes: about that of the caches.
+CHUNK_BYTES = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -104,9 +104,10 @@ def assemble_rows(
         own = nodes[node_region[nodes] == region]
         columns = _needed_columns(mesh, int(region), needed)
         matrix = np.empty((2 * len(own), len(columns)))
-        for part, where in _list_chunks(own, mesh.traction_equation, sources[region]):
+        scratch = _allocate_scratch(sources[region])
+        for part, where in _list_chunks(own, mesh.traction_equation, scratch):
             traction = bool(mesh.traction_equation[part[0]])
-            values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction)
+            values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction, scratch)
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
         rows = (2 * (own - first_node)[:, None] + np.arange(2)).ravel()
         blocks.append(Block(int(region), rows, columns, matrix))
@@ -125,8 +126,9 @@ def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes:
         at = np.flatnonzero(node_region[nodes] == region)
         columns = _needed_columns(mesh, int(region), needed)
         matrix = np.empty((2 * len(at), len(columns)))
-        for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), sources[region]):
-            matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False)
+        scratch = _allocate_scratch(sources[region])
+        for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), scratch):
+            matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False, scratch)
         blocks.append(Block(int(region), (2 * at[:, None] + np.arange(2)).ravel(), columns, matrix))
     return blocks
 
@@ -178,10 +180,16 @@ def _needed_columns(mesh: Mesh, region: int, needed: Bool) -> Integer:
     return columns[needed[columns]]
 
 
-def _list_chunks(nodes: Integer, traction: Bool, sources: Sources) -> list[tuple[Integer, Integer]]:
+def _allocate_scratch(sources: Sources) -> tuple[Real, Real]:
+    """Room for the rows of some points: displacements and tractions of all elements."""
+    width = 2 * sources.count * len(sources.local)
+    points = max(1, CHUNK_BYTES // (2 * 2 * 8 * width))
+    return np.empty((2 * points, width)), np.zeros((2 * points, width))
+
+
+def _list_chunks(nodes: Integer, traction: Bool, scratch: tuple[Real, Real]) -> list[tuple[Integer, Integer]]:
     """Runs of nodes with the same equation that fit into the scratch memory, and their rows in the block."""
-    row_bytes = 2 * 8 * 2 * sources.count * len(sources.local) * 2
-    most = max(1, CHUNK_BYTES // row_bytes)
+    most = len(scratch[0]) // 2
     chunks = []
     for kind in (False, True):
         at = np.flatnonzero(traction[nodes] == kind)
@@ -192,7 +200,13 @@ def _list_chunks(nodes: Integer, traction: Bool, sources: Sources) -> list[tuple
 
 
 def _evaluate_columns(
-    mesh: Mesh, sources: Sources, region: int, nodes: Integer, columns: Integer, traction: bool
+    mesh: Mesh,
+    sources: Sources,
+    region: int,
+    nodes: Integer,
+    columns: Integer,
+    traction: bool,
+    scratch: tuple[Real, Real],
 ) -> Real:
     """Values at nodes (displacement, or traction on the node's normal) in the given columns of v."""
     own = _region_nodes(mesh, region)
@@ -202,7 +216,7 @@ def _evaluate_columns(
     with_tractions = bool((~of_displacement).any())
     displacement, tractions = evaluate_rows(
         sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions,
-        mesh.node_local[nodes],
+        mesh.node_local[nodes], scratch,
     )
     parts = [displacement[:, columns[of_displacement] - 2 * first]]
     if tractions is not None:

@@ -51,13 +51,15 @@ def evaluate_rows(
     normal: Complex | None = None,
     tractions: bool = True,
     on_local: Real | None = None,
+    out: tuple[Real, Real] | None = None,
 ) -> tuple[Real, Real | None]:
     """Matrices A, B with: value at the points = A u + B t, for nodal u, t of all elements (x, y interleaved).
 
     point (n,): complex. on (n,): index of the element on which a point lies (principal value, finite part), or -1.
     normal None: the value is the displacement, -int T u + int U t. normal (n,) complex: the value is the traction on
     that normal, -int S u + int D t. At a smooth boundary point the value is half the local one (free term).
-    on_local (n,): the points' coordinates on those elements, needed on arcs.
+    on_local (n,): the points' coordinates on those elements, needed on arcs. out: arrays of the results' width with at
+    least 2 n rows to put them in, the second full of zeros at first; fresh pages cost more time than the kernels.
     Shapes (2 n, 2 m (p + 1)); B is None without `tractions`. Tip elements carry no traction density: zero columns.
     On an arc the densities are polynomials of s with a point at apex (1 + i q s)/(1 - i q s) from the centre,
     q = tan(sweep/4); tractions are such polynomials times 1 + q^2 s^2.
@@ -66,8 +68,9 @@ def evaluate_rows(
     on_crack = sources.local if sources.crack_local is None else sources.crack_local
     shape = np.stack([interpolate_shapes(sources.local), *tip_shapes(tuple(on_crack)), interpolate_shapes(on_crack)])
     size = (2 * len(point), 2 * sources.count * len(sources.local))
-    displacement = np.empty(size)
-    traction = np.zeros(size) if tractions else None
+    displacement, traction = (np.empty(size), np.zeros(size) if tractions else None) if out is None else (
+        out[0][: size[0]], out[1][: size[0]] if tractions else None
+    )  # fmt: skip
     center = np.zeros(sources.count, dtype=complex) if sources.center is None else sources.center
     sweep = np.zeros(sources.count) if sources.sweep is None else sources.sweep
     local = np.zeros(len(point)) if on_local is None else on_local

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 PREFIX = "-pbem_"
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 COMMANDS = ("check", "run", "info", "plot")
+# Of `pbem plot --field`; defined in pbem.results.field_plot.
+FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
 
 DESCRIPTION = """\
 Boundary elements for frictional contact in two-dimensional elasticity.
@@ -199,10 +201,12 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
     info = add("info", _info, "tell what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
-    plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips")
+    plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")
     plot.add_argument("file", metavar="FILE.h5")
     plot.add_argument("-o", "--output", metavar="FILE.png", help="picture (default: beside the result file)")
     plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
+    plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
+                      help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
     plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
     return parser
 
@@ -235,14 +239,20 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
+    from pbem.results.field_plot import plot_field
     from pbem.results.output import check_picture_path
     from pbem.results.plots import plot_results
     from pbem.results.reader import open_results
 
     results = open_results(options.file)
-    target = check_picture_path(options.output or Path(options.file).with_suffix(".png"))
+    source = Path(options.file)
+    beside = source.with_name(f"{source.stem}_{options.field}.png") if options.field else source.with_suffix(".png")
+    target = check_picture_path(options.output or beside)
     step = -1 if options.step is None else results.find_step(options.step)
-    plot_results(results, target, step, options.magnify)
+    if options.field:
+        plot_field(results, options.field, target, step)
+    else:
+        plot_results(results, target, step, options.magnify)
     print(f"picture: {target}")
     return 0
 
@@ -253,13 +263,14 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
 
     from pbem.driver import run
     from pbem.parallel import abort_if_unexpected, world
+    from pbem.progress import make_reporter
 
     reporter: Reporter | None = None
     begun = time.perf_counter()
     code = 0
     try:
         with abort_if_unexpected(world, PbemError):
-            reporter = _make_reporter(case, options.quiet) if world.rank == 0 else None
+            reporter = make_reporter(options.quiet) if world.rank == 0 else None
         results = run(case, target, resume=options.resume, petsc=petsc, reporter=reporter)
         if world.rank == 0 and not options.quiet:
             _close(reporter)
@@ -279,17 +290,6 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code
-
-
-def _make_reporter(case: Path, quiet: bool) -> Reporter | None:
-    """The progress needs the stages, and what is wrong with the case is better said by the run, on all ranks."""
-    from pbem.model.build import read_model
-    from pbem.progress import make_reporter
-
-    try:
-        return make_reporter(read_model(case)[1].stages, quiet)
-    except PbemError:
-        return None
 
 
 def _say_finished(steps: Steps, target: Path, seconds: float) -> None:

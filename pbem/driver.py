@@ -48,6 +48,7 @@ def run(
         do_on_first(world, PbemError, lambda: check_output_path(target))
         mesh = generate_mesh(model)
         listener = reporter if reporter is not None and world.rank == 0 else SilentReporter()
+        listener.begin(model)
         for note in (*model.notes, *mesh.notes):
             listener.note(note)
         options = {**model.solver.petsc, **(petsc or {})}

@@ -6,7 +6,7 @@ import math
 import sys
 from typing import Any, TextIO
 
-from pbem.model.model import Stage
+from pbem.model.model import Model, Stage
 from pbem.solve.step import OPEN, SLIP, STICK, Iteration, Reporter, SilentReporter, Step
 
 
@@ -29,10 +29,12 @@ class Plan:
 class LogReporter:
     """Plain lines, flushed one by one, for batch logs."""
 
-    def __init__(self, stages: tuple[Stage, ...], stream: TextIO) -> None:
-        self._plan = Plan(stages)
+    def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._number: int | None = None
+
+    def begin(self, model: Model) -> None:
+        self._plan = Plan(model.stages)
 
     def note(self, text: str) -> None:
         self._say(f"note: {text}")
@@ -66,13 +68,17 @@ class LogReporter:
 class BarReporter:
     """A progress bar on a terminal, over the planned steps; notes and failures are printed above it."""
 
-    def __init__(self, stages: tuple[Stage, ...], stream: TextIO) -> None:
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._bar: Any = None
+
+    def begin(self, model: Model) -> None:
         from tqdm import tqdm
 
-        self._plan = Plan(stages)
+        self._plan = Plan(model.stages)
         self._name = ""
-        self._bar: Any = tqdm(
-            total=self._plan.steps, file=stream, unit="step", dynamic_ncols=True, mininterval=0.1, leave=True,
+        self._bar = tqdm(
+            total=self._plan.steps, file=self._stream, unit="step", dynamic_ncols=True, mininterval=0.1, leave=True,
             bar_format="{l_bar}{bar}| {n:.4g}/{total} steps [{elapsed}<{remaining}]{postfix}",
         )
 
@@ -100,14 +106,15 @@ class BarReporter:
         self._write(f"{self._bar.desc}: not converged ({reason}), the step is halved. {detail}")
 
     def close(self) -> None:
-        """Leave the bar as it stands and end its line."""
-        self._bar.close()
+        """Leave the bar as it stands and end its line; nothing if it was never begun."""
+        if self._bar is not None:
+            self._bar.close()
 
     def _write(self, text: str) -> None:
         self._bar.write(text, file=self._bar.fp)
 
 
-def make_reporter(stages: tuple[Stage, ...], quiet: bool = False, stream: TextIO | None = None) -> Reporter:
+def make_reporter(quiet: bool = False, stream: TextIO | None = None) -> Reporter:
     """A bar if the stream is a terminal, otherwise lines; by default a bar on standard error or lines on standard
     output."""
     if quiet:
@@ -115,8 +122,8 @@ def make_reporter(stages: tuple[Stage, ...], quiet: bool = False, stream: TextIO
     if stream is None:
         # Standard output tells nothing: Open MPI gives its ranks a terminal there, whatever its own output is.
         stream = sys.stderr
-        return BarReporter(stages, stream) if stream.isatty() else LogReporter(stages, sys.stdout)
-    return BarReporter(stages, stream) if stream.isatty() else LogReporter(stages, stream)
+        return BarReporter(stream) if stream.isatty() else LogReporter(sys.stdout)
+    return BarReporter(stream) if stream.isatty() else LogReporter(stream)
 
 
 def describe_iteration(iteration: Iteration) -> str:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.results.contents import Elements, Nodes
+from pbem.mesh.interpolation import find_coordinates, interpolate, interpolate_tips
+from pbem.results.contents import Elements, Nodes, Tips
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-POINTS_PER_ELEMENT = 5
+POINTS_PER_ELEMENT = 9
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,24 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
 
 
 def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t: Real) -> Real:
-    """(e, len(t), 2): displacement at local coordinates t in [-1, 1] of every element."""
+    """(e, len(t), 2): displacement at local coordinates t in [-1, 1] of every element.
+
+    At crack tips the mean of the two faces is a polynomial, and their jump has the square-root shape.
+    """
     count = len(elements.vertices)
     start, end = to_complex(elements.vertices).T
     local = find_coordinates(start, end, elements.sweep, to_complex(nodes.position).reshape(count, -1))
-    powers = np.arange(nodes.order + 1)
-    coefficients = np.linalg.solve(local[..., None] ** powers, displacement.reshape(count, -1, 2))
-    return np.asarray(t[:, None] ** powers @ coefficients)
+    at_nodes = displacement.reshape(count, -1, 2)
+    values = interpolate(local, np.broadcast_to(t, (count, len(t)))) @ at_nodes
+    # Second faces are stored in the order of the first ones, each travelled backwards.
+    first, second = np.flatnonzero(elements.crack).reshape(2, -1)
+    tips = elements.tip[first] > 0
+    for here, there in ((first[tips], second[tips]), (second[tips], first[tips])):
+        half_jump = 0.5 * (at_nodes[here] - at_nodes[there][:, ::-1])
+        along = np.broadcast_to(t, (len(here), len(t)))
+        shapes = interpolate_tips(elements.tip[here], local[here], along) - interpolate(local[here], along)
+        values[here] += shapes @ half_jump
+    return np.asarray(values)
 
 
 def trace_elements(start: Complex, end: Complex, sweep: Real, t: Real) -> Complex:
@@ -72,14 +85,6 @@ def trace_elements(start: Complex, end: Complex, sweep: Real, t: Real) -> Comple
     return middle + half * (t - 1j * quarter) / (1 - 1j * quarter * t)
 
 
-def find_coordinates(start: Complex, end: Complex, sweep: Real, points: Complex) -> Real:
-    """The coordinates (e, p) of points (e, p) on their elements; the inverse of `trace_elements`."""
-    middle, half = 0.5 * (start + end)[:, None], 0.5 * (end - start)[:, None]
-    quarter = np.tan(0.25 * sweep)[:, None]
-    w = (points - middle) / half
-    return np.asarray(((w + 1j * quarter) / (1 + 1j * quarter * w)).real)
-
-
 def to_complex(columns: Real) -> Complex:
     """Complex points (...) from their x and y (..., 2)."""
     return np.asarray(columns[..., 0] + 1j * columns[..., 1])
@@ -88,6 +93,19 @@ def to_complex(columns: Real) -> Complex:
 def to_columns(points: Complex) -> Real:
     """x and y (..., 2) of complex points (...)."""
     return np.stack([points.real, points.imag], axis=-1)
+
+
+def find_tips(elements: Elements, curve_names: Sequence[str], tips: Mapping[str, Tips]) -> set[tuple[float, ...]]:
+    """The points (x, y) of all ends of cracks that are tips: those that have stress-intensity factors."""
+    count = int(elements.crack.sum()) // 2
+    first = np.flatnonzero(elements.crack)[:count]
+    points = set()
+    for name, factors in tips.items():
+        own = first[elements.curve[first] == curve_names.index(name)]
+        for end, vertex in ((0, elements.vertices[own[0], 0]), (1, elements.vertices[own[-1], 1])):
+            if len(factors.KI) and not np.isnan(factors.KI[-1, end]):
+                points.add(tuple(vertex))
+    return points
 
 
 def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
@@ -104,6 +122,7 @@ def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
             and elements.region[e] == elements.region[last[-1]]
             and bool(elements.crack[e]) == bool(elements.crack[last[-1]])
             and (not elements.crack[e] or elements.curve[e] == elements.curve[last[-1]])
+            and (e < second) == (last[-1] < second)
             and (bool(elements.crack[e]) or bool((end[last[-1]] != start[last[0]]).any()))
         )
         if follows:

@@ -11,6 +11,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 
+from pbem.results.reader import Results
 from pbem.solve.step import OPEN, SLIP, STICK
 
 
@@ -43,6 +44,7 @@ MODES = {
 }
 SHADES = ("#DCE6EE", "#EFE6D5", "#DFEBDC", "#EADFEA", "#E4E4E4", "#F2DEDA")
 POWER, SUPERSCRIPT = r"\^(-?[0-9.]+)", r"$^{\1}$"
+TIP = "#A51C30"
 FORCE, MOTION, SUPPORT = "#D55E00", "#0072B2", "#444444"
 
 
@@ -68,3 +70,10 @@ def label(quantity: str, unit: str) -> str:
 def scale_axis(axes: Axes) -> None:
     """Write small and large numbers of the vertical axis with a common power of ten."""
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+
+
+def describe_step(results: Results, step: int) -> str:
+    """Title and load step (its place in the file)."""
+    steps = results.steps
+    stage = steps.stage_names[int(steps.stage[step])]
+    return f"{results.title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g})"

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pbem.results.model_plot import plot_model
-from pbem.results.outline import Outline, trace_outlines
-from pbem.results.plot_style import MODES, SHADES, label, scale_axis, style
+from pbem.results.outline import Outline, find_tips, trace_outlines
+from pbem.results.plot_style import MODES, SHADES, TIP, describe_step, label, scale_axis, style
 from pbem.results.reader import Contact, Results
 
 __all__ = ["draw_results", "plot_model", "plot_results"]
@@ -96,6 +96,7 @@ def _draw_body(axes: Axes, results: Results, step: int | None, magnify: float | 
     lines = [each.position + magnify * each.displacement for each in outlines]
     axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.8, zorder=3))
     marks = _mark_modes(axes, results, step, displacement, magnify) if step is not None else []
+    marks += _mark_tips(axes, results, outlines, magnify)
     for contact in named:
         place = contact.position[contact.pairs // 3]
         axes.annotate(contact.name, place, xytext=(4, -9), textcoords="offset points", fontsize=7, zorder=6)
@@ -104,19 +105,13 @@ def _draw_body(axes: Axes, results: Results, step: int | None, magnify: float | 
     axes.margins(0.05)
     axes.set_xlabel(label("$x$", results.units.length))
     axes.set_ylabel(label("$y$", results.units.length))
-    axes.set_title(_describe_step(results, step, magnify), loc="left", fontsize=9)
+    title = f"{results.title}: no step stored"
+    if step is not None:
+        title = f"{describe_step(results, step)}, displacements × {magnify:g}"
+    axes.set_title(title, loc="left", fontsize=9)
     handles = [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
                Line2D([], [], color="0.7", linewidth=0.6, label="as it was")]
     axes.legend(handles=handles + marks, loc="center left", bbox_to_anchor=(1.01, 0.5))
-
-
-def _describe_step(results: Results, step: int | None, magnify: float) -> str:
-    if step is None:
-        return f"{results.title}: no step stored"
-    steps = results.steps
-    stage = steps.stage_names[int(steps.stage[step])]
-    return (f"{results.title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g}), "
-            f"displacements × {magnify:g}")
 
 
 def _fill_region(axes: Axes, region: int, loops: Sequence[Outline], magnify: float) -> None:
@@ -163,6 +158,17 @@ def _mark_modes(axes: Axes, results: Results, step: int, displacement: Real, mag
         there = segments[mode[begins] == which]
         axes.add_collection(LineCollection(there, colors=MODES[which].stroke, linewidths=1.6, zorder=4))
     return [Line2D([], [], color=MODES[which].stroke, linewidth=1.6, label=MODES[which].name) for which in used]
+
+
+def _mark_tips(axes: Axes, results: Results, outlines: Sequence[Outline], magnify: float) -> list[Line2D]:
+    """A dot at every tip, where it is now; returns its legend handle."""
+    tips = find_tips(results.elements, results.nodes.curve_names, results.tips)
+    places = [face.position[end] + magnify * face.displacement[end]
+              for face in outlines if face.crack for end in (0, -1) if tuple(face.position[end]) in tips]
+    if not places:
+        return []
+    axes.plot(*np.transpose(places), ".", color=TIP, markersize=4.0 if len(places) < 20 else 2.0, zorder=5)
+    return [Line2D([], [], linestyle="none", marker=".", color=TIP, markersize=4.0, label="crack tip")]
 
 
 def _draw_along(axes: Axes, contact: Contact, step: int, quantities: dict[str, str]) -> None:

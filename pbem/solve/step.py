@@ -8,6 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.model.model import Model
+
 STICK, SLIP, OPEN = 0, 1, 2
 
 
@@ -81,6 +83,9 @@ class Step:
 class Reporter(Protocol):
     """Who is told of the run as it goes on (on rank 0 only); all calls return at once."""
 
+    def begin(self, model: Model) -> None:
+        """The case has been read, and is going to be computed; always the first call."""
+
     def note(self, text: str) -> None:
         """A choice or a fact that the user should know, one sentence."""
 
@@ -99,6 +104,9 @@ class Reporter(Protocol):
 
 class SilentReporter:
     """A reporter that says nothing."""
+
+    def begin(self, model: Model) -> None:
+        """Nothing."""
 
     def note(self, text: str) -> None:
         """Nothing."""

@@ -7,11 +7,12 @@ import io
 import numpy as np
 import pytest
 
-from pbem.model.model import Stage
 from pbem.progress import BarReporter, LogReporter, make_reporter
 from pbem.solve.step import OPEN, SLIP, STICK, ContactState, Iteration, Reporter, SilentReporter, Step
+from tests.unit.results_sample import make_model
 
-STAGES = (Stage("press", 2, {}, {}), Stage("shear", 4, {}, {}))
+# Stages "press" of 2 and "shear" of 4 steps.
+MODEL = make_model()
 
 
 class Terminal(io.StringIO):
@@ -27,6 +28,7 @@ def make_step(number: int, stage: int, factor: float) -> Step:
 
 def march(reporter: Reporter) -> None:
     """Two steps of the first stage, then one that is halved."""
+    reporter.begin(MODEL)
     reporter.note("joint is refined.")
     for number, stage, reached, factor in ((1, 0, 0.0, 0.5), (2, 0, 0.5, 1.0)):
         reporter.start_step(stage, reached, factor)
@@ -41,7 +43,7 @@ def march(reporter: Reporter) -> None:
 
 def test_a_log_has_a_line_for_every_step_and_iteration() -> None:
     stream = io.StringIO()
-    march(make_reporter(STAGES, stream=stream))
+    march(make_reporter(stream=stream))
     lines = stream.getvalue().splitlines()
     assert lines[0] == "note: joint is refined."
     assert lines[1] == "step 1 of 6, stage press, factor 0 to 0.5"
@@ -57,14 +59,15 @@ def test_a_log_has_a_line_for_every_step_and_iteration() -> None:
 
 def test_a_resumed_log_goes_on_counting() -> None:
     stream = io.StringIO()
-    reporter = LogReporter(STAGES, stream)
+    reporter = LogReporter(stream)
+    reporter.begin(MODEL)
     reporter.start_step(1, 0.25, 0.5)
     assert stream.getvalue() == "step 4 of 6, stage shear, factor 0.25 to 0.5\n"
 
 
 def test_a_terminal_gets_a_bar_with_the_state_of_the_iteration() -> None:
     stream = Terminal()
-    reporter = make_reporter(STAGES, stream=stream)
+    reporter = make_reporter(stream=stream)
     assert isinstance(reporter, BarReporter)
     march(reporter)
     assert reporter._bar.n == pytest.approx(2.5)
@@ -80,7 +83,8 @@ def test_a_terminal_gets_a_bar_with_the_state_of_the_iteration() -> None:
 
 
 def test_a_resumed_bar_begins_where_the_run_does() -> None:
-    reporter = BarReporter(STAGES, Terminal())
+    reporter = BarReporter(Terminal())
+    reporter.begin(MODEL)
     reporter.start_step(1, 0.25, 0.5)
     assert reporter._bar.n == reporter._bar.initial == 3
     reporter.close()
@@ -88,7 +92,14 @@ def test_a_resumed_bar_begins_where_the_run_does() -> None:
 
 def test_quiet_is_silent() -> None:
     stream = io.StringIO()
-    reporter = make_reporter(STAGES, quiet=True, stream=stream)
+    reporter = make_reporter(quiet=True, stream=stream)
     assert isinstance(reporter, SilentReporter)
     march(reporter)
+    assert stream.getvalue() == ""
+
+
+def test_a_bar_that_never_began_closes_quietly() -> None:
+    # What is wrong with a case is found before a run begins.
+    stream = Terminal()
+    BarReporter(stream).close()
     assert stream.getvalue() == ""

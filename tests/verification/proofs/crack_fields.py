@@ -15,11 +15,20 @@ from pbem.errors import ConvergenceError
 from pbem.model.build import parse_model
 from pbem.solve import newton
 from pbem.solve.step import OPEN, SLIP, STICK, ContactState
-from tests.verification.proofs.proof import Outcome, Proof, Solved, line, solve_model, solve_text, write_case
+from tests.verification.proofs.proof import (
+    Outcome,
+    Proof,
+    Solved,
+    largest_error,
+    line,
+    solve_model,
+    solve_text,
+    write_case,
+)
 
 COUNT, DENSITY, CLEARANCE = 150, 0.15, 0.1
 FRICTION = 0.6
-STIFF_COUNT = 60
+FEW = 60
 
 
 def scatter_cracks(seed: int, count: int = COUNT) -> list[tuple[complex, complex]]:
@@ -53,8 +62,8 @@ def measure_distance(one: tuple[complex, complex], other: tuple[complex, complex
     return min(*(distance(end, other) for end in one), *(distance(end, one) for end in other))
 
 
-def write_field(seed: int, count: int = COUNT, order: int = 1) -> str:
-    """The case: compression 1 along y, tension 0.3 along x, in one step that may not be halved."""
+def write_field(seed: int, count: int = COUNT, order: int = 1, steps: int = 1) -> str:
+    """The case: compression 1 along y, tension 0.3 along x, in steps that may not be halved."""
     cracks = {f"c{k}": line(*ends, 4) for k, ends in enumerate(scatter_cracks(seed, count))}
     return write_case(
         {
@@ -63,7 +72,7 @@ def write_field(seed: int, count: int = COUNT, order: int = 1) -> str:
             "regions": {"plane": {"material": "rock", "infinite": True, "cracks": list(cracks)}},
             "interfaces": {name: {"friction": FRICTION} for name in cracks},
             "remote": {"sxx": 0.3, "syy": -1.0},
-            "analysis": {"order": order, "steps": 1},
+            "analysis": {"order": order, "steps": steps},
             "solver": {"min_step": 1.0},
         }
     )
@@ -100,6 +109,19 @@ def random_field(seed: int, order: int) -> Outcome:
     return Outcome(measure_violation(step.contact), solved.unknowns, remark)
 
 
+def many_steps() -> Outcome:
+    """Slips and openings of a load in five steps against one: all grows in proportion, whatever friction remembers."""
+    one, five = (solve_text(write_field(1, FEW, steps=steps)) for steps in (1, 5))
+    assert len(five.steps) == 5
+    np.testing.assert_array_equal(one.last.contact.mode, five.last.contact.mode)
+    errors = [
+        largest_error(getattr(five.last.contact, name), values, float(np.abs(values).max()))
+        for name in ("opening", "slip", "traction_n", "traction_s")
+        for values in [getattr(one.last.contact, name)]
+    ]
+    return Outcome(max(errors), one.unknowns)
+
+
 def solve_stiffly(text: str, factor: float, cautions: Any) -> Solved | str:
     """The solution with the trial stiffness of the mode choice multiplied; the reason if there is none."""
     usual = laws.SOFTNESS, newton.CAUTIONS
@@ -114,7 +136,7 @@ def solve_stiffly(text: str, factor: float, cautions: Any) -> Solved | str:
 
 def stiff_trials(factor: float) -> Outcome:
     """Share of the pairs with other modes than usual, where switching without caution goes round for ever."""
-    text = write_field(1, STIFF_COUNT)
+    text = write_field(1, FEW)
     usual = solve_text(text)
     assert solve_stiffly(text, factor, newton.CAUTIONS[:1]) == "mode cycle"
     solved = solve_stiffly(text, factor, newton.CAUTIONS)
@@ -126,7 +148,7 @@ def stiff_trials(factor: float) -> Outcome:
 
 def stiffest_trials() -> Outcome:
     """Beyond all caution the run ends with the reason: 0; with anything else: 1."""
-    text = write_field(1, STIFF_COUNT)
+    text = write_field(1, FEW)
     solved = solve_stiffly(text, 1e6, newton.CAUTIONS)
     reason = solved if isinstance(solved, str) else "converged"
     return Outcome(float(reason != "mode cycle"), solve_text(text).unknowns, reason)
@@ -137,6 +159,7 @@ PROOFS = (
             1e-8, partial(random_field, seed, order))
       for order, seeds in ((1, range(1, 11)), (2, (1,)))
       for seed in seeds),
+    Proof(f"field of {FEW} random cracks, load in five steps: jumps, tractions", "invariance", 1e-8, many_steps),
     *(Proof(f"trial stiffness {factor:g} times too large: pairs in other modes", "usual stiffness", 0.0,
             partial(stiff_trials, factor))
       for factor in (80.0, 800.0, 8000.0)),

@@ -33,7 +33,7 @@ def expect_factors(found: NDArray[np.float64], expected: float | list[float], to
     np.testing.assert_allclose(found, np.broadcast_to(expected, 2), rtol=tolerance)
 
 
-@pytest.mark.parametrize("order, elements, tolerance", [(2, 8, 1e-3), (3, 16, 2e-4), (1, 8, 2e-2)])
+@pytest.mark.parametrize("order, elements, tolerance", [(2, 8, 1e-5), (3, 16, 2e-7), (1, 8, 5e-4)])
 def test_griffith_crack(order: int, elements: int, tolerance: float) -> None:
     crack = [make_straight(-1.3, 1.3, elements)]
     KI, KII = find_factors(make_plane((0.0, 2.0, 0.0), {"crack": crack}, order=order))["crack"]
@@ -42,7 +42,7 @@ def test_griffith_crack(order: int, elements: int, tolerance: float) -> None:
 
 
 # order, elements, power of the grading towards the tips, error of an estimate
-WITHOUT_TIP_ELEMENTS = [(2, 16, None, 0.02), (2, 16, 3.0, 0.025), (3, 16, 3.0, 0.01)]
+WITHOUT_TIP_ELEMENTS = [(2, 16, None, 0.015), (2, 16, 3.0, 0.015), (3, 16, 3.0, 0.004)]
 
 
 @pytest.mark.parametrize("order, elements, power, tolerance", WITHOUT_TIP_ELEMENTS)
@@ -59,8 +59,8 @@ def test_inclined_crack(angle: float) -> None:
     crack = [make_straight(-along, along, 8)]
     KI, KII = find_factors(make_plane((0.0, 1.0, 0.0), {"crack": crack}))["crack"]
     exact = inclined_crack_intensity(1.0, 1.0, beta)
-    expect_factors(KI, exact.KI, 1e-3)
-    expect_factors(KII, exact.KII, 1e-3)
+    expect_factors(KI, exact.KI, 2e-5)
+    expect_factors(KII, exact.KII, 2e-5)
 
 
 def test_a_crack_written_backwards_has_the_same_factors() -> None:
@@ -84,11 +84,11 @@ def test_closed_crack_with_friction(cohesion: float, KII: float) -> None:
     exact = closed_crack(SLATE.plane_modulus, 1.0, 100.0, psi, friction, cohesion)
     np.testing.assert_allclose(exact.KII, KII, atol=1e-3)
     assert found[0].tolist() == [0.0, 0.0]
-    expect_factors(np.abs(found[1]), exact.KII, 1e-3)
+    expect_factors(np.abs(found[1]), exact.KII, 2e-5)
     assert (found[1] < 0).all()
     np.testing.assert_allclose(contact.traction_n, exact.normal_traction, rtol=1e-9)
     shape = np.sqrt(1 - (mesh.pairs.arc_length - 1) ** 2)
-    assert np.abs(np.abs(contact.slip) - exact.slip * shape).max() < 1e-3 * exact.slip
+    assert np.abs(np.abs(contact.slip) - exact.slip * shape).max() < 1e-4 * exact.slip
 
 
 def test_a_crack_that_sticks_has_no_factors_at_all() -> None:
@@ -104,9 +104,9 @@ def test_crack_along_an_arc(degrees: float, elements: int) -> None:
     crack = [make_arc(complex(radius * np.exp(-1j * half)), 2 * half, elements)]
     KI, KII = find_factors(make_plane((1.0, 1.0, 0.0), {"crack": crack}, size=3.0))["crack"]
     exact = arc_crack_intensity(radius, half, 1.0)
-    expect_factors(KI, exact.KI, 5e-3)
+    expect_factors(KI, exact.KI, 5e-4)
     # The centre is on the left of the crack: the face of that side moves towards the tips.
-    expect_factors(KII, [-exact.KII, exact.KII], 5e-3)
+    expect_factors(KII, [-exact.KII, exact.KII], 5e-4)
 
 
 def test_two_collinear_cracks() -> None:
@@ -114,8 +114,8 @@ def test_two_collinear_cracks() -> None:
     cracks = {"left": [make_straight(-outer, -inner, 16)], "right": [make_straight(inner, outer, 16)]}
     found = find_factors(make_plane((0.0, 1.0, 0.0), cracks))
     exact = collinear_cracks_intensity(inner, outer, 1.0)
-    expect_factors(found["left"][0], list(exact[::-1]), 5e-3)
-    expect_factors(found["right"][0], list(exact), 5e-3)
+    expect_factors(found["left"][0], list(exact[::-1]), 2e-4)
+    expect_factors(found["right"][0], list(exact), 2e-4)
 
 
 def test_an_end_that_is_no_tip_has_no_factor() -> None:

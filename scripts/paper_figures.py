@@ -4,8 +4,8 @@
     .venv/bin/python scripts/paper_figures.py [-o figures] [--only 13] [--format png]
 
 The paper is "Non-linear boundary element formulation applied to contact analysis using tangent operator". Cases are run
-where the folder holds no finished result of the same case and version; a table of the reactions of the four schemes is printed.
-Where there are finite-element solutions (cases/reference) they are drawn as black dots.
+where the folder holds no finished result of the same case and version. Finite-element solutions (cases/reference) are
+drawn as black dots. A table of the reactions of the four schemes is printed.
 """
 
 from __future__ import annotations

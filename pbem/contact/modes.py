@@ -7,6 +7,7 @@ in slip; both jumps when open. Value and tangent of the law are one object.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ from pbem.contact.laws import (
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
+Frozen = Literal["nothing", "slip", "strength"]
 P_N, P_S, G_N, G_S = range(4)
 
 
@@ -51,13 +53,15 @@ def linearise(
     memory: Memory,
     pressure: Real,
     traction_scale: float,
-    frozen: bool = False,
+    frozen: Frozen = "nothing",
 ) -> Linearisation:
     """The affine law of every pair in its mode; a traction is traction_scale times its unknown, a jump the unknown.
 
     p_n, slip (m,): normal tractions and plastic slips at which the friction bound is taken; pressure (m,): of fluid.
-    frozen: leave out how the bound changes with slip. Where friction weakens faster than the bodies unload, the tangent
-    sends the slip backwards; taken step by step with a fixed bound it runs on until it finds the next equilibrium.
+    frozen: what is left out of the tangent. "slip": how the bound changes with slip; where friction weakens faster than
+    the bodies unload, the tangent sends the slip backwards, and with a bound fixed in each iteration it runs on until
+    it finds the next equilibrium. "strength": how it changes with the normal traction, too (Tresca's law in each
+    iteration): slower, but its modes do not chase each other.
     """
     tangent = np.zeros((laws.count, 4, 2))
     offset = np.zeros((laws.count, 4))
@@ -72,7 +76,8 @@ def linearise(
     # Rounding must not put a pair without cohesion beyond the apex of its cone, where friction has no slope.
     admissible = np.minimum(p_n, tensile_limit(laws, memory) - pressure)
     strength = evaluate_strength(laws, admissible, slip_path(modes, memory, slip), pressure, memory.broken)
-    by_n, by_s = modes.sign * strength.by_traction, np.zeros(laws.count) if frozen else strength.by_slip
+    by_n = modes.sign * (np.zeros(laws.count) if frozen == "strength" else strength.by_traction)
+    by_s = strength.by_slip if frozen == "nothing" else np.zeros(laws.count)
     p_s = modes.sign * strength.bound
     along = np.stack([by_n * traction_scale, by_s], axis=1)
     constant = p_s - by_n * admissible - by_s * slip
@@ -158,11 +163,16 @@ def propose_modes(
     parting = normal + pressure - np.where(is_open, 0.0, limit)
     opens = np.where(is_open, parting > -margin, parting > margin)
     admissible = np.minimum(normal, limit - pressure)
-    bound = evaluate_strength(laws, admissible, slip_path(modes, memory, slip), pressure, memory.broken).bound
-    excess = np.abs(tangential) - bound
+    path = slip_path(modes, memory, slip)
+    bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
+    # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to their last stick.
+    adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), path, pressure, memory.broken).bound
+    excess = np.abs(tangential) - np.where(is_open, np.maximum(bound - adhesion, 0.0), bound)
     free = ~resists_slip(laws)
+    # A pair that goes on slipping is held against the traction that it has, whatever its bound was taken at.
+    ahead = modes.sign * tangential - np.abs(state.p_s)
     same_sign = (modes.mode == SLIP) & ((np.sign(tangential) * modes.sign >= 0) | free)
-    slips = np.where(same_sign, excess > -margin, excess > margin) | free
+    slips = np.where(same_sign, ahead > -margin, excess > margin) | free
     intact = laws.brittle & ~memory.broken
     opens = (opens | laws.parted) & ~laws.bonded & ~intact
     slips &= ~laws.bonded & ~opens & ~intact

@@ -12,6 +12,7 @@ from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
+    Frozen,
     Linearisation,
     Proposal,
     find_failures,
@@ -48,19 +49,25 @@ class Solution:
 class Caution:
     """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest.
 
-    frozen: friction that depends on slip is taken as it is at the last iterate.
+    frozen: what of the friction bound is taken as it is at the last iterate.
     """
 
     softening: float
     share: float
-    frozen: bool = False
+    frozen: Frozen = "nothing"
 
 
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
 # Each cycle of modes moves one level down; the last changes one pair at a time.
-CAUTIONS = (Caution(1.0, 0.0), Caution(0.1, 0.0, True), Caution(0.01, 0.3, True), Caution(0.01, 1.0, True))
+CAUTIONS = (
+    Caution(1.0, 0.0),
+    Caution(0.1, 0.0, "slip"),
+    Caution(0.1, 0.0, "strength"),
+    Caution(0.01, 0.3, "strength"),
+    Caution(0.01, 1.0, "strength"),
+)
 
 
 def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:

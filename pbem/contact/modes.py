@@ -165,7 +165,7 @@ def propose_modes(
     admissible = np.minimum(normal, limit - pressure)
     path = slip_path(modes, memory, slip)
     bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
-    # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to their last stick.
+    # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to the last stick.
     adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), path, pressure, memory.broken).bound
     excess = np.abs(tangential) - np.where(is_open, np.maximum(bound - adhesion, 0.0), bound)
     free = ~resists_slip(laws)

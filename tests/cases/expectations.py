@@ -24,6 +24,7 @@ REACTION = re.compile(r"reactions\.(?P<curve>\w+)\.(?P<axis>[xy])")
 AT_PLACE = re.compile(rf"contact\.(?P<name>\w+)\.(?P<field>{'|'.join(FIELDS)}) at (?P<place>{NUMBER})")
 LARGEST = re.compile(rf"contact\.(?P<name>\w+|\*)\.(?P<field>{'|'.join(FIELDS)}) largest")
 PAIRS = re.compile(r"contact\.(?P<name>\w+|\*)\.(?P<mode>stick|slip|open) (?P<measure>count|share)")
+TIP = re.compile(r"tips\.(?P<name>\w+)\.(?P<factor>KI|KII) (?P<end>start|end)")
 ZONE = re.compile(r"contact\.(?P<name>\w+)\.(?P<mode>stick|slip|open) (?P<end>start|end)")
 
 
@@ -128,10 +129,16 @@ def _read_zone(results: Results, match: re.Match[str], step: int) -> float:
     return float(places[there[0]] if match["end"] == "start" else places[there[-1] + 1])
 
 
+def _read_tip(results: Results, match: re.Match[str], step: int) -> float:
+    factors = getattr(results.tips[match["name"]], match["factor"])
+    return float(factors[step][("start", "end").index(match["end"])])
+
+
 READERS = {
     REACTION: _read_reaction,
     AT_PLACE: _read_at_place,
     LARGEST: _read_largest,
     PAIRS: _read_pairs,
     ZONE: _read_zone,
+    TIP: _read_tip,
 }

@@ -45,6 +45,7 @@ def list_points(sweep: float) -> dict[str, complex]:
         "outside": CENTER + 1.05 * apex * np.exp(-0.2j * sweep),
         "beside": CENTER + apex * (1 + 0.02 * half / abs(apex)),
         "ahead": CENTER + (START - CENTER) * np.exp(1.1j * sweep),
+        "between": CENTER + apex * (1 - 1.3 * half / abs(apex)),
         "nearly far": CENTER + apex * (1 + 1.99 * half / abs(apex)),
         "just far": CENTER + apex * (1 + 2.01 * half / abs(apex)),
         "center": CENTER,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -231,3 +232,57 @@ def test_traction_densities_of_tip_elements_are_left_out() -> None:
     for normal in (None, np.array([1j])):
         _, rows = evaluate_rows(element, np.array([0.3 + 0.4j]), np.array([-1]), normal)
         assert rows is not None and not rows.any()
+
+
+def make_many(order: int, count: int) -> Sources:
+    """Random elements of all families and sizes, near and far from each other: arcs and tips among straight ones."""
+    random = np.random.default_rng(order)
+    start = random.normal(size=(count, 2)) @ [1, 1j]
+    end = start + random.lognormal(-2, 1.5, count) * np.exp(2j * np.pi * random.random(count))
+    sweep = np.where(random.random(count) < 0.05, 0.3, 0.0)
+    turn = np.exp(1j * np.where(sweep == 0, 1.0, sweep))
+    center = np.where(sweep == 0, 0, (end - start * turn) / (1 - turn))
+    family = np.sort(random.choice([0, 0, 0, 1, 2, 3], count)).astype(np.int8)
+    nodes = place_nodes(order)
+    return Sources(start, end, family, nodes, 1.8, 1.3, LENGTH, center, sweep, 0.9 * nodes)
+
+
+@orders
+@pytest.mark.parametrize("count", [1, 63, 64, 65, 200])
+def test_every_element_counts_as_if_it_were_alone(count: int, order: int) -> None:
+    # However the elements are grouped for the processor, and whichever of them are near the point.
+    sources = make_many(order, count)
+    random = np.random.default_rng(count)
+    beside = (sources.start + sources.end) / 2 + 0.2j * (sources.end - sources.start)
+    points = np.concatenate([beside[:5], random.normal(size=(5, 2)) @ [1, 1j], [1e3 + 1e2j]])
+    on_straight = np.flatnonzero((sources.sweep == 0) & (sources.family == 0))[:2]
+    points = np.concatenate([points, (sources.start + sources.end)[on_straight] / 2])
+    on = np.concatenate([np.full(len(points) - len(on_straight), -1), on_straight])
+    for normal in (None, np.exp(1j * np.arange(len(points)))):
+        together = evaluate_rows(sources, points, on, normal)
+        for element in range(0, count, 1 if count < 70 else 7):
+            at = slice(2 * element * (order + 1), 2 * (element + 1) * (order + 1))
+            alone = evaluate_rows(take_element(sources, element), points, np.where(on == element, 0, -1), normal)
+            for whole, one in zip(together, alone, strict=True):
+                assert whole is not None and one is not None
+                scale = np.abs(one).max(axis=1, keepdims=True)
+                assert np.all(np.abs(whole[:, at] - one) <= 1e-13 * scale), f"element {element}"
+
+
+def take_element(sources: Sources, element: int) -> Sources:
+    own = slice(element, element + 1)
+    assert sources.center is not None and sources.sweep is not None
+    return replace(
+        sources, start=sources.start[own], end=sources.end[own], family=sources.family[own],
+        center=sources.center[own], sweep=sources.sweep[own],
+    )  # fmt: skip
+
+
+@orders
+def test_without_tractions_the_rows_of_displacements_are_the_same(order: int) -> None:
+    sources = make_many(order, 100)
+    points, off = np.random.default_rng(7).normal(size=(9, 2)) @ [1, 1j], np.full(9, -1)
+    for normal in (None, np.exp(1j * np.arange(9))):
+        with_tractions, without = (evaluate_rows(sources, points, off, normal, kind) for kind in (True, False))
+        np.testing.assert_array_equal(with_tractions[0], without[0])
+        assert without[1] is None

@@ -277,6 +277,17 @@ def test_rounding_does_not_change_a_mode(noise: float, size: float) -> None:
     np.testing.assert_array_equal(proposal.modes.mode, modes.mode)
 
 
+@pytest.mark.parametrize("size", [1.0, 1e9, 1e-9])
+def test_what_is_more_than_rounding_changes_a_mode(size: float) -> None:
+    excess = 1e-8  # of the largest traction
+    laws, modes = make_laws(4), ModeState(np.array([STICK, STICK, SLIP, OPEN]), np.ones(4))
+    states = np.array([[excess, 0, 0, 0], [-1, 0.5 + excess, 0, 0], [-1, 0.5, 0, -excess], [0, 0, -excess, 0]])
+    states[:, :2] *= size
+    laws = replace(laws, stiffness=laws.stiffness * size)
+    proposal = propose_modes(laws, modes, PairState(*states.T), remember(0.0, 4), np.zeros(4))
+    np.testing.assert_array_equal(proposal.modes.mode, [OPEN, SLIP, STICK, STICK])
+
+
 def test_softening_makes_jumps_count_less() -> None:
     # The jump alone would turn the slip around; a softer trial only lets it stick.
     state, none, before = make_state(-1.0, 0.5, 0.0, -0.2), np.zeros(1), remember(0.0)

@@ -242,7 +242,7 @@ def make_many(order: int, count: int) -> Sources:
     sweep = np.where(random.random(count) < 0.05, 0.3, 0.0)
     turn = np.exp(1j * np.where(sweep == 0, 1.0, sweep))
     center = np.where(sweep == 0, 0, (end - start * turn) / (1 - turn))
-    family = np.sort(random.choice([0, 0, 0, 1, 2, 3], count)).astype(np.int8)
+    family = random.choice(np.array([0, 0, 0, 0, 0, 0, 1, 2, 3, 3, 3], dtype=np.int8), count)
     nodes = place_nodes(order)
     return Sources(start, end, family, nodes, 1.8, 1.3, LENGTH, center, sweep, 0.9 * nodes)
 

@@ -368,6 +368,18 @@ def test_the_tangent_of_weakening_friction_is_its_derivative(sign: float) -> Non
         np.testing.assert_allclose(law.tangent[:, :, k], by_differences, atol=1e-7)
 
 
+@pytest.mark.parametrize("frozen", ["nothing", "slip", "strength"])
+def test_a_frozen_bound_keeps_its_value_and_loses_its_slope(frozen: str) -> None:
+    laws, modes, memory, none = make_weakening(1), make_modes(SLIP), remember(0.0), np.zeros(1)
+    p_n, slip = np.array([-2.0]), np.array([0.25])
+    law = linearise(laws, modes, p_n, slip, memory, none, 4.0, frozen)  # type: ignore[arg-type]
+    at = np.array([[p_n[0] / 4.0, slip[0]]])
+    # 0.1 + 0.4 * 2 with the slopes -0.4 by traction (times its scale) and -0.8 * 2 by slip
+    assert law.evaluate(at).p_s == pytest.approx(0.9)
+    slopes = {"nothing": [-1.6, -1.6], "slip": [-1.6, 0.0], "strength": [0.0, 0.0]}[frozen]
+    np.testing.assert_allclose(law.tangent[0, P_S], slopes, atol=1e-14)
+
+
 def test_intact_brittle_bonds_stick_whatever_they_carry() -> None:
     laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3)
     for state in (make_state(5.0), make_state(-0.1, 5.0)):

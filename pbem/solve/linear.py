@@ -23,6 +23,11 @@ Method = Literal["lu", "mumps"]
 
 PREFIX = "pbem_"
 
+# MUMPS' codes (INFOG(1)) for too little work space, which can be asked for again, and for too little memory.
+MORE_ROOM_HELPS = (-8, -9, -11, -12, -14, -15, -17, -18, -20)
+NO_MEMORY = (-5, -7, -13, -19, -22, -29)
+MOST_WORKSPACE = 10_000  # per cent
+
 
 def choose_method(requested: str, regions: int) -> Method:
     """The direct solver: sparse for several regions, since a region's rows are zero in the others' columns."""
@@ -154,10 +159,9 @@ class LinearSolver:
 
     def _recover(self) -> bool:
         """Whether another try makes sense: more room for MUMPS, or fresh factors in place of reused ones."""
-        assert self.solver is not None
-        if self.factor_type == "mumps":
-            code = self.solver.getPC().getFactorMatrix().getMumpsInfog(1)
-            if code in (-8, -9, -11, -12, -14, -15, -17, -18, -20):
+        code = self._find_mumps_code()
+        if code is not None:
+            if code in MORE_ROOM_HELPS and self.workspace < MOST_WORKSPACE:
                 self.workspace = 2 * self.workspace + 50
                 self._renew()
                 return True
@@ -168,11 +172,21 @@ class LinearSolver:
             return True
         return False
 
+    def _find_mumps_code(self) -> int | None:
+        """INFOG(1) of MUMPS: 0 or more if all is well; None where MUMPS is not used."""
+        if self.factor_type != "mumps" or self.solver is None:
+            return None
+        return int(self.solver.getPC().getFactorMatrix().getMumpsInfog(1))
+
     def _renew(self) -> None:
         self._destroy_solver()
         self._make_solver()
 
     def _explain(self, reason: int) -> ConvergenceError:
+        code = self._find_mumps_code()
+        if code in MORE_ROOM_HELPS or code in NO_MEMORY:
+            detail = f"MUMPS has no room for the LU factors (INFOG(1) = {code}); try more memory or fewer elements"
+            return ConvergenceError("linear solver", detail)
         if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED:
             detail = "the tangent operator has no LU factors; a body is probably free to move"
             return ConvergenceError("singular tangent", detail)

@@ -58,8 +58,11 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
                 step = describe_step(problem, solution, memory, number, stage, reached)
                 reporter.accept(step)
                 yield step
-    finally:
+    except (ConvergenceError, GeneratorExit):
+        # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
         tangent.destroy()
+        raise
+    tangent.destroy()
 
 
 def _advance(

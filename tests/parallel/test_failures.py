@@ -1,0 +1,184 @@
+"""What goes wrong on one rank, or on all, ends every rank within seconds, is said once, and is kept in the file."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbem.results.reader import open_results
+from tests.cli.cli_sample import BLOCKS
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+
+# Seconds until all ranks have ended; starting the program takes about two of them, more on a busy machine.
+SOON = 40.0
+
+# The command line with a function of the program replaced on one rank (-1: on all), where it raises at its n-th call.
+BROKEN = """
+import importlib, sys
+from pbem.cli import main
+from pbem.errors import ConvergenceError
+from pbem.parallel import world
+
+rank, module, name, calls, error, *arguments = sys.argv[1:]
+owner = importlib.import_module(module)
+for part in name.split(".")[:-1]:
+    owner = getattr(owner, part)
+name = name.split(".")[-1]
+whole = getattr(owner, name)
+done = 0
+
+def broken(*given, **named):
+    global done
+    done += 1
+    if done >= int(calls) and int(rank) in (-1, world.rank):
+        raise eval(error)
+    return whole(*given, **named)
+
+setattr(owner, name, broken)
+sys.exit(main(arguments))
+"""
+
+# A block that is pressed, then pushed by more than friction carries.
+SLIDES_AWAY = (
+    BLOCKS.replace("friction = 0.2", "friction = 0.2\n[solver]\nmin_step = 0.05")
+    .replace("[stages.boundary.top]\nux = 0.0\nuy = -0.01", "[stages.boundary.top]\nty = -1.0")
+    .replace("[stages.boundary.top]\nux = 0.02\nuy = -0.01", "[stages.boundary.top]\ntx = 0.4")
+)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A working directory with the case blocks.toml."""
+    (tmp_path / "blocks.toml").write_text(BLOCKS)
+    return tmp_path
+
+
+def expect_one_traceback(done: subprocess.CompletedProcess[str], rank: int, error: str) -> None:
+    assert done.returncode not in (0, 2, 3), done.stdout
+    assert done.stderr.count("Traceback (most recent call last)") == 1, done.stderr
+    assert done.stderr.count(error) == 1, done.stderr
+    assert f"rank {rank} of 2 failed" in done.stderr, done.stderr
+
+
+# Where: before anything is computed, in the assembly, in the third step, on the way to the file.
+PLACES = {
+    "meshing": ("pbem.driver", "generate_mesh", 1, 0),
+    "assembly": ("pbem.solve.problem", "assemble_rows", 1, 0),
+    "a step": ("pbem.solve.march", "solve_step", 3, 2),
+    "the linear solver": ("pbem.solve.linear", "LinearSolver.solve", 4, None),
+}
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+@pytest.mark.parametrize("place", PLACES)
+def test_an_exception_on_one_rank_ends_both(place: str, rank: int, folder: Path, mpirun_snippet: Launch) -> None:
+    module, name, calls, stored = PLACES[place]
+    error = "a slip of ours"
+    begin = time.monotonic()
+    arguments = (str(rank), module, name, str(calls), f"ZeroDivisionError({error!r})", "run", "blocks.toml", "--quiet")
+    done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
+    assert time.monotonic() - begin < SOON
+    expect_one_traceback(done, rank, f"ZeroDivisionError: {error}")
+    if place == "meshing":
+        assert not (folder / "blocks.h5").exists()
+    elif stored is not None:
+        # The second rank can be a step ahead of the first, which writes.
+        assert stored - rank <= len(open_results(folder / "blocks.h5").steps) <= stored
+
+
+def test_an_exception_on_all_ranks_ends_them(folder: Path, mpirun_snippet: Launch) -> None:
+    arguments = ("-1", "pbem.solve.march", "solve_step", "2", "MemoryError('all is full')", "blocks.toml", "--quiet")
+    done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
+    assert done.returncode not in (0, 2, 3)
+    # Whichever comes first ends the other, which may have spoken by then.
+    assert 1 <= done.stderr.count("MemoryError: all is full") <= 2, done.stderr
+    assert len(open_results(folder / "blocks.h5").steps) <= 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_run_that_finds_no_equilibrium_returns_3(ranks: int, folder: Path, mpirun: Launch) -> None:
+    (folder / "away.toml").write_text(SLIDES_AWAY)
+    done = mpirun(ranks, "run", "away.toml", cwd=folder)
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.count("pbem: not converged: free motion: stage 'shear' stopped at the fraction 0.5") == 1
+    assert "translation along x of 'upper'" in done.stderr and "away.h5 holds every step reached" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "the step is halved" in done.stdout
+    results = open_results(folder / "away.h5")
+    assert results.status == "failed"
+    assert results.failure.startswith("free motion: stage 'shear' stopped at the fraction 0.5")
+    assert results.steps.factor[-1] == pytest.approx(0.5, abs=0.05)
+    # The last step that was reached is a state of equilibrium.
+    np.testing.assert_allclose(results.reactions["bottom"][-1], [-0.8 * results.steps.factor[-1], 2.0], rtol=1e-3)
+
+
+CODES = """
+import sys
+from pbem.cli import main
+from pbem.parallel import world
+codes = world.gather(main(sys.argv[1:]))
+if world.rank == 0:
+    print("codes", *codes)
+"""
+
+
+def test_all_ranks_return_3_alike(folder: Path, mpirun_snippet: Launch) -> None:
+    (folder / "away.toml").write_text(SLIDES_AWAY)
+    done = mpirun_snippet(3, CODES, "run", "away.toml", "--quiet", cwd=folder)
+    assert done.stdout == "codes 3 3 3\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [("ConvergenceError('linear solver', 'INFOG(1) = -9')", "linear solver: "),
+     ("ConvergenceError('singular tangent', 'no factors')", "singular tangent: ")],
+)
+def test_a_linear_solver_that_fails_ends_with_its_reason(
+    error: str, reason: str, folder: Path, mpirun_snippet: Launch
+) -> None:
+    arguments = ("-1", "pbem.solve.linear", "LinearSolver.solve", "4", error, "run", "blocks.toml", "--quiet")
+    done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.count(f"pbem: not converged: {reason}") == 1
+    assert open_results(folder / "blocks.h5").failure.startswith(reason)
+
+
+# MUMPS is kept from asking for more room (its ICNTL(14)); GMRES is not let begin.
+@pytest.mark.parametrize(
+    ("option", "reason"),
+    [("mat_mumps_icntl_14=-90", "MUMPS has no room for the LU factors (INFOG(1) = -9)"),
+     ("ksp_max_it=0", "PETSc's solver ended with DIVERGED_MAX_IT")],
+)
+def test_a_linear_solver_kept_from_its_work_says_so(option: str, reason: str, folder: Path, mpirun: Launch) -> None:
+    done = mpirun(2, "run", "blocks.toml", "--quiet", f"-pbem_{option}", cwd=folder, timeout=SOON)
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.count("pbem: not converged: linear solver: ") == done.stderr.count(reason) == 1
+    assert "Traceback" not in done.stderr
+    assert reason in open_results(folder / "blocks.h5").failure
+
+
+def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed(
+    folder: Path, mpirun: Launch
+) -> None:
+    (folder / "taken.h5").mkdir()
+    for output, said in (("taken.h5", "is a folder"), ("none/a.h5", "the folder none does not exist"),
+                         ("/proc/a.h5", "the folder /proc is not writable")):
+        done = mpirun(2, "run", "blocks.toml", "-o", output, cwd=folder, timeout=SOON)
+        assert (done.returncode, done.stderr.count(said)) == (2, 1), done.stderr
+        assert "Traceback" not in done.stderr and "step 1" not in done.stdout
+
+
+def test_a_disk_that_fills_up_ends_all_ranks_and_keeps_the_steps_before(folder: Path, mpirun_snippet: Launch) -> None:
+    error = "OSError(28, 'No space left on device')"
+    arguments = ("0", "pbem.driver", "ResultWriter.append", "3", error, "run", "blocks.toml", "--quiet")
+    done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
+    expect_one_traceback(done, 0, "OSError: [Errno 28] No space left on device")
+    results = open_results(folder / "blocks.h5")
+    assert (results.status, len(results.steps)) == ("failed", 2)
+    assert "No space left on device" in results.failure

@@ -1,5 +1,4 @@
-"""What the README tells is true: its cases and its Python run, its pictures and files are there, and its table of keys is
-that of the program."""
+"""What the README tells is true: its cases and its Python run, and its table of keys is that of the program."""
 
 from __future__ import annotations
 
@@ -123,9 +122,10 @@ def list_keys(table: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, A
 def read_key_table() -> dict[str, str]:
     """Keys and defaults of the README's table."""
     section = README.split("## The case file")[1].split("\n## ")[0]
-    rows = [[cell.strip().strip("`") for cell in line.split("|")[1:3]] for line in section.splitlines() if "| `" in line]
-    assert len(rows) == len({key for key, _ in rows})
-    return {key: default for key, default in rows}
+    lines = [line.split("|")[1:3] for line in section.splitlines() if line.startswith("| `")]
+    rows = [(key.strip(" `"), default.strip(" `")) for key, default in lines]
+    assert len(rows) == len(dict(rows)), "a key is told twice"
+    return dict(rows)
 
 
 def test_all_keys_of_a_case_file_are_told_with_their_defaults() -> None:

@@ -66,36 +66,29 @@ typedef struct {
     cplx Pu[MAX_SHAPES], Qu[MAX_SHAPES], Pt[MAX_SHAPES], Qt[MAX_SHAPES];
 } Factors;
 
-/* Factors of the displacement at the point: -int T u for the density u, int U t for the density t. */
-static void combine_displacement(const Rows *r, const Moments *m, double h, cplx e, int tractions, Factors *out)
+/* Crack-tip elements: factors of the displacement at the point, -int T u for the density u. */
+static void combine_tip_displacement(const Rows *r, const Moments *m, cplx e, Factors *out)
 {
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1));
-    const double ft = -h / (4 * M_PI * r->shear_modulus * (kappa + 1)), log_h = log(h) - r->log_length;
     for (int k = 0; k <= r->order; k++) {
         out->Pu[k] = fu * ((kappa + 1) * cimag(m->c[k]) + I * (1 - kappa) * creal(m->c[k]));
         out->Qu[k] = fu * 2 * m->y * e * e * conj(m->d[k]);
-        if (!tractions) continue;
-        out->Pt[k] = ft * 2 * kappa * (m->n[k] + m->l[k] * log_h);
-        out->Qt[k] = -ft * e * e * (m->l[k] - 2 * I * m->y * conj(m->c[k]));
     }
 }
 
 /* Factors of the traction on the normal N at the point. */
-static void combine_traction(const Rows *r, const Moments *m, double h, cplx e, cplx N, int tractions, Factors *out)
+static void combine_tip_traction(const Rows *r, const Moments *m, double h, cplx e, cplx N, Factors *out)
 {
-    const double kappa = r->kappa, g = r->shear_modulus / (M_PI * (kappa + 1) * h), f = -1 / (2 * M_PI * (kappa + 1));
+    const double g = r->shear_modulus / (M_PI * (r->kappa + 1) * h);
     const cplx e3 = e * e * e;
     for (int k = 0; k <= r->order; k++) {
-        const cplx c = conj(m->c[k]), d = conj(m->d[k]);
+        const cplx d = conj(m->d[k]);
         out->Pu[k] = g * I * (e * d * conj(N) - conj(e * d) * N);
         out->Qu[k] = g * (I * e * d * N + e3 * (I * d + 2 * m->y * conj(m->e[k])) * conj(N));
-        if (!tractions) continue;
-        out->Pt[k] = -f * (conj(e * c) * N + kappa * e * c * conj(N));
-        out->Qt[k] = f * (-e * c * N + e3 * (2 * I * m->y * d - c) * conj(N));
     }
 }
 
-/* The same two for an arc. */
+/* The same two for an arc, and for its tractions t: int U t, int D t. */
 static void combine_arc_displacement(const Rows *r, const ArcMoments *m, int tractions, Factors *out)
 {
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1)), ft = -1 / (4 * M_PI * r->shear_modulus * (kappa + 1));
@@ -121,20 +114,17 @@ static void combine_arc_traction(const Rows *r, const ArcMoments *m, cplx N, int
     }
 }
 
-static void evaluate_straight(const Rows *r, Py_ssize_t i, Py_ssize_t j, int tractions, Factors *out)
+static void evaluate_tip(const Rows *r, Py_ssize_t i, Py_ssize_t j, Factors *out)
 {
     const cplx half = 0.5 * (r->end[j] - r->start[j]), middle = 0.5 * (r->end[j] + r->start[j]);
     const double h = cabs(half);
     const cplx e = half / h, w = (r->point[i] - middle) * conj(e) / h;
     Moments m;
-    if (is_tip(r->family[j]))
-        evaluate_tip_moments(w, r->on[i] == j, r->order, r->family[j], &m);
-    else
-        evaluate_moments(w, r->on[i] == j, r->order, &m);
+    evaluate_tip_moments(w, r->on[i] == j, r->order, r->family[j], &m);
     if (r->normal)
-        combine_traction(r, &m, h, e, r->normal[i], tractions, out);
+        combine_tip_traction(r, &m, h, e, r->normal[i], out);
     else
-        combine_displacement(r, &m, h, e, tractions, out);
+        combine_tip_displacement(r, &m, e, out);
 }
 
 static void evaluate_arc(const Rows *r, const Arc *arc, Py_ssize_t i, Py_ssize_t j, int tractions, Factors *out)
@@ -147,6 +137,7 @@ static void evaluate_arc(const Rows *r, const Arc *arc, Py_ssize_t i, Py_ssize_t
         combine_arc_displacement(r, &m, tractions, out);
 }
 
+/* An arc or a crack tip: what cannot be done in batches. */
 static void fill_element(const Rows *r, const Arc *arcs, Py_ssize_t i, Py_ssize_t j)
 {
     const int shapes = r->order + 1, family = r->family[j], is_arc = r->sweep[j] != 0;
@@ -157,7 +148,7 @@ static void fill_element(const Rows *r, const Arc *arcs, Py_ssize_t i, Py_ssize_
     if (is_arc)
         evaluate_arc(r, &arcs[j], i, j, tractions, &f);
     else
-        evaluate_straight(r, i, j, tractions, &f);
+        evaluate_tip(r, i, j, &f);
     put_shapes(r->displacement + at, width, shapes, shape, NULL, f.Pu, f.Qu);
     if (tractions) put_shapes(r->traction + at, width, shapes, shape, is_arc ? arcs[j].node_weight : NULL, f.Pt, f.Qt);
 }
@@ -177,7 +168,7 @@ static void put_blocks(double *out, Py_ssize_t width, int stride, int count, con
     }
 }
 
-/* The same factors as combine_displacement, from the moments of one nodal shape: u into H, t into G (may be NULL). */
+/* Straight elements: displacements at the point, from the moments of one nodal shape: u into H, t into G (or NULL). */
 static void combine_displacements(const Rows *r, const Segments *s, Py_ssize_t first, int count, int node, double l,
                                   const Batch *b, Blocks *H, Blocks *G)
 {
@@ -206,7 +197,7 @@ static void combine_displacements(const Rows *r, const Segments *s, Py_ssize_t f
     }
 }
 
-/* The same factors as combine_traction. */
+/* Straight elements: tractions on the normal at the point. */
 static void combine_tractions(const Rows *r, const Segments *s, Py_ssize_t first, int count, int node, cplx normal,
                               const Batch *b, Blocks *H, Blocks *G)
 {

@@ -174,7 +174,10 @@ def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed
         assert "Traceback" not in done.stderr and "step 1" not in done.stdout
 
 
-def test_a_disk_that_fills_up_ends_all_ranks_and_keeps_the_steps_before(folder: Path, mpirun_snippet: Launch) -> None:
+def test_a_step_that_cannot_be_stored_ends_all_ranks_and_keeps_those_before(
+    folder: Path, mpirun_snippet: Launch
+) -> None:
+    """The error comes before HDF5 writes; one that it meets itself is another matter."""
     error = "OSError(28, 'No space left on device')"
     arguments = ("0", "pbem.driver", "ResultWriter.append", "3", error, "run", "blocks.toml", "--quiet")
     done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)

@@ -107,7 +107,7 @@ VARIANTS = {
     "base": "Hertz, two meshes, block first",
 }
 PROOFS = tuple(
-    Proof(f"{title}: {what}", "Hertz 1882, NAFEMS R0081", tolerance, partial(run, variant))
+    Proof(f"{title}: {what}", "Hertz 1882, Konter 2006 (NAFEMS)", tolerance, partial(run, variant))
     for variant, title in VARIANTS.items()
     for what, tolerance, run in (
         ("half-width, in elements", 1.0, half_width),

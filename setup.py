@@ -4,6 +4,7 @@ PBEM_MARCH names the processor to build for (as gcc's -march, or -mcpu on other 
 Unset it is the processor of this machine; empty, the compiler's default.
 """
 
+import glob
 import os
 import platform
 
@@ -41,7 +42,7 @@ setup(
         Extension(
             "pbem.bem._kernels",
             sources=["pbem/bem/_kernels.c"],
-            depends=["pbem/bem/arcs.h", "pbem/bem/moments.h", "pbem/bem/straight.h"],
+            depends=sorted(glob.glob("pbem/bem/*.h")),
             extra_compile_args=["-O3", *select_processor_flags(), *MATH_FLAGS],
             libraries=["m"],
         )

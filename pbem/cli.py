@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
+from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StorageError
 from pbem.version import __version__
 
 if TYPE_CHECKING:
@@ -212,12 +212,12 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def _check(options: argparse.Namespace) -> int:
+    from pbem.contact.strength import read_checked_model
     from pbem.mesh.generate import generate_mesh
-    from pbem.model.build import read_model
     from pbem.results.describe import describe_model
     from pbem.results.output import check_picture_path
 
-    _, model = read_model(find_case(options.case))
+    model = read_checked_model(find_case(options.case))
     if options.plot:
         check_picture_path(options.plot)
     mesh = generate_mesh(model)
@@ -279,6 +279,10 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
         _close(reporter)
         _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)
         code = NOT_CONVERGED
+    except StorageError as error:
+        _close(reporter)
+        _say(f"pbem: {error}; it holds every step before", world.rank)
+        code = UNEXPECTED
     except KeyboardInterrupt:
         _close(reporter)
         _say(f"pbem: interrupted; if {target} was begun, --resume goes on after its last step", world.rank)

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from pbem.contact.strength import read_checked_model
 from pbem.errors import ConvergenceError, PbemError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import read_model
 from pbem.model.model import Model
 from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.output import check_output_path
@@ -43,7 +43,7 @@ def run(
     """
     with abort_if_unexpected(world, PbemError):
         path = Path(case)
-        model = do_on_first(world, PbemError, lambda: read_model(path)[1])
+        model = do_on_first(world, PbemError, lambda: read_checked_model(path))
         target = Path(output) if output is not None else Path(path.stem + ".h5")
         do_on_first(world, PbemError, lambda: check_output_path(target))
         mesh = generate_mesh(model)
@@ -96,8 +96,8 @@ def store_steps(
             waiting = None if stored else step
             if interior is not None and stored:
                 step = replace(step, interior=interior.evaluate(step))
-            if writer:
-                writer.append(step)
+            # An error of the first rank is every rank's.
+            do_on_first(world, PbemError, lambda due=step: writer.append(due) if writer else None)  # type: ignore[misc]
     except ConvergenceError:
         # All ranks are here together: the last step reached is stored as well.
         if interior is not None and waiting is not None:

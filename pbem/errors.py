@@ -63,3 +63,15 @@ class ResultFileError(PbemError):
         self.path = path
         self.reason = reason
         super().__init__(f"{path}: {reason}")
+
+
+class StorageError(PbemError):
+    """A step cannot be stored; the file holds the steps before it.
+
+    path: the result file as the user named it; reason: one sentence.
+    """
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        self.reason = reason
+        super().__init__(f"{path}: {reason}")

@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.model import Law
+from pbem.errors import CaseError, Fault
+from pbem.model.build import read_model
+from pbem.model.model import Law, Model
 
 Real = NDArray[np.float64]
 
@@ -58,6 +60,36 @@ def choose_strength(law: Law) -> tuple[StrengthLaw, dict[str, float]]:
     if law.friction_dynamic is None or law.slip_distance is None:
         return coulomb, parameters
     return slip_weakening, parameters | {"friction_dynamic": law.friction_dynamic, "slip_distance": law.slip_distance}
+
+
+def check_custom_laws(model: Model) -> tuple[Fault, ...]:
+    """Faults of laws of one's own: files that do not run, have no such function, or give no strength."""
+    faults = []
+    joints = {f"interfaces.{name}": joint.law for name, joint in model.interfaces.items()}
+    joints |= {f"contacts.{name}": joint.law for name, joint in model.contacts.items()}
+    for place, law in joints.items():
+        if law.kind != "custom":
+            continue
+        try:
+            function, parameters = choose_strength(law)
+            result = function(-np.ones(2), np.zeros(2), **{name: np.full(2, v) for name, v in parameters.items()})
+            shapes = {np.shape(part) for part in (result.bound, result.by_traction, result.by_slip)}
+            if shapes != {(2,)} or not np.all(np.isfinite(result.bound)):
+                raise ValueError(f"strength gives {result} at two pairs")
+        except Exception as error:  # a user's file may raise anything
+            found = f"a law that fails ({type(error).__name__}: {error})"
+            expected = "a Python file with a function strength(p_n, slip, **parameters) that gives a Strength of arrays"
+            faults.append(Fault(f"{place}.file", found, expected))
+    return tuple(faults)
+
+
+def read_checked_model(path: Path) -> Model:
+    """Read a case and build its model. Raises CaseError with its faults; laws of one's own are tried last."""
+    _, model = read_model(path)
+    faults = check_custom_laws(model)
+    if faults:
+        raise CaseError(str(path), faults)
+    return model
 
 
 def load_strength(file: Path) -> StrengthLaw:

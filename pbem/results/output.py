@@ -22,6 +22,8 @@ def check_output_path(path: str | os.PathLike[str]) -> Path:
         raise ResultFileError(str(path), f"the folder {folder} does not exist")
     if target.is_dir():
         raise ResultFileError(str(path), "is a folder; name a file in it")
+    if target.exists() and not target.is_file():
+        raise ResultFileError(str(path), "is not a regular file")
     # Tried, not asked: permissions do not tell of read-only file systems, nor of what root may not do.
     try:
         with tempfile.TemporaryFile(dir=folder):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hoop import evaluate_hoop_stress
-from pbem.errors import ConvergenceError, ResultFileError
+from pbem.errors import ConvergenceError, ResultFileError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.energy import Energy, EnergyBalance
@@ -36,6 +36,9 @@ from pbem.results.resume import check_same_case, read_last_energy, read_last_ste
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Interior, Iteration, Step
+
+# Bytes that HDF5 may need beyond the data of a step, and to close the file.
+ROOM_TO_CLOSE = 2_000_000
 
 
 class ResultWriter:
@@ -127,7 +130,11 @@ class ResultWriter:
         self._pending: Step | None = None
 
     def append(self, step: Step) -> None:
-        """Store the step if it is its turn, and its iterations in any case; flush."""
+        """Store the step if it is its turn, and its iterations in any case; flush.
+
+        Raises StorageError if the disk has no room for it: HDF5 would leave a file that cannot be read.
+        """
+        self._require_room(step)
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
         self._energy = self._balance.add(step)
@@ -136,6 +143,16 @@ class ResultWriter:
         else:
             self._pending = step
         self._file.flush()
+
+    def _require_room(self, step: Step) -> None:
+        state = os.statvfs(self.path.parent)
+        free = state.f_bavail * state.f_frsize
+        fields = (step.displacement, step.traction, *vars(step.contact).values())
+        inside = 0 if step.interior is None else step.interior.displacement.nbytes + step.interior.stress.nbytes
+        needed = 3 * (sum(field.nbytes for field in fields) + inside) + ROOM_TO_CLOSE
+        if free < needed:
+            sizes = f"{free / 1e6:.3g} MB are free, {needed / 1e6:.3g} MB may be needed"
+            raise StorageError(str(self.path), f"no room for step {step.number}: {sizes}")
 
     def complete(self, interior: Interior) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""

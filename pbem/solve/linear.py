@@ -28,6 +28,9 @@ MORE_ROOM_HELPS = (-8, -9, -11, -12, -14, -15, -17, -18, -20)
 NO_MEMORY = (-5, -7, -13, -19, -22, -29)
 MOST_WORKSPACE = 10_000  # per cent
 
+# PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
+ZERO_PIVOT, LIBRARY_ERROR = 71, 76
+
 
 def choose_method(requested: str, regions: int) -> Method:
     """The direct solver: sparse for several regions, since a region's rows are zero in the others' columns."""
@@ -64,7 +67,7 @@ class LinearSolver:
         self.method = method
         self.reuse = reuse
         self.comm = comm
-        self.factored = False
+        self.factored = False  # factors are there that have served a solution
         self.shape = ((local_rows, rows), (local_rows, rows))
         self.matrix: PETSc.Mat | None = None
         self.solver: PETSc.KSP | None = None
@@ -107,7 +110,7 @@ class LinearSolver:
         """End an update of the matrix; its factors are made anew at the next solution unless they are reused."""
         assert self.matrix is not None
         self.matrix.assemble()
-        if self.solver is None or not self.reuse:
+        if not (self.reuse and self.factored):
             self._renew()
 
     def _make_solver(self) -> None:
@@ -148,14 +151,29 @@ class LinearSolver:
         for _ in range(6):
             assert self.solver is not None
             self.right.setArray(rhs)
-            self.solver.solve(self.right, self.left)
-            reason = self.solver.getConvergedReason()
+            reason = self._run_solver()
             if reason > 0:
                 self.factored = True
                 return np.array(self.left.getArray())
             if not self._recover():
                 break
         raise self._explain(reason)
+
+    def _run_solver(self) -> int:
+        """Solve, and return PETSc's reason to end; a zero pivot of dense factors is a failed set-up too."""
+        assert self.solver is not None
+        try:
+            self.solver.solve(self.right, self.left)
+        except PETSc.Error as error:
+            if error.ierr != {"petsc": ZERO_PIVOT, "scalapack": LIBRARY_ERROR}.get(self.factor_type):
+                raise
+            # PETSc has left its solver half set up and the vectors locked.
+            for vector in (self.right, self.left):
+                vector.destroy()
+            self.right, self.left = self._make_vectors()
+            self._renew()
+            return int(PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED)
+        return int(self.solver.getConvergedReason())
 
     def _recover(self) -> bool:
         """Whether another try makes sense: more room for MUMPS, or fresh factors in place of reused ones."""
@@ -174,9 +192,13 @@ class LinearSolver:
 
     def _find_mumps_code(self) -> int | None:
         """INFOG(1) of MUMPS: 0 or more if all is well; None where MUMPS is not used."""
-        if self.factor_type != "mumps" or self.solver is None:
+        if self.solver is None:
             return None
-        return int(self.solver.getPC().getFactorMatrix().getMumpsInfog(1))
+        # Not self.factor_type: the user's options can have put something else in its place.
+        preconditioner = self.solver.getPC()
+        if preconditioner.getType() != "lu" or preconditioner.getFactorSolverType() != "mumps":
+            return None
+        return int(preconditioner.getFactorMatrix().getMumpsInfog(1))
 
     def _renew(self) -> None:
         self._destroy_solver()

@@ -74,7 +74,7 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of a pipe (`| head`) has gone; nothing is wrong.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return 0
     except PbemError as error:
         _say(f"pbem: {error}", rank)
@@ -85,6 +85,11 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
             time.sleep(1.0)
         _say(traceback.format_exc().rstrip(), 0)
         return UNEXPECTED
+
+
+def _discard_output() -> None:
+    """Send the rest of standard output nowhere: flushing it into a closed pipe at the end would fail once more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def find_launch_rank() -> tuple[int, int]:
@@ -158,8 +163,8 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     try:
         with contextlib.redirect_stderr(sys.stderr if rank == 0 else sys.stdout):
             options = parser.parse_args(arguments)
-        if petsc and options.command != "run":
-            parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run`")
+            if petsc and options.command != "run":
+                parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run`")
     except SystemExit as end:
         return int(end.code or 0)
     if options.command == "run":
@@ -272,9 +277,6 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
         with abort_if_unexpected(world, PbemError):
             reporter = make_reporter(options.quiet) if world.rank == 0 else None
         results = run(case, target, resume=options.resume, petsc=petsc, reporter=reporter)
-        if world.rank == 0 and not options.quiet:
-            _close(reporter)
-            _say_finished(results.steps, target, time.perf_counter() - begun)
     except ConvergenceError as error:
         _close(reporter)
         _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)
@@ -287,10 +289,20 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
         _close(reporter)
         _say(f"pbem: interrupted; if {target} was begun, --resume goes on after its last step", world.rank)
         return INTERRUPTED
+    except BrokenPipeError:
+        # Only of one rank: several have been ended. The run is not finished, whatever has become of its reader.
+        _discard_output()
+        _say(f"pbem: nobody reads the progress any more; if {target} was begun, --resume goes on after its last step",
+             world.rank)
+        code = UNEXPECTED
     except PbemError as error:
         _close(reporter)
         _say(f"pbem: {error}", world.rank)
         code = WRONG_INPUT
+    else:
+        if world.rank == 0 and not options.quiet:
+            _close(reporter)
+            _say_finished(results.steps, target, time.perf_counter() - begun)
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code

@@ -194,6 +194,29 @@ def test_interrupting_a_run_is_said_in_a_line(folder: Path, capsys: Capture, mon
     assert open_results("blocks.h5").failure.startswith("interrupted")
 
 
+def run_into_closed_pipe(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the program with a standard output whose reader has gone."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        return subprocess.run(
+            [sys.executable, "-m", "pbem", *arguments], stdout=writer, stderr=subprocess.PIPE, text=True
+        )
+    finally:
+        os.close(writer)
+
+
+def test_a_run_whose_reader_has_gone_is_not_finished(folder: Path) -> None:
+    done = run_into_closed_pipe("run", "blocks.toml")
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.startswith("pbem: nobody reads the progress any more") and done.stderr.count("\n") == 1
+
+
+def test_a_reader_that_has_gone_is_no_fault_of_other_commands(folder: Path) -> None:
+    done = run_into_closed_pipe("check", "blocks.toml")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_petsc_options_are_taken_out_with_their_values() -> None:
     arguments = ["-pbem_ksp_rtol", "1e-8", "run", "-pbem_ksp_view", "-o", "a.h5", "-pbem_shift", "-0.5",
                  "-pbem_mat_mumps_icntl_14=40", "-pbem_ksp_monitor", "case.toml"]
@@ -241,6 +264,13 @@ def test_further_ranks_leave_all_but_runs_to_the_first(folder: Path) -> None:
     done = subprocess.run(arguments, capture_output=True, text=True, env=environment)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert not (folder / "model.png").exists()
+
+
+def test_further_ranks_do_not_repeat_what_is_wrong_with_the_command_line(folder: Path) -> None:
+    environment = os.environ | {"OMPI_COMM_WORLD_RANK": "1", "OMPI_COMM_WORLD_SIZE": "2"}
+    arguments = [sys.executable, "-m", "pbem", "check", "blocks.toml", "-pbem_ksp_view"]
+    done = subprocess.run(arguments, capture_output=True, text=True, env=environment)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", "")
 
 
 def test_the_package_can_be_run_as_a_module(folder: Path) -> None:

@@ -39,7 +39,8 @@ def run(
     Every rank of an MPI run calls this and gets the results.
 
     Raises CaseError (all faults of the case), ResultFileError (the output cannot be written, or does not belong to the
-    case), ConvergenceError (the file then holds every step reached). Any other exception on one rank ends all ranks.
+    case), ConvergenceError (the file then holds every step reached), StorageError (the disk has no room for a step; the
+    file holds those before it). Any other exception on one rank ends all ranks.
     """
     with abort_if_unexpected(world, PbemError):
         path = Path(case)
@@ -61,7 +62,6 @@ def _solve(
     model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter
 ) -> None:
     """March through the load history; the first rank writes."""
-
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
 

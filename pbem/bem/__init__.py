@@ -1,1 +1,1 @@
-"""Closed-form integrals on straight elements and the rows of the boundary integral equations made from them."""
+"""Closed-form integrals on straight and circular elements, and the rows of the integral equations made from them."""

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.strength import Strength, StrengthLaw, choose_strength
+from pbem.contact.strength import Strength, StrengthLaw, choose_strength, coulomb
 from pbem.mesh.mesh import Mesh
+from pbem.model.expression import evaluate_expression
 from pbem.model.model import Contact, Interface, Law, Model
 
 Real = NDArray[np.float64]
@@ -149,8 +150,6 @@ def _evaluate_gaps(laws: list[Law], mesh: Mesh) -> Real:
     for number, law in enumerate(laws):
         own = pairs.interface == number
         if isinstance(law.gap, str):
-            from pbem.model.expression import evaluate_expression
-
             place = pairs.position[own]
             gap[own] += evaluate_expression(law.gap, x=place.real, y=place.imag)
         elif law.kind != "bonded":
@@ -173,10 +172,13 @@ def evaluate_strength(laws: PairLaws, p_n: Real, path: Real, pressure: Real, bro
 
 
 def resists_slip(laws: PairLaws) -> Bool:
-    """Whether a pair's law has any friction or cohesion, (m,); pairs without slip freely in both directions."""
+    """Whether a pair's law has any friction or cohesion, (m,); pairs without slip freely in both directions.
+
+    Only Coulomb's law tells by its parameters; others are taken to resist.
+    """
     resists = np.ones(laws.count, dtype=bool)
     for group in laws.strengths:
-        if set(group.parameters) == {"friction", "cohesion"}:
+        if group.law is coulomb:
             resists[group.pairs] = (group.parameters["friction"] > 0) | (group.parameters["cohesion"] > 0)
     return resists
 

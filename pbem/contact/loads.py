@@ -23,6 +23,7 @@ class OuterNodes:
     """Nodes (k,) on curves of one region, with their two directions and what is known along each.
 
     direction (k, 2): complex unit vectors. displacement_known (k, 2). condition (k,): index of the condition.
+    stiffness (k, 2): of springs against the ground, stress/length along each direction; 0 where there is none.
     """
 
     node: Integer

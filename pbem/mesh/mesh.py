@@ -72,8 +72,8 @@ class Mesh:
 
     start, end, center, sweep, region, curve, crack, tip: per element (e,). An arc has its centre and the signed angle
     `sweep` that it turns through (radians); a straight element has zeros. tip is 1 or 2 where the jump has the
-    square-root shape of
-    a crack tip at the element's start or end, else 0. position, normal, weight, traction_equation: per node (n,).
+    square-root shape of a crack tip at the element's start or end, else 0.
+    position, normal, weight, traction_equation: per node (n,).
     local, crack_local (order + 1,): nodes' coordinates in [-1, 1] on boundary elements and on crack elements.
     """
 

@@ -45,8 +45,7 @@ def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:
 _PAIR_TYPES: Mapping[str, type] = {
     "interface": np.int64, "first": np.int64, "second": np.int64, "slot": np.int64, "crack": np.bool_,
     "sense": np.float64, "position": np.complex128, "normal": np.complex128, "arc_length": np.float64,
-    "weight": np.float64,
-    "distance": np.float64,
+    "weight": np.float64, "distance": np.float64,
 }  # fmt: skip
 _LINK_TYPES: Mapping[str, type] = {
     "carrier": np.int64, "displacement_pair": np.int64, "displacement_node": np.int64,

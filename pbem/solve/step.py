@@ -15,7 +15,7 @@ STICK, SLIP, OPEN = 0, 1, 2
 
 @dataclass(frozen=True)
 class Iteration:
-    """One Newton iteration: relative residual before it was accepted, pairs that changed mode, counts, seconds."""
+    """One Newton iteration: relative residual of its linear system, pairs that changed mode, counts, seconds."""
 
     number: int
     residual: float

@@ -19,6 +19,7 @@ from pbem.contact.laws import (
     StrengthGroup,
     commit,
     evaluate_strength,
+    resists_slip,
     start_memory,
 )
 from pbem.contact.modes import (
@@ -72,6 +73,19 @@ def make_modes(mode: int, sign: float = 1.0, count: int = 1) -> ModeState:
 
 def make_state(p_n: float, p_s: float = 0.0, g_n: float = 0.0, g_s: float = 0.0) -> PairState:
     return PairState(*(np.array([value]) for value in (p_n, p_s, g_n, g_s)))
+
+
+def test_only_coulombs_law_is_known_to_resist_nothing_by_its_parameters() -> None:
+    laws = make_laws(friction=0.0)
+    assert resists_slip(laws).tolist() == [False]
+    assert start_memory(laws).modes.mode.tolist() == [SLIP]
+
+    def constant(p_n: Real, slip: Real, friction: Real, cohesion: Real) -> Strength:
+        return Strength(1.0 + 0 * p_n, 0 * p_n, 0 * p_n)
+
+    custom = replace(laws, strengths=(replace(laws.strengths[0], law=constant),))
+    assert resists_slip(custom).tolist() == [True]
+    assert start_memory(custom).modes.mode.tolist() == [STICK]
 
 
 def choose(

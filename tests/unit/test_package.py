@@ -8,6 +8,7 @@ import sys
 import pytest
 
 import pbem
+from pbem import errors
 from pbem.driver import run
 from pbem.results.reader import open_results
 
@@ -16,6 +17,11 @@ def test_the_package_offers_runs_and_results() -> None:
     assert pbem.run is run
     assert pbem.open_results is open_results
     assert {"run", "open_results", "CaseError", "__version__"} <= set(dir(pbem))
+
+
+def test_every_kind_of_error_is_offered() -> None:
+    kinds = {kind.__name__ for kind in errors.PbemError.__subclasses__()} | {"PbemError"}
+    assert kinds <= set(pbem.__all__) and kinds <= set(dir(pbem))
 
 
 def test_what_the_package_does_not_offer_is_named() -> None:

@@ -29,8 +29,9 @@ from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.solve.march import start_from_rest
 from pbem.solve.newton import solve_step
-from pbem.solve.problem import Problem, Tangent, assemble_problem
+from pbem.solve.problem import Problem, assemble_problem
 from pbem.solve.step import SilentReporter
+from pbem.solve.tangent import Tangent
 
 Real = NDArray[np.float64]
 
@@ -89,7 +90,7 @@ def solve_classically(problem: Problem, tangent: Tangent, load: Load, factor: fl
             return state, number - 1
         if not np.abs(unknowns).max() < 1e6 * problem.model.size:
             break
-        unknowns -= tangent.solve(unbalanced)
+        unknowns -= tangent.solve_system(unbalanced)
     return state, MOST_ITERATIONS
 
 

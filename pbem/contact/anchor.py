@@ -36,7 +36,7 @@ def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, .
     remaining = np.eye(len(motions))  # combinations of motions that the anchors so far do not see
     for _ in motions:
         best, strength = None, -1.0
-        for motion, name in ((motion, region) for motion in motions for region in motion.regions):
+        for motion, name in [(each, region) for each in motions for region in each.regions]:
             anchor = _anchor_region(mesh, motion, mesh.region_names.index(name))
             seen = np.array([_apply(mesh, anchor, other) for other in motions]) @ remaining
             if np.linalg.norm(seen) > strength * (1 + 1e-9):

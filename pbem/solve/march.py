@@ -10,8 +10,9 @@ import numpy as np
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.errors import ConvergenceError
 from pbem.solve.newton import Solution, solve_step
-from pbem.solve.problem import Problem, Tangent
+from pbem.solve.problem import Problem
 from pbem.solve.step import ContactState, Reporter, Step
+from pbem.solve.tangent import Tangent
 
 
 @dataclass(frozen=True)

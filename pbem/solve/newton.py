@@ -23,8 +23,9 @@ from pbem.contact.modes import (
 )
 from pbem.contact.support import close_nearest_pairs, find_ties
 from pbem.errors import ConvergenceError
-from pbem.solve.problem import Problem, Tangent
+from pbem.solve.problem import Problem
 from pbem.solve.step import Iteration, Reporter
+from pbem.solve.tangent import Solved, Tangent
 
 Real = NDArray[np.float64]
 
@@ -89,7 +90,8 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
         law = linearise(
             laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale, search.caution.frozen
         )
-        unknowns, v, residual = _solve_linearised(problem, tangent, modes, law, load)
+        solved = _solve_linearised(problem, tangent, modes, law, load)
+        unknowns = solved.unknowns
         pairs = evaluate_pairs(problem.mesh, law, unknowns)
         floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(unknowns).max())
         proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening, floor)
@@ -100,11 +102,11 @@ def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, r
             memory = replace(memory, broken=memory.broken | failing)
             proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening, floor)
             search.restart(modes)
-        iterations.append(_record(len(iterations) + 1, residual, modes, proposal, begin))
+        iterations.append(_record(len(iterations) + 1, solved.residual, modes, proposal, begin))
         reporter.iterate(iterations[-1])
         if settled and not failing.any():
             _refuse_free_motion(problem, modes)
-            return Solution(unknowns, v, pairs, modes, memory, residual, tuple(iterations))
+            return Solution(unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         modes = _hold_free_bodies(problem, limit_changes(modes, proposal, search.caution.share), pairs.g_n)
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
         search.note(problem, modes, proposal)
@@ -151,40 +153,14 @@ class _Search:
 
 def _solve_linearised(
     problem: Problem, tangent: Tangent, modes: ModeState, law: Linearisation, load: Load
-) -> tuple[Real, Real, float]:
-    """Unknowns and v for linearised laws, and the relative residual; a failure names a free body if there is one."""
+) -> Solved:
+    """The solution for linearised laws; a failure names a free body if there is one."""
     try:
-        return _solve_and_refine(problem, tangent, law, load)
+        constraints = problem.constrain(law, load)
+        return tangent.solve(constraints, load)
     except ConvergenceError:
         _refuse_free_motion(problem, modes)
         raise
-
-
-def _solve_and_refine(
-    problem: Problem, tangent: Tangent, law: Linearisation, load: Load
-) -> tuple[Real, Real, float]:
-    constraints = problem.constrain(law, load)
-    tangent.update(constraints)
-    forced = problem.apply(constraints.offset, load)
-    scale = problem.measure(forced)
-    if scale == 0.0:
-        unknowns = np.zeros(problem.unknowns)
-        return unknowns, constraints.evaluate(unknowns), 0.0
-    tolerance = problem.model.solver.newton_tolerance
-    unknowns = tangent.solve(-forced)
-    for attempt in range(2):
-        v = constraints.evaluate(unknowns)
-        left = problem.apply(v, load)
-        residual = problem.measure(left) / scale
-        if residual <= tolerance:
-            return unknowns, v, residual
-        if attempt == 0 and np.isfinite(residual):
-            unknowns = unknowns - tangent.solve(left)
-    raise ConvergenceError(
-        "singular tangent",
-        f"the linear system is solved only to a relative residual of {residual:.1e} (asked: {tolerance:.1e}); "
-        "a body is probably free to move in its present contact",
-    )
 
 
 def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:

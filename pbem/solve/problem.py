@@ -1,4 +1,4 @@
-"""One discretised problem on the ranks: its operator, its tangent operator K = B M, and residuals."""
+"""One discretised problem on the ranks: its operator, its constraints, and residuals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy import sparse
 
 from pbem.bem.operator import (
     Block,
@@ -29,7 +28,6 @@ from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.model.model import Model
 from pbem.model.support import Tie, find_free_motions
 from pbem.parallel import gather_parts, norm_of_parts, share_nodes
-from pbem.solve.linear import LinearSolver, choose_method
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -150,45 +148,3 @@ def find_unknowns_of_regions(mesh: Mesh, outer: OuterNodes, load: Load) -> list[
     return [
         np.unique(matrix[np.flatnonzero(region_of_row == region)].indices) for region in range(len(mesh.region_names))
     ]
-
-
-class Tangent:
-    """The tangent operator K = B M(mode) in a linear solver."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        options = problem.model.solver
-        method = choose_method(options.linear, len(problem.mesh.region_names))
-        operator = problem.operator
-        self.solver = LinearSolver(
-            problem.comm, method, operator.rows, problem.unknowns, reuse=options.linear == "gmres"
-        )
-        inside, outside = np.zeros((2, operator.rows), dtype=np.int64)
-        for block, columns in zip(operator.blocks, problem.block_columns, strict=True):
-            own = (columns >= 2 * operator.first_node) & (columns < 2 * operator.last_node)
-            inside[block.rows], outside[block.rows] = own.sum(), (~own).sum()
-        self.solver.allocate(inside, outside)
-        self.formed: sparse.csr_matrix | None = None
-
-    def update(self, constraints: ConstraintMap) -> None:
-        """Form K for a constraint map; K and its factors stay if no pair has changed its mode since the last time."""
-        if self.formed is not None and _are_equal(self.formed, constraints.matrix):
-            return
-        self.formed = constraints.matrix
-        operator = self.problem.operator
-        for block, columns in zip(operator.blocks, self.problem.block_columns, strict=True):
-            self.solver.fill(block.rows, columns, operator.multiply_block(block, constraints.matrix, columns))
-        self.solver.finish_filling()
-
-    def solve(self, rhs: Real) -> Real:
-        """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side."""
-        return gather_parts(self.problem.comm, self.solver.solve(rhs))
-
-    def destroy(self) -> None:
-        self.solver.destroy()
-
-
-def _are_equal(one: sparse.csr_matrix, other: sparse.csr_matrix) -> bool:
-    """Whether two constraint maps are the same numbers in the same places."""
-    parts = ((one.indptr, other.indptr), (one.indices, other.indices), (one.data, other.data))
-    return all(np.array_equal(mine, yours) for mine, yours in parts)

@@ -16,10 +16,10 @@ from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.output import check_output_path
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
-from pbem.solve.problem import assemble_problem
 from pbem.solve.step import Reporter, SilentReporter, Step
 
 

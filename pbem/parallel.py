@@ -80,6 +80,15 @@ def gather_parts(comm: MPI.Intracomm, part: Real) -> Real:
     return whole
 
 
+def add_up(comm: MPI.Intracomm, part: Real) -> Real:
+    """The sum over the ranks of arrays of the same shape, on every rank."""
+    if comm.size == 1:
+        return part
+    whole = np.empty_like(part)
+    comm.Allreduce(np.ascontiguousarray(part), whole)
+    return whole
+
+
 def norm_of_parts(comm: MPI.Intracomm, part: Real) -> float:
     """Euclidean norm of a vector whose parts lie on the ranks; the same number on all."""
     return float(np.sqrt(comm.allreduce(float(part @ part))))

@@ -27,9 +27,10 @@ from pbem.mesh.generate import generate_mesh
 from pbem.model.build import read_model
 from pbem.model.model import Model
 from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import start_from_rest
 from pbem.solve.newton import solve_step
-from pbem.solve.problem import Problem, assemble_problem
+from pbem.solve.problem import Problem
 from pbem.solve.step import SilentReporter
 from pbem.solve.tangent import Tangent
 

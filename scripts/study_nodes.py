@@ -14,8 +14,8 @@ from pbem.mesh import shapes
 from pbem.mesh.generate import generate_mesh
 from pbem.model.build import parse_model
 from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march
-from pbem.solve.problem import assemble_problem
 from pbem.solve.step import SilentReporter
 
 GAUSS = {order: tuple(shapes.place_nodes(order)) for order in (1, 2, 3)}

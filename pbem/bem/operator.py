@@ -51,6 +51,11 @@ class RowOperator:
     free: sparse.csr_matrix
 
     @property
+    def nodes(self) -> Integer:
+        """The nodes whose rows these are."""
+        return np.arange(self.first_node, self.last_node)
+
+    @property
     def rows(self) -> int:
         return 2 * (self.last_node - self.first_node)
 
@@ -111,7 +116,7 @@ def assemble_rows(
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
         rows = (2 * (own - first_node)[:, None] + np.arange(2)).ravel()
         blocks.append(Block(int(region), rows, columns, matrix))
-    return RowOperator(first_node, last_node, tuple(blocks), _collect_free_terms(mesh, nodes, scale))
+    return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
 
 
 def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes: Integer, needed: Bool) -> list[Block]:
@@ -159,7 +164,8 @@ def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) ->
     return np.where(mesh.traction_equation, length / shear_modulus, 1.0)
 
 
-def _collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:
+def collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:
+    """The free terms in the equations of nodes (k,): matrix (2 k, 4 nodes); scale (nodes,) as of scale_equations."""
     value = np.where(mesh.node_crack[nodes], 1.0, 0.5) * scale[nodes]
     first_column = np.where(mesh.traction_equation[nodes], 2 * mesh.nodes, 0) + 2 * nodes
     columns = (first_column[:, None] + np.arange(2)).ravel()

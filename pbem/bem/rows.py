@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,14 @@ class Sources:
     @property
     def count(self) -> int:
         return len(self.start)
+
+    def select(self, numbers: Integer) -> Sources:
+        """The elements of the given numbers (k,), in that order."""
+        return replace(
+            self, start=self.start[numbers], end=self.end[numbers], family=self.family[numbers],
+            center=None if self.center is None else self.center[numbers],
+            sweep=None if self.sweep is None else self.sweep[numbers],
+        )  # fmt: skip
 
 
 def evaluate_rows(

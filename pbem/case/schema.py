@@ -231,6 +231,8 @@ class SolverTable(Table):
     """How the discrete equations are solved."""
 
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
+    operator: Literal["auto", "dense", "hierarchical"] = "auto"
+    tolerance: Tolerance = 1e-8
     newton_tolerance: Tolerance = 1e-9
     newton_max_iterations: Count = 50
     min_step: Fraction = 1e-4

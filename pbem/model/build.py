@@ -138,8 +138,9 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         crack_tips=topology.tips, stages=loading.stages,
         analysis=Analysis(case.analysis.scheme, case.analysis.order, case.analysis.tips),
         solver=SolverOptions(
-            case.solver.linear, case.solver.newton_tolerance, case.solver.newton_max_iterations, case.solver.min_step,
-            dict(case.petsc),
+            linear=case.solver.linear, operator=case.solver.operator, tolerance=case.solver.tolerance,
+            newton_tolerance=case.solver.newton_tolerance, newton_max_iterations=case.solver.newton_max_iterations,
+            min_step=case.solver.min_step, petsc=dict(case.petsc),
         ),
         output_every=case.output.every, size=topology.size,
         interior_grid=case.output.interior.shape if case.output.interior else None,

@@ -138,9 +138,14 @@ class Analysis:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """How Newton's method and its linear systems are run; petsc: options without the leading dash."""
+    """How Newton's method and its linear systems are run; petsc: options without the leading dash.
+
+    tolerance: relative error of the hierarchical operator's products.
+    """
 
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
+    operator: Literal["auto", "dense", "hierarchical"] = "auto"
+    tolerance: float = 1e-8
     newton_tolerance: float = 1e-9
     newton_max_iterations: int = 50
     min_step: float = 1e-4

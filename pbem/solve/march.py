@@ -9,10 +9,11 @@ import numpy as np
 
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.errors import ConvergenceError
+from pbem.solve.krylov import make_tangent
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.step import ContactState, Reporter, Step
-from pbem.solve.tangent import Tangent
+from pbem.solve.tangent import AnyTangent
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
     Raises ConvergenceError with the reason of the last failure, after the steps before it were yielded.
     """
     begin = start or start_from_rest(problem)
-    tangent = Tangent(problem)
+    tangent = make_tangent(problem)
     number, memory = begin.number, begin.memory
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
@@ -67,7 +68,8 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
 
 
 def _advance(
-    problem: Problem, tangent: Tangent, memory: Memory, stage: int, reached: float, planned: float, reporter: Reporter
+    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float,
+    reporter: Reporter,
 ) -> tuple[Solution, float]:
     """One converged step towards the planned fraction of the stage; returns it and the fraction reached."""
     target = planned

@@ -25,7 +25,7 @@ from pbem.contact.support import close_nearest_pairs, find_ties
 from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem
 from pbem.solve.step import Iteration, Reporter
-from pbem.solve.tangent import Solved, Tangent
+from pbem.solve.tangent import AnyTangent, Solved
 
 Real = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ CAUTIONS = (
 )
 
 
-def solve_step(problem: Problem, tangent: Tangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
+def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
     """Converge one load step from the memory of the last.
 
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
@@ -152,7 +152,7 @@ class _Search:
 
 
 def _solve_linearised(
-    problem: Problem, tangent: Tangent, modes: ModeState, law: Linearisation, load: Load
+    problem: Problem, tangent: AnyTangent, modes: ModeState, law: Linearisation, load: Load
 ) -> Solved:
     """The solution for linearised laws; a failure names a free body if there is one."""
     try:

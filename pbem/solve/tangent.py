@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.bem.operator import RowOperator
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
@@ -27,10 +29,21 @@ class Solved:
     residual: float
 
 
+class AnyTangent(Protocol):
+    """What Newton's method asks of a tangent operator, however it is stored."""
+
+    def solve(self, constraints: ConstraintMap, load: Load) -> Solved:
+        """Solve B (M x + m) = 0. Raises ConvergenceError: "singular tangent", "linear solver"."""
+
+    def destroy(self) -> None:
+        """Free PETSc's storage."""
+
+
 class Tangent:
     """The tangent operator K = B M(mode) in a linear solver."""
 
     def __init__(self, problem: Problem) -> None:
+        assert isinstance(problem.operator, RowOperator)
         self.problem = problem
         options = problem.model.solver
         method = choose_method(options.linear, len(problem.mesh.region_names))
@@ -51,6 +64,7 @@ class Tangent:
             return
         self.formed = constraints.matrix
         operator = self.problem.operator
+        assert isinstance(operator, RowOperator)
         for block, columns in zip(operator.blocks, self.problem.block_columns, strict=True):
             self.solver.fill(block.rows, columns, operator.multiply_block(block, constraints.matrix, columns))
         self.solver.finish_filling()

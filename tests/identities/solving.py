@@ -14,8 +14,9 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march
-from pbem.solve.problem import Problem, assemble_problem
+from pbem.solve.problem import Problem
 from pbem.solve.step import SilentReporter, Step
 
 Real = NDArray[np.float64]

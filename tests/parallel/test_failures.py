@@ -69,7 +69,7 @@ def expect_one_traceback(done: subprocess.CompletedProcess[str], rank: int, erro
 # Where: before anything is computed, in the assembly, in the third step, on the way to the file.
 PLACES = {
     "meshing": ("pbem.driver", "generate_mesh", 1, 0),
-    "assembly": ("pbem.solve.problem", "assemble_rows", 1, 0),
+    "assembly": ("pbem.solve.assembly", "assemble_rows", 1, 0),
     "a step": ("pbem.solve.march", "solve_step", 3, 2),
     "the linear solver": ("pbem.solve.linear", "LinearSolver.solve", 4, None),
 }

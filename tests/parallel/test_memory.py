@@ -18,7 +18,7 @@ from scipy import sparse
 from pbem.mesh.generate import generate_mesh
 from pbem.model.build import read_model
 from pbem.parallel import world
-from pbem.solve.problem import assemble_problem
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.tangent import Tangent
 
 def list_arrays(item, seen):

@@ -15,7 +15,8 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.build import parse_model
 from pbem.model.model import Model
 from pbem.parallel import world
-from pbem.solve.problem import Problem, assemble_problem
+from pbem.solve.assembly import assemble_problem
+from pbem.solve.problem import Problem
 from tests.identities.bodies import ROCK, Body, mesh_body
 from tests.identities.solving import linearise_pairs
 

@@ -26,8 +26,8 @@ from pbem.model.model import (
     Stage,
 )
 from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march
-from pbem.solve.problem import assemble_problem
 from pbem.solve.step import SilentReporter, Step
 
 ROCK = Material("rock", 1e3, 0.2)

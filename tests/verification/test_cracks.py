@@ -17,8 +17,9 @@ from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.material import Material
 from pbem.model.model import Model
 from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march
-from pbem.solve.problem import Problem, assemble_problem
+from pbem.solve.problem import Problem
 from pbem.solve.step import SilentReporter, Step
 from tests.identities.bodies import ROCK, Body
 from tests.identities.solving import linearise_pairs, march_to_end

@@ -26,10 +26,10 @@ from pbem.model.model import Analysis, Condition, Loop, Model, Region, Side, Sol
 from pbem.parallel import world
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.fields import InteriorField
 from pbem.solve.march import march
-from pbem.solve.problem import assemble_problem
 from pbem.solve.step import ContactState, Interior, SilentReporter, Step
 from tests.parallel.launch import launch_snippet
 from tests.verification.planes import ROCK, make_circle, make_plane, make_straight, solve
@@ -309,7 +309,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.fields import InteriorField
 from pbem.solve.march import march
-from pbem.solve.problem import assemble_problem
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.step import SilentReporter
 from tests.verification.planes import make_circle, make_plane
 

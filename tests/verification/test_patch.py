@@ -18,8 +18,8 @@ from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.build import parse_model
 from pbem.model.material import Material
 from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march
-from pbem.solve.problem import assemble_problem
 from pbem.solve.step import OPEN, SLIP, STICK, SilentReporter, Step
 from tests.identities.bodies import Body
 from tests.identities.solving import march_to_end

@@ -18,10 +18,10 @@ from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.tips import collect_tip_rules
+from pbem.solve.assembly import assemble_problem
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.fields import InteriorField
 from pbem.solve.march import march
-from pbem.solve.problem import assemble_problem
 from pbem.solve.step import Interior, SilentReporter, Step
 
 Real = NDArray[np.float64]

@@ -1,0 +1,230 @@
+"""The operator B in hierarchical form: near elements exactly, far ones by expansions about clusters.
+
+Its storage and the time of a product grow in proportion to the number of unknowns. Rows and signs are those of
+pbem.bem.operator; all regions share one forest of cluster trees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestors, prepare_shifts
+from pbem.bem.leaf import Medium, source_matrix, target_matrix
+from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.bem.rows import Sources, evaluate_rows
+from pbem.bem.tree import Forest, build_forest, find_interactions
+from pbem.mesh.mesh import Mesh
+from pbem.model.material import Material
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+Complex = NDArray[np.complex128]
+
+# Elements in a leaf at most: fewer make more work of the expansions, more make more of the near elements.
+LEAF_ELEMENTS = 16
+# A region of so few elements is one leaf: what is near is all of it.
+SMALL_REGION = 48
+# By this factor at least the errors of expansions fall from term to term.
+RATIO = 0.55
+
+
+@dataclass(frozen=True)
+class LeafRows:
+    """Rows of one leaf's nodes: near (r, columns) on v[columns], far (r, 4 (p + 1)) on the leaf's field coefficients.
+
+    rows: from this rank's first row on.
+    """
+
+    leaf: int
+    rows: Integer
+    columns: Integer
+    near: Real
+    far: Real
+
+
+@dataclass(frozen=True)
+class Anchoring:
+    """rows get pattern times functional . v[columns]: see add_anchor of pbem.bem.operator."""
+
+    rows: Integer
+    pattern: Real
+    columns: Integer
+    functional: Real
+
+
+@dataclass(frozen=True)
+class Sorted:
+    """The model's elements in cluster trees, and those of each region as the kernels see them."""
+
+    mesh: Mesh
+    materials: tuple[Material, ...]
+    sources: tuple[Sources, ...]
+    forest: Forest
+    terms: int
+
+    @cached_property
+    def first_element(self) -> Integer:
+        """Number of each region's first element."""
+        return np.searchsorted(self.mesh.region, np.arange(len(self.materials)))
+
+    def list_nodes(self, elements: Integer) -> Integer:
+        per_element = self.mesh.order + 1
+        return (elements[:, None] * per_element + np.arange(per_element)).ravel()
+
+
+def choose_terms(tolerance: float) -> int:
+    """Terms of the expansions for a relative error of products; the margin was measured."""
+    return int(np.ceil(np.log(tolerance) / np.log(RATIO)))
+
+
+def sort_elements(mesh: Mesh, materials: Sequence[Material], terms: int) -> Sorted:
+    """Cluster trees of all regions' elements."""
+    bulge = np.where(mesh.sweep == 0, 0.0, 0.5 * np.abs(mesh.end - mesh.start))
+    counts = np.bincount(mesh.region, minlength=len(materials))
+    most = np.where(counts <= SMALL_REGION, SMALL_REGION, LEAF_ELEMENTS)
+    forest = build_forest(mesh.start, mesh.end, bulge, mesh.region, most)
+    return Sorted(mesh, tuple(materials), tuple(collect_sources(mesh, materials)), forest, terms)
+
+
+def log_lengths(parts: Sorted, forest: Forest) -> Real:
+    """Unit of the logarithm in the region of each cluster of a forest (clusters,)."""
+    return np.array([sources.length for sources in parts.sources])[forest.region]
+
+
+def prepare_sources(
+    parts: Sorted, needed: Bool, leaves: Integer, add_up: Callable[[Real], Real]
+) -> SourceTree:
+    """The coefficients' matrices of the given leaves, this rank's share."""
+    forest, mesh = parts.forest, parts.mesh
+    made = []
+    for leaf in leaves:
+        elements = forest.items(leaf)
+        region = int(forest.region[leaf])
+        chosen = parts.sources[region].select(elements - parts.first_element[region])
+        matrix = source_matrix(chosen, forest.center[leaf], forest.radius[leaf], parts.terms)
+        columns = list_columns(mesh, parts.list_nodes(elements), matrix.shape[1])
+        kept = needed[columns]
+        made.append(LeafSources(int(leaf), columns[kept], np.ascontiguousarray(matrix[:, kept])))
+    return SourceTree(forest, parts.terms, tuple(made), prepare_shifts(forest, parts.terms), add_up)
+
+
+def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
+    """Entries of v of the nodes' displacements and, if the matrix is so wide, of their tractions."""
+    displacement = (2 * nodes[:, None] + np.arange(2)).ravel()
+    return displacement if width == len(displacement) else np.concatenate([displacement, 2 * mesh.nodes + displacement])
+
+
+@dataclass(frozen=True)
+class HierarchicalOperator:
+    """The rows of B of some nodes (k,), in their order; sources and targets are the same trees."""
+
+    nodes: Integer
+    sources: SourceTree
+    targets: TargetTree
+    leaves: tuple[LeafRows, ...]
+    free: sparse.csr_matrix
+    anchorings: tuple[Anchoring, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        return 2 * len(self.nodes)
+
+    def apply(self, v: Real) -> Real:
+        """This rank's rows of B v, lengths, for v of shape (4 nodes,); all ranks call this together."""
+        fields = self.targets.spread(self.sources.collect(v), self.sources.forest)
+        far = np.ascontiguousarray(fields).view(float).reshape(len(fields), -1)
+        result: Real = self.free @ v
+        for each in self.leaves:
+            result[each.rows] += each.near @ v[each.columns] + each.far @ far[each.leaf]
+        for anchoring in self.anchorings:
+            result[anchoring.rows] += anchoring.pattern * (anchoring.functional @ v[anchoring.columns])
+        return result
+
+
+def anchor_rows(
+    operator: HierarchicalOperator, nodes: Integer, pattern: Complex, functional: Complex
+) -> HierarchicalOperator:
+    """The operator with pattern (functional . u) added to the equations of a region's nodes (k,): see add_anchor."""
+    row = np.full(int(max(nodes.max(), operator.nodes.max())) + 1, -1)
+    row[operator.nodes] = np.arange(len(operator.nodes))
+    own = row[nodes] >= 0
+    added = Anchoring(
+        rows=_both(row[nodes[own]]), pattern=_split(pattern[own]), columns=_both(nodes), functional=_split(functional)
+    )
+    return replace(operator, anchorings=(*operator.anchorings, added))
+
+
+def _both(nodes: Integer) -> Integer:
+    return (2 * nodes[:, None] + np.arange(2)).ravel()
+
+
+def _split(value: Complex) -> Real:
+    return np.stack([value.real, value.imag], axis=1).ravel()
+
+
+def assemble_hierarchical(
+    parts: Sorted, sources: SourceTree, nodes: Integer, needed: Bool, length: float
+) -> HierarchicalOperator:
+    """Rows of B of the given nodes (k,); needed (4 nodes,), length: as of pbem.bem.operator.assemble_rows."""
+    mesh, forest, terms = parts.mesh, parts.forest, parts.terms
+    row_of_node = np.full(mesh.nodes, -1)
+    row_of_node[nodes] = np.arange(len(nodes))
+    owned = [leaf for leaf in forest.leaves if (row_of_node[parts.list_nodes(forest.items(leaf))] >= 0).any()]
+    wanted = mark_ancestors(forest, owned)
+    met = find_interactions(forest, forest, RATIO, wanted)
+    targets = TargetTree(
+        forest, terms, sources.shifts, wanted, log_lengths(parts, forest), met.far_target, met.far_source
+    )
+    scale = scale_equations(mesh, parts.materials, length)
+    begin, end = np.searchsorted(met.near_target, owned), np.searchsorted(met.near_target, owned, side="right")
+    leaves = []
+    for leaf, low, high in zip(owned, begin, end, strict=True):
+        at = parts.list_nodes(forest.items(leaf))
+        at = at[row_of_node[at] >= 0]
+        elements = np.sort(np.concatenate([forest.items(source) for source in met.near_source[low:high]]))
+        columns, near, far = _evaluate_leaf(parts, int(leaf), at, elements, needed)
+        factor = -np.repeat(scale[at], 2)[:, None]
+        near *= factor
+        far *= factor
+        rows = (2 * row_of_node[at][:, None] + np.arange(2)).ravel()
+        leaves.append(LeafRows(int(leaf), rows, columns, near, far))
+    return HierarchicalOperator(nodes, sources, targets, tuple(leaves), collect_free_terms(mesh, nodes, scale))
+
+
+def _evaluate_leaf(
+    parts: Sorted, leaf: int, nodes: Integer, elements: Integer, needed: Bool
+) -> tuple[Integer, Real, Real]:
+    """Columns of v, the near rows of a leaf's nodes on them, and the far rows on the leaf's field."""
+    mesh, forest = parts.mesh, parts.forest
+    region = int(forest.region[leaf])
+    chosen = parts.sources[region].select(elements - parts.first_element[region])
+    material = parts.materials[region]
+    bounded = bool((chosen.family == 0).any())
+    on = np.searchsorted(elements, mesh.node_element[nodes])
+    width = 2 * len(elements) * (mesh.order + 1)
+    columns = list_columns(mesh, parts.list_nodes(elements), 2 * width if bounded else width)
+    kept = needed[columns]
+    near = np.empty((2 * len(nodes), int(kept.sum())))
+    far = np.empty((2 * len(nodes), 4 * (parts.terms + 1)))
+    for traction in (False, True):
+        at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
+        if len(at) == 0:
+            continue
+        own = nodes[at]
+        where = (2 * at[:, None] + np.arange(2)).ravel()
+        normal = mesh.normal[own] if traction else None
+        values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, mesh.node_local[own])
+        whole = np.concatenate([value for value in values if value is not None], axis=1)
+        near[where] = whole[:, kept]
+        far[where] = target_matrix(
+            mesh.position[own], normal, Medium(material.kappa, material.shear_modulus),
+            forest.center[leaf], forest.radius[leaf], parts.terms,
+        )  # fmt: skip
+    return columns[kept], near, far

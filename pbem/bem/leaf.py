@@ -1,0 +1,160 @@
+"""The two ends of an expansion: from the densities on elements to coefficients, from coefficients to values at points.
+
+The functions phi and psi are those of pbem.bem.expansion; they follow from the Cauchy integrals of the kernels:
+N. I. Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity (1953), chapters 5 and 19.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.rows import Sources
+from pbem.mesh.shapes import interpolate_shapes, tip_shapes
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Medium:
+    """kappa, shear_modulus of a region."""
+
+    kappa: float
+    shear_modulus: float
+
+
+def source_matrix(sources: Sources, center: complex, radius: float, terms: int) -> Real:
+    """Coefficients of elements about a centre: matrix (4 (p + 1), columns) on nodal values.
+
+    Rows: real and imaginary part of a_0 .. a_p, then of b_0 .. b_p. Columns: x and y of the displacement (or jump) of
+    every node, then, unless all elements are cracks, x and y of its traction. Integrals by Gauss points, exact for
+    straight elements; an arc is less than the reach of the expansion.
+    """
+    point, dzeta, displacement = _place_points(sources, terms)
+    g = sources.shear_modulus / (np.pi * (sources.kappa + 1))
+    f = -1 / (2 * np.pi * (sources.kappa + 1))
+    number = np.arange(1, terms + 1)
+    z = (point - center) / radius
+    power = z[:, :, None] ** np.arange(terms + 1)  # element, point, power
+    along, back = dzeta / radius, np.conj(dzeta) / radius
+    # factors of the density a and of its conjugate, at the points
+    phi = 1j * g * along[:, :, None] * power[:, :, :-1]
+    psi = 1j * g * back[:, :, None] * power[:, :, :-1]
+    psi[:, :, 1:] += 1j * g * (along * np.conj(z))[:, :, None] * number[:-1] * power[:, :, :-2]
+    conjugate = -phi
+    blocks = [_collect_columns(displacement, phi, psi, conjugate, 0, 0)]
+    if (sources.family == 0).any():
+        density = _traction_density(sources, terms)
+        length = np.abs(dzeta)[:, :, None]
+        series = -f / number * length * power[:, :, 1:]
+        mixed = -f * (np.conj(z) * np.abs(dzeta))[:, :, None] * power[:, :, :-1]
+        blocks.append(_collect_columns(density, series, mixed, -sources.kappa * series,
+                                       f * np.abs(dzeta), -sources.kappa * f * np.abs(dzeta)))
+    return np.concatenate(blocks, axis=1)
+
+
+def _collect_columns(
+    density: Real, phi: Complex, psi: Complex, conjugate: Complex, phi_log: Real | int, psi_log: Real | int
+) -> Real:
+    """Sums over the points, (element, point, node) times (element, point, power), as rows by real columns.
+
+    psi takes the density with the factor psi and its conjugate with `conjugate`; the logarithm's phi and psi likewise.
+    """
+    elements, _, nodes = density.shape
+    terms = phi.shape[-1]
+    out = np.zeros((2, terms + 1, elements, nodes, 2), dtype=complex)  # function, power, element, node, component
+    series = [np.einsum("eqn,eqk->ken", density, factor) for factor in (phi, psi, conjugate)]
+    for component, unit in enumerate((1.0, 1j)):
+        out[0, 1:, :, :, component] = unit * series[0]
+        out[1, 1:, :, :, component] = unit * series[1] + np.conj(unit) * series[2]
+        if not isinstance(phi_log, int) and not isinstance(psi_log, int):
+            out[0, 0, :, :, component] = unit * np.einsum("eqn,eq->en", density, phi_log)
+            out[1, 0, :, :, component] = np.conj(unit) * np.einsum("eqn,eq->en", density, psi_log)
+    flat = out.reshape(2 * (terms + 1), -1)
+    return np.stack([flat.real, flat.imag], axis=1).reshape(4 * (terms + 1), -1)
+
+
+@cache
+def _gauss_points(count: int) -> tuple[Real, Real]:
+    return np.polynomial.legendre.leggauss(count)
+
+
+def _place_points(sources: Sources, terms: int) -> tuple[Complex, Complex, Real]:
+    """Integration points (e, q), d zeta times their weights, and the shapes of the displacement there (e, q, nodes).
+
+    At a tip the points are those of the square root of the distance, in which its shapes are polynomials.
+    """
+    s, weight = _gauss_points(terms + 3)
+    order = len(sources.local) - 1
+    on_crack = sources.local if sources.crack_local is None else sources.crack_local
+    root, half = 0.5 * (1 + s), 0.5 * weight  # t = root^2 from the tip
+    tips = tip_shapes(tuple(on_crack))
+    power = np.arange(order + 1)
+    rules = {
+        0: (s, weight, s[:, None] ** power @ interpolate_shapes(sources.local)),
+        3: (s, weight, s[:, None] ** power @ interpolate_shapes(on_crack)),
+        1: (2 * root**2 - 1, 4 * root * half, root[:, None] ** (2 * power + 1) @ tips[0]),
+        2: (1 - 2 * root**2, 4 * root * half, root[:, None] ** (2 * power + 1) @ tips[1]),
+    }
+    local, weights, shapes = (np.stack([rules[int(family)][k] for family in sources.family]) for k in range(3))
+    point, slope = trace_elements(sources, local)
+    return point, slope * weights, shapes
+
+
+def trace_elements(sources: Sources, local: Real) -> tuple[Complex, Complex]:
+    """Points and d zeta/ds at the coordinates s (e, q) of elements."""
+    half, middle = 0.5 * (sources.end - sources.start)[:, None], 0.5 * (sources.end + sources.start)[:, None]
+    point, slope = middle + half * local, half + 0 * local
+    if sources.sweep is not None and sources.center is not None and sources.sweep.any():
+        bent = sources.sweep != 0
+        center, tangent = sources.center[bent, None], np.tan(0.25 * sources.sweep[bent])[:, None]
+        apex = (sources.start[bent] - sources.center[bent])[:, None] * np.exp(0.5j * sources.sweep[bent])[:, None]
+        turn = 1j * tangent * local[bent]
+        point[bent] = center + apex * (1 + turn) / (1 - turn)
+        slope[bent] = apex * 2j * tangent / (1 - turn) ** 2
+    return point, slope
+
+
+def _traction_density(sources: Sources, terms: int) -> Real:
+    """Traction at the integration points (e, q) by nodal values; none on cracks."""
+    s, _ = _gauss_points(terms + 3)
+    local = sources.local
+    shapes = s[:, None] ** np.arange(len(local)) @ interpolate_shapes(local)
+    tangent = np.zeros(sources.count) if sources.sweep is None else np.tan(0.25 * sources.sweep)
+    stretched = (1 + (tangent[:, None] * s) ** 2)[:, :, None] / (1 + (tangent[:, None] * local) ** 2)[:, None, :]
+    density: Real = stretched * shapes * (sources.family == 0)[:, None, None]
+    return density
+
+
+def target_matrix(
+    point: Complex, normal: Complex | None, medium: Medium, center: complex, radius: float, terms: int
+) -> Real:
+    """Values at points (n,) from the field's coefficients about a centre: matrix (2 n, 4 (p + 1)).
+
+    The displacement, or the traction on the normals (n,). Columns as the rows of source_matrix.
+    """
+    number = np.arange(terms + 1)
+    h = (point - center)[:, None]
+    power: Complex = (h / radius) ** number
+    slope = np.zeros_like(power)  # of the powers, by z
+    slope[:, 1:] = number[1:] * power[:, :-1] / radius
+    if normal is None:
+        own, conjugate, psi = medium.kappa * power, -h * np.conj(slope), -np.conj(power)
+        scale = 0.5 / medium.shear_modulus
+    else:
+        bend = np.zeros_like(power)
+        bend[:, 2:] = number[2:] * (number[2:] - 1) * power[:, :-2] / radius**2
+        n = normal[:, None]
+        own, conjugate, psi = n * slope, n * np.conj(slope) - h * np.conj(bend * n), -np.conj(slope * n)
+        scale = 1.0
+    out = np.zeros((len(point), 2, 2, terms + 1, 2))  # point, component, function, power, part
+    for part, unit in enumerate((1.0, 1j)):
+        first = unit * own + np.conj(unit) * conjugate
+        second = np.conj(unit) * psi
+        for k, value in enumerate((first, second)):
+            out[:, 0, k, :, part], out[:, 1, k, :, part] = value.real, value.imag
+    return scale * out.reshape(2 * len(point), -1)

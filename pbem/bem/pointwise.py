@@ -1,0 +1,107 @@
+"""Displacement and stress at many points by the cluster trees: nothing is stored, near elements are evaluated anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
+from pbem.bem.hierarchical import RATIO, Sorted, list_columns, log_lengths
+from pbem.bem.leaf import Medium, target_matrix
+from pbem.bem.rows import evaluate_rows
+from pbem.bem.tree import Interactions, build_forest, find_interactions
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# Points in a leaf at most.
+LEAF_POINTS = 32
+
+
+@dataclass(frozen=True)
+class PointRows:
+    """Points (k,) in cluster trees of their own, and the clusters of elements that these see.
+
+    region (k,): of each point. on (k,): the element (of the mesh) that a point lies on, or -1; local (k,): its
+    coordinate there.
+    """
+
+    parts: Sorted
+    sources: SourceTree
+    targets: TargetTree
+    met: Interactions
+    point: Complex
+    on: Integer
+    local: Real
+
+    def displacement(self, v: Real) -> Complex:
+        """-int T u + int U t at the points (k,), on an element the mean of both sides; all ranks call this together."""
+        return self._evaluate(v, (None,))[:, 0]
+
+    def stress(self, v: Real) -> Real:
+        """sxx, syy, sxy (k, 3) at points off all elements; all ranks call this together."""
+        along = self._evaluate(v, (1.0, 1j))
+        return np.stack([along[:, 0].real, along[:, 1].imag, 0.5 * (along[:, 0].imag + along[:, 1].real)], axis=1)
+
+    def _evaluate(self, v: Real, normals: tuple[complex | None, ...]) -> Complex:
+        fields = self.targets.spread(self.sources.collect(v), self.sources.forest)
+        far = np.ascontiguousarray(fields).view(float).reshape(len(fields), -1)
+        forest = self.targets.forest
+        leaves = forest.leaves
+        begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
+        result = np.zeros((len(self.point), len(normals)), dtype=complex)
+        for leaf, low, high in zip(leaves, begin, end, strict=True):
+            chosen = forest.items(leaf)
+            near = self.met.near_source[low:high]
+            for k, normal in enumerate(normals):
+                value = self._add_near(int(leaf), chosen, near, normal, v)
+                value += self._add_far(int(leaf), chosen, normal, far)
+                result[chosen, k] = value[0::2] + 1j * value[1::2]
+        return result
+
+    def _add_near(self, leaf: int, chosen: Integer, near: Integer, normal: complex | None, v: Real) -> Real:
+        parts = self.parts
+        if len(near) == 0:
+            return np.zeros(2 * len(chosen))
+        elements = np.sort(np.concatenate([parts.forest.items(source) for source in near]))
+        region = int(self.targets.forest.region[leaf])
+        sources = parts.sources[region].select(elements - parts.first_element[region])
+        bounded = bool((sources.family == 0).any())
+        on = np.where(self.on[chosen] >= 0, np.searchsorted(elements, self.on[chosen]), -1)
+        normals = None if normal is None else np.full(len(chosen), normal, dtype=complex)
+        values = evaluate_rows(sources, self.point[chosen], on, normals, bounded, self.local[chosen])
+        whole = [value for value in values if value is not None]
+        columns = list_columns(parts.mesh, parts.list_nodes(elements), sum(value.shape[1] for value in whole))
+        width = whole[0].shape[1]
+        total: Real = whole[0] @ v[columns[:width]]
+        return total if len(whole) == 1 else total + whole[1] @ v[columns[width:]]
+
+    def _add_far(self, leaf: int, chosen: Integer, normal: complex | None, far: Real) -> Real:
+        forest = self.targets.forest
+        material = self.parts.materials[int(forest.region[leaf])]
+        normals = None if normal is None else np.full(len(chosen), normal, dtype=complex)
+        matrix = target_matrix(
+            self.point[chosen], normals, Medium(material.kappa, material.shear_modulus),
+            forest.center[leaf], forest.radius[leaf], self.parts.terms,
+        )  # fmt: skip
+        result: Real = matrix @ far[leaf]
+        return result
+
+
+def place_points(
+    parts: Sorted, sources: SourceTree, point: Complex, region: Integer, on: Integer, local: Real
+) -> PointRows:
+    """Sort points (k,) of regions into trees; on, local: see PointRows."""
+    forest = build_forest(point, point, np.zeros(len(point)), region, np.full(len(parts.materials), LEAF_POINTS))
+    # A leaf of one point has no radius to measure its powers in.
+    least = 1e-9 * np.abs(parts.mesh.end - parts.mesh.start).max()
+    forest = forest.widen(least)
+    met = find_interactions(forest, parts.forest, RATIO)
+    targets = TargetTree(
+        forest, parts.terms, prepare_shifts(forest, parts.terms), np.ones(forest.clusters, dtype=bool),
+        log_lengths(parts, forest), met.far_target, met.far_source,
+    )  # fmt: skip
+    return PointRows(parts, sources, targets, met, point, on, local)

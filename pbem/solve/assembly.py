@@ -1,0 +1,137 @@
+"""From the discretised model to the problem on the ranks: which operator, and each rank's share of its rows."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from pbem.bem.hierarchical import (
+    anchor_rows,
+    assemble_hierarchical,
+    choose_terms,
+    prepare_sources,
+    sort_elements,
+)
+from pbem.bem.operator import add_anchor, assemble_displacement_rows, assemble_rows, scale_equations
+from pbem.bem.pointwise import place_points
+from pbem.contact.anchor import anchor_motions
+from pbem.contact.constraints import build_constraints
+from pbem.contact.laws import collect_laws
+from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
+from pbem.contact.modes import Linearisation
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.support import find_free_motions
+from pbem.parallel import add_up, share_nodes
+from pbem.solve.groups import divide_model, list_nodes, share_groups, surround_groups
+from pbem.solve.problem import Problem
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+
+# With more unknowns in one region than this the hierarchical operator is the faster one.
+DENSE_UNKNOWNS = 10_000
+
+
+def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
+    """Assemble this rank's rows of the dense or the hierarchical operator."""
+    return _assemble_hierarchical(model, mesh, comm) if is_hierarchical(model, mesh) else _assemble_dense(
+        model, mesh, comm
+    )
+
+
+def is_hierarchical(model: Model, mesh: Mesh) -> bool:
+    """Whether a model is computed with the hierarchical operator."""
+    if model.solver.operator != "auto":
+        return model.solver.operator == "hierarchical"
+    return 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
+
+
+def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
+    """Shares are balanced by the number of matrix entries."""
+    materials = [region.material for region in model.regions]
+    outer = collect_outer_nodes(model, mesh)
+    needed = find_needed_columns(model, mesh, outer)
+    node_region = mesh.node_region
+    costs = np.bincount(node_region, minlength=len(materials)).astype(float)[node_region]
+    offsets = share_nodes(costs, comm.size)
+    first, last = int(offsets[comm.rank]), int(offsets[comm.rank + 1])
+    anchors = anchor_motions(mesh, find_free_motions(model))
+    operator = assemble_rows(mesh, materials, first, last, needed, model.size)
+    for anchor in anchors:
+        add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
+    crack_nodes = np.flatnonzero(mesh.node_crack)
+    shares = np.linspace(0, len(crack_nodes), comm.size + 1).astype(int)
+    own_cracks = crack_nodes[shares[comm.rank] : shares[comm.rank + 1]]
+    unknowns = find_unknowns_of_regions(mesh, outer, evaluate_load(model, mesh, outer, 0, 1.0))
+    modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
+    return Problem(
+        comm=comm,
+        model=model,
+        mesh=mesh,
+        outer=outer,
+        laws=collect_laws(model, mesh),
+        operator=operator,
+        crack_rows=tuple(assemble_displacement_rows(mesh, materials, own_cracks, needed)),
+        crack_nodes=own_cracks,
+        traction_scale=modulus / model.size,
+        equation_scale=scale_equations(mesh, materials, model.size),
+        anchors=anchors,
+        block_columns=tuple(unknowns[block.region] for block in operator.blocks),
+    )
+
+
+def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
+    """Shares are whole groups of neighbouring elements."""
+    materials = [region.material for region in model.regions]
+    outer = collect_outer_nodes(model, mesh)
+    needed = find_needed_columns(model, mesh, outer)
+    groups = divide_model(mesh)
+    first, last = share_groups(mesh, groups, comm.rank, comm.size)
+    elements = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups[first:last]]))
+    parts = sort_elements(mesh, materials, choose_terms(model.solver.tolerance))
+    leaves = parts.forest.leaves
+    cuts = np.linspace(0, len(leaves), comm.size + 1).astype(int)
+    own_leaves = leaves[cuts[comm.rank] : cuts[comm.rank + 1]]
+    sources = prepare_sources(parts, needed, own_leaves, lambda part: add_up(comm, part))
+    operator = assemble_hierarchical(parts, sources, list_nodes(mesh, elements), needed, model.size)
+    anchors = anchor_motions(mesh, find_free_motions(model))
+    for anchor in anchors:
+        operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
+    cracks = np.flatnonzero(mesh.node_crack)
+    shares = np.linspace(0, len(cracks), comm.size + 1).astype(int)
+    own_cracks = cracks[shares[comm.rank] : shares[comm.rank + 1]]
+    points = place_points(
+        parts, sources, mesh.position[own_cracks], mesh.node_region[own_cracks], mesh.node_element[own_cracks],
+        mesh.node_local[own_cracks],
+    ) if len(cracks) else None
+    modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
+    return Problem(
+        comm=comm,
+        model=model,
+        mesh=mesh,
+        outer=outer,
+        laws=collect_laws(model, mesh),
+        operator=operator,
+        crack_rows=(),
+        crack_nodes=own_cracks,
+        traction_scale=modulus / model.size,
+        equation_scale=scale_equations(mesh, materials, model.size),
+        block_columns=(),
+        anchors=anchors,
+        crack_points=points,
+        groups=tuple(surround_groups(mesh, groups, first, last)),
+    )
+
+
+def find_unknowns_of_regions(mesh: Mesh, outer: OuterNodes, load: Load) -> list[Integer]:
+    """Unknowns, in rising order, on which each region's displacements and tractions can depend in any mode."""
+    # A law that depends on everything has the entries of all modes at once.
+    everything = np.tile(1 + 0.1 * np.arange(8.0).reshape(4, 2), (mesh.pairs.count, 1, 1))
+    law = Linearisation(everything, np.zeros((mesh.pairs.count, 4)))
+    matrix = build_constraints(mesh, outer, np.zeros(mesh.pairs.count), law, load, 1.0).matrix
+    region_of_row = np.tile(np.repeat(mesh.node_region, 2), 2)
+    return [
+        np.unique(matrix[np.flatnonzero(region_of_row == region)].indices) for region in range(len(mesh.region_names))
+    ]

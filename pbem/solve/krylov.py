@@ -1,0 +1,145 @@
+"""The linear systems of the hierarchical operator: GMRES on K x = B (M x), preconditioned by overlapping groups."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.hierarchical import HierarchicalOperator
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.loads import Load
+from pbem.errors import ConvergenceError
+from pbem.parallel import gather_parts
+from pbem.solve.linear import PREFIX, PETSc
+from pbem.solve.problem import Problem
+from pbem.solve.schwarz import SchwarzPreconditioner
+from pbem.solve.tangent import AnyTangent, Solved, Tangent
+
+Real = NDArray[np.float64]
+
+# Most iterations of GMRES for one linear system, without restart.
+MOST_ITERATIONS = 300
+# GMRES goes on to this part of the tolerance of Newton's method.
+SAFETY = 0.1
+
+
+class KrylovTangent:
+    """The tangent operator K = B M as a PETSc shell; its preconditioner follows the modes."""
+
+    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner) -> None:
+        self.problem = problem
+        self.preconditioner = preconditioner
+        self.constraints: ConstraintMap | None = None
+        self.solution: Real | None = None
+        self.iterations: list[int] = []
+        rows = problem.operator.rows
+        sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
+        self._order = _find_order(problem)
+        self._matrix = PETSc.Mat().createPython(sizes, _Product(self), comm=problem.comm)
+        self._matrix.setUp()
+        self._right, self._left = self._matrix.createVecs()
+        solver = PETSc.KSP().create(problem.comm)
+        solver.setOptionsPrefix(PREFIX)
+        solver.setOperators(self._matrix)
+        solver.setType("gmres")
+        solver.setGMRESRestart(MOST_ITERATIONS)
+        solver.setPCSide(PETSc.PC.Side.RIGHT)
+        solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
+        solver.setInitialGuessNonzero(True)
+        inner = solver.getPC()
+        inner.setType("python")
+        inner.setPythonContext(_Preconditioning(self))
+        solver.setFromOptions()
+        self._solver = solver
+
+    def solve(self, constraints: ConstraintMap, load: Load) -> Solved:
+        """Solve B (M x + m) = 0 for a constraint map.
+
+        Raises ConvergenceError: "linear solver".
+        """
+        problem = self.problem
+        begin = self._guess(constraints)
+        self.preconditioner.update(constraints)
+        self.constraints = constraints
+        forced = problem.apply(constraints.offset, load)
+        scale = problem.measure(forced)
+        if scale == 0.0:
+            unknowns = np.zeros(problem.unknowns)
+            return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
+        self._left.setArray(begin)
+        self._right.setArray(-forced)
+        self._solver.solve(self._right, self._left)
+        self.iterations.append(int(self._solver.getIterationNumber()))
+        unknowns = self.gather(np.array(self._left.getArray()))
+        v = constraints.evaluate(unknowns)
+        residual = problem.measure(problem.apply(v, load)) / scale
+        if not residual <= problem.model.solver.newton_tolerance:
+            raise ConvergenceError(
+                "linear solver",
+                f"GMRES reached a relative residual of {residual:.1e} in {self.iterations[-1]} iterations (asked: "
+                f"{problem.model.solver.newton_tolerance:.1e})",
+            )
+        self.solution = unknowns
+        return Solved(unknowns, v, residual)
+
+    def _guess(self, constraints: ConstraintMap) -> Real:
+        """This rank's part of the last solution, zero at first."""
+        rows = self.problem.operator.nodes
+        if self.solution is None:
+            return np.zeros(2 * len(rows))
+        return np.ascontiguousarray(self.solution.reshape(-1, 2)[rows].ravel())
+
+    def gather(self, part: Real) -> Real:
+        """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""
+        whole = np.empty(self.problem.unknowns)
+        whole[self._order] = gather_parts(self.problem.comm, part)
+        return whole
+
+    def multiply(self, unknowns: Real) -> Real:
+        """This rank's rows of B M x."""
+        assert self.constraints is not None
+        return self.problem.operator.apply(self.constraints.matrix @ unknowns)
+
+    def destroy(self) -> None:
+        for item in (self._solver, self._matrix, self._right, self._left):
+            item.destroy()
+
+
+def make_tangent(problem: Problem) -> AnyTangent:
+    """The tangent operator that belongs to the problem's operator."""
+    if not isinstance(problem.operator, HierarchicalOperator):
+        return Tangent(problem)
+    materials = [region.material for region in problem.model.regions]
+    preconditioner = SchwarzPreconditioner(
+        problem.mesh, materials, problem.model.size, problem.anchors, problem.groups, problem.operator.nodes
+    )
+    return KrylovTangent(problem, preconditioner)
+
+
+class _Product:
+    """What PETSc asks of a matrix that is not stored."""
+
+    def __init__(self, tangent: KrylovTangent) -> None:
+        self._tangent = tangent
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray()))))
+
+
+class _Preconditioning:
+    """What PETSc asks of a preconditioner of ours."""
+
+    def __init__(self, tangent: KrylovTangent) -> None:
+        self._tangent = tangent
+
+    def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        result = np.zeros(x.getLocalSize())
+        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray())), result)
+        y.setArray(result)
+
+
+def _find_order(problem: Problem) -> NDArray[np.int64]:
+    """Unknowns of all ranks, one rank after the other."""
+    own = problem.operator.nodes.astype(float)
+    nodes = gather_parts(problem.comm, own).astype(np.int64)
+    return (2 * nodes[:, None] + np.arange(2)).ravel()

@@ -1,0 +1,160 @@
+"""A preconditioner of overlapping groups: each group's part of the solution of its equations and its neighbours'.
+
+For every group the tangent operator of the group and of those around it is formed exactly and factored; of the local
+solution only the group's own part is used (restricted additive Schwarz: X.-C. Cai, M. Sarkis, SIAM J. Sci. Comput. 21,
+1999). Only the rows of the local inverse that give this part are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.linalg import lu_factor, lu_solve
+
+from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.bem.rows import Sources, evaluate_rows
+from pbem.contact.anchor import Anchor
+from pbem.contact.constraints import ConstraintMap
+from pbem.mesh.mesh import Mesh
+from pbem.model.material import Material
+from pbem.solve.groups import Group, list_nodes
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+
+@dataclass
+class LocalInverse:
+    """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
+
+    matrix (own, around): rows of the local inverse; None until it is formed.
+    """
+
+    group: Group
+    own: Integer
+    around: Integer
+    matrix: Real | None = None
+
+
+class SchwarzPreconditioner:
+    """The local inverses of this rank's groups, formed anew where the constraint map has changed."""
+
+    def __init__(
+        self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
+        groups: Sequence[Group], nodes: Integer,
+    ) -> None:
+        self._mesh, self._anchors = mesh, tuple(anchors)
+        self._sources = collect_sources(mesh, materials)
+        self._scale = scale_equations(mesh, materials, length)
+        self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
+        self._free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
+        self._nodes = nodes
+        self._formed: sparse.csr_matrix | None = None
+        self.inverses = [self._place(group) for group in groups]
+
+    def _place(self, group: Group) -> LocalInverse:
+        at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
+        around = list_nodes(self._mesh, group.around)
+        return LocalInverse(group, _both(at), _both(around))
+
+    def update(self, constraints: ConstraintMap) -> int:
+        """Form the inverses of the groups that see a change of the constraint map; returns their number."""
+        matrix = constraints.matrix
+        changed = _find_changes(self._formed, matrix)
+        self._formed = matrix
+        by_column = matrix.tocsc()
+        free = (self._free @ matrix).tocsr()
+        count = 0
+        for inverse in self.inverses:
+            if inverse.matrix is None or changed[inverse.around].any():
+                inverse.matrix = self._invert(inverse, by_column, free)
+                count += 1
+        return count
+
+    def apply(self, residual: Real, result: Real) -> None:
+        """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,)."""
+        for inverse in self.inverses:
+            assert inverse.matrix is not None
+            result[inverse.own] = inverse.matrix @ residual[inverse.around]
+
+    def _invert(self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix) -> Real:
+        around = inverse.around
+        local = self._form(inverse.group.around, around, constraints, free)
+        wanted = np.flatnonzero(np.isin(around, _both(list_nodes(self._mesh, inverse.group.elements))))
+        unit = np.zeros((len(around), len(wanted)))
+        unit[wanted, np.arange(len(wanted))] = 1.0
+        with np.errstate(all="ignore"):
+            factors = lu_factor(local, overwrite_a=True, check_finite=False)
+            rows = lu_solve(factors, unit, trans=1, overwrite_b=True, check_finite=False).T
+        # A group that nothing holds without the rest of the model: its residual serves as it is.
+        return np.ascontiguousarray(rows) if np.isfinite(rows).all() else np.ascontiguousarray(unit.T)
+
+    def _form(
+        self, elements: Integer, around: Integer, constraints: sparse.csc_matrix, free: sparse.csr_matrix
+    ) -> Real:
+        """The tangent operator's rows and columns of the nodes of elements, dense."""
+        mesh = self._mesh
+        nodes = around[::2] // 2
+        local = free[around][:, around].toarray()
+        chosen = constraints[:, around].tocsr()
+        for region in np.unique(mesh.region[elements]):
+            own = np.flatnonzero(mesh.node_region[nodes] == region)
+            values, columns = self._evaluate(int(region), elements[mesh.region[elements] == region], nodes[own])
+            local[_both(own)] += (chosen[columns].T @ values.T).T
+        return local
+
+    def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
+        """Rows of B of nodes, less the free terms, on the entries of v of elements of the same region."""
+        mesh = self._mesh
+        sources: Sources = self._sources[region].select(elements - self._first_element[region])
+        bounded = bool((sources.family == 0).any())
+        on = np.searchsorted(elements, mesh.node_element[nodes])
+        columns = _both(nodes)
+        if bounded:
+            columns = np.concatenate([columns, 2 * mesh.nodes + columns])
+        values = np.empty((2 * len(nodes), len(columns)))
+        for traction in (False, True):
+            at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
+            if len(at):
+                own = nodes[at]
+                normal = mesh.normal[own] if traction else None
+                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, mesh.node_local[own])
+                values[_both(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
+        values *= -np.repeat(self._scale[nodes], 2)[:, None]
+        for anchor in self._anchors:
+            if anchor.region == region:
+                self._anchor(values, nodes, anchor)
+        return values, columns
+
+    @staticmethod
+    def _anchor(values: Real, nodes: Integer, anchor: Anchor) -> None:
+        place = np.searchsorted(anchor.nodes, nodes)
+        known = (place < len(anchor.nodes)) & (anchor.nodes[np.minimum(place, len(anchor.nodes) - 1)] == nodes)
+        pattern, functional = anchor.pattern[place[known]], anchor.functional[place[known]]
+        at = _both(np.flatnonzero(known))
+        values[np.ix_(at, at)] += np.outer(_split(pattern), _split(functional))
+
+
+def _both(nodes: Integer) -> Integer:
+    """Numbers of both components of nodes."""
+    return (2 * nodes[:, None] + np.arange(2)).ravel()
+
+
+def _split(value: NDArray[np.complex128]) -> Real:
+    return np.stack([value.real, value.imag], axis=1).ravel()
+
+
+def _find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
+    """Columns (unknowns,) in which two constraint maps differ."""
+    changed = np.zeros(matrix.shape[1], dtype=bool)
+    if before is None:
+        changed[:] = True
+    else:
+        difference = (matrix - before).tocoo()
+        changed[difference.col[difference.data != 0]] = True
+    return changed

@@ -48,6 +48,28 @@ static int check_lengths(const Py_buffer *b, Py_ssize_t n, Py_ssize_t m, Py_ssiz
            (!b[TRACTION].buf || has_length(&b[TRACTION], full, "traction"));
 }
 
+/* Returns 0 if memory is short. */
+static int fill_checked_rows(const Rows *r)
+{
+    Py_ssize_t count;
+    Kind kinds[FAMILIES];
+    Arc *arcs = prepare_arcs(r, &count);
+    NearPairs near = {.count = 0};
+    int enough = !count || arcs;
+    for (int family = 0; family < FAMILIES; family++) {
+        kinds[family] = prepare_kind(r, family);
+        enough = enough && (!kinds[family].groups || (kinds[family].frame && kinds[family].element));
+    }
+    if (enough) {
+        Py_BEGIN_ALLOW_THREADS
+        fill_rows(r, arcs, kinds, &near);
+        Py_END_ALLOW_THREADS
+    }
+    free(arcs);
+    for (int family = 0; family < FAMILIES; family++) release_kind(&kinds[family]);
+    return enough;
+}
+
 static PyObject *rows(PyObject *self, PyObject *args)
 {
     PyObject *normal, *traction, *result = NULL;
@@ -79,20 +101,10 @@ static PyObject *rows(PyObject *self, PyObject *args)
             PyErr_SetString(PyExc_ValueError, "an element turns by more than half a circle");
             goto end;
         }
-    Py_ssize_t count;
-    Arc *arcs = prepare_arcs(&r, &count);
-    const Segments segments = prepare_segments(&r);
-    if ((count && !arcs) || !segments.mx) {
-        free(arcs);
-        free(segments.mx);
+    if (!fill_checked_rows(&r)) {
         PyErr_NoMemory();
         goto end;
     }
-    Py_BEGIN_ALLOW_THREADS
-    fill_rows(&r, arcs, &segments);
-    Py_END_ALLOW_THREADS
-    free(arcs);
-    free(segments.mx);
     result = Py_NewRef(Py_None);
 end:
     for (int i = 0; i < BUFFERS; i++)
@@ -107,4 +119,8 @@ static struct PyModuleDef module = {
     NULL, NULL, NULL, NULL,
 };
 
-PyMODINIT_FUNC PyInit__kernels(void) { return PyModule_Create(&module); }
+PyMODINIT_FUNC PyInit__kernels(void)
+{
+    prepare_series();
+    return PyModule_Create(&module);
+}

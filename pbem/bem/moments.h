@@ -23,8 +23,10 @@ typedef struct {
     double y;                            /* Im w, in units of h */
 } Moments;
 
-/* Beyond this |w|^2 the series in 1/w is used; at it, upward recursion to k = 4 loses a factor of about 40. */
-static const double FAR_SQUARED = 6.25;
+/* Beyond this |w|^2 the series in 1/w is used; at it, upward recursion to k = 4 loses a factor of about 16. */
+static const double FAR_SQUARED = 4.0;
+/* The same for a tip element, counted from the tip in units of the element's length. */
+static const double FAR_TIP_SQUARED = 4.0;
 
 /* Terms of a series in q = 1/|w|^2 (or 1/|w|) that reach rounding: the least K with q^K < 1e-17. */
 static int count_terms(double inverse_ratio)
@@ -96,7 +98,7 @@ static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Mom
     /* distance from the tip over the length: (1 + w)/2 at the start; at the end the axis is reversed, (1 - w)/2 */
     const cplx q = 0.5 * (1 + sign * (creal(w) + I * m->y));
     const double r2 = creal(q) * creal(q) + cimag(q) * cimag(q);
-    if (r2 < 4.0) {
+    if (r2 < FAR_TIP_SQUARED) {
         const cplx root = csqrt(q), sum = root + 1;
         /* q - 1 = (root - 1)(root + 1), without cancellation near the other end */
         const cplx rest = 0.5 * (sign * (creal(w) + I * m->y) - 1), ratio = rest / (sum * sum);

@@ -8,16 +8,17 @@ from numpy.typing import NDArray
 
 from tests.identities.moments import FAR, integrate_moments, read_moments
 
-# Upward recursion to the fourth moment multiplies rounding by at most 2.5^4 = 40; a few roundings of 1e-16 each. On a
+# Upward recursion to the fourth moment multiplies rounding by at most 2^4 = 16; a few roundings of 1e-16 each. On a
 # tip element the second derivative of the third is small beside the terms that it is the sum of.
 RELATIVE = {0: 1.5e-13, 1: 1e-12, 2: 1e-12}
 
 NEAR = [0.3 + 1e-6j, 0.3 - 1e-6j, -0.77 + 1e-3j, 0.1 + 0.2j, -0.4 - 1.1j, 0.02j]
 AT_ENDS = [1 + 1e-6j, 1 - 1e-6j, -1 - 1e-6j, -1 + 1e-6j, 1 + 1e-6 + 1e-7j, -1 - 1e-6 + 1e-8j, 1 - 1e-4 + 1e-4j]
 ON_LINE = [1 + 1e-6, -1 - 1e-6, 1.2, -1.3, 2.45, -2.45, 2.6, -7.9, 1e3, -1e6]
-# The series takes over at |w| = 2.5; on tip elements at twice the element's length from the tip.
-SWITCH = [r * np.exp(1j * a) for r in (2.4, 2.499, 2.501, 2.6, 2.99, 3.01) for a in (0.1, 0.8, 1.57, 2.5, -0.4, -3.0)]
-TIP_SWITCH = [1 + 4 * r * np.exp(1j * a) for r in (0.9, 0.999, 1.001, 1.1) for a in (0.1, 0.8, 1.57, 2.5, -0.4, -3.0)]
+# The series takes over at |w| = 2; on tip elements at twice the element's length from the tip.
+ANGLES = (0.1, 0.8, 1.57, 2.5, -0.4, -3.0)
+SWITCH = [r * np.exp(1j * a) for r in (1.9, 1.999, 2.001, 2.1, 2.5, 2.99, 3.01) for a in ANGLES]
+TIP_SWITCH = [1 + 4 * r * np.exp(1j * a) for r in (0.9, 0.999, 1.001, 1.1) for a in ANGLES]
 DISTANT = [5 + 5j, 1e3 - 3e2j, -1e3j, 1e6j, 1e6 + 1e5j, -3e6 - 1e-3j]
 ON_ELEMENT = [0.05, 0.3, -0.861, 0.999, -0.999]
 

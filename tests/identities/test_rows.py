@@ -284,5 +284,8 @@ def test_without_tractions_the_rows_of_displacements_are_the_same(order: int) ->
     points, off = np.random.default_rng(7).normal(size=(9, 2)) @ [1, 1j], np.full(9, -1)
     for normal in (None, np.exp(1j * np.arange(9))):
         with_tractions, without = (evaluate_rows(sources, points, off, normal, kind) for kind in (True, False))
-        np.testing.assert_array_equal(with_tractions[0], without[0])
+        one, other = with_tractions[0], without[0]
+        # The two are compiled apart: roundings differ, which near an element grow by what its recursions lose.
+        scale = np.abs(one).reshape(len(one), 100, -1).max(axis=2)
+        assert np.all(np.abs(one - other).reshape(len(one), 100, -1).max(axis=2) <= 1e-13 * scale)
         assert without[1] is None

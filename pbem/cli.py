@@ -1,4 +1,4 @@
-"""The command line: check, run, info, plot. Only `run` needs MPI and PETSc."""
+"""The command line: make, check, run, info, plot. Only `run` needs MPI and PETSc."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StorageError
+from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
 if TYPE_CHECKING:
@@ -25,13 +26,14 @@ if TYPE_CHECKING:
 
 PREFIX = "-pbem_"
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
-COMMANDS = ("check", "run", "info", "plot")
+COMMANDS = ("make", "check", "run", "info", "plot")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
 FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
 
 DESCRIPTION = """\
 Boundary elements for frictional contact in two-dimensional elasticity.
 
+  pbem make cracks           write a case of random cracks; also inclusions
   pbem check CASE            is the case right, and what will be computed?
   pbem run CASE              compute; `pbem CASE` does the same
   pbem info FILE.h5          what a result file holds
@@ -163,6 +165,7 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     try:
         with contextlib.redirect_stderr(sys.stderr if rank == 0 else sys.stdout):
             options = parser.parse_args(arguments)
+            options.arguments = arguments
             if petsc and options.command != "run":
                 parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run`")
     except SystemExit as end:
@@ -196,6 +199,7 @@ def make_parser() -> argparse.ArgumentParser:
         command.set_defaults(action=action)
         return command
 
+    add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
     check = add("check", _check, "validate a case and tell what would be computed")
     check.add_argument("case", metavar="CASE")
     check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
@@ -214,6 +218,15 @@ def make_parser() -> argparse.ArgumentParser:
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
     plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
     return parser
+
+
+def _make(options: argparse.Namespace) -> int:
+    try:
+        print(f"case file: {make(options)}")
+    except (OSError, ValueError) as error:
+        print(f"pbem make: {error}", file=sys.stderr)
+        return WRONG_INPUT
+    return 0
 
 
 def _check(options: argparse.Namespace) -> int:

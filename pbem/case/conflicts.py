@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pbem.case.finding import Finding, show
+from pbem.case.generated_conflicts import check_generated
 from pbem.case.places import Loc
 
 GLOBAL_KEYS = ("ux", "uy", "tx", "ty")
@@ -30,10 +31,11 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
     for name in ("interfaces", "contacts"):
         for loc, table in _tables(raw, (name,)):
             findings += _check_law(loc, table)
+    findings += _check_generate(raw)
     findings += _check_stages(raw)
     findings += _check_options(raw)
     for name in ("materials", "curves", "regions", "contacts"):
-        findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc)]
+        findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc, str(loc[-1]))]
     return findings
 
 
@@ -46,8 +48,7 @@ def _tables(parent: Mapping[str, Any], loc: Loc) -> Iterator[tuple[Loc, Mapping[
                 yield (*loc, name), table
 
 
-def _check_name(loc: Loc) -> list[Finding]:
-    name = str(loc[-1])
+def _check_name(loc: Loc, name: str) -> list[Finding]:
     if name.strip() == name and name not in ("", ".", "..") and "/" not in name and name.isprintable():
         return []
     expected = "a name of printable characters without '/' and without spaces around it"
@@ -156,6 +157,22 @@ def _check_law(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
             for key in ("friction", "friction_angle", "cohesion", "friction_dynamic", "slip_distance")
             if table.get(key)
         ]
+    return findings
+
+
+def _check_generate(raw: Mapping[str, Any]) -> list[Finding]:
+    tables = raw.get("generate")
+    if "curves" not in raw and not tables:
+        return [Finding(("curves",), "no curves", "the [table] `curves`, or a table [[generate]]")]
+    if raw.get("curves") == {} and not tables:
+        return [Finding(("curves",), "an empty table", "at least 1 entry, or a table [[generate]]")]
+    findings: list[Finding] = []
+    for number, table in enumerate(tables if isinstance(tables, list) else []):
+        if isinstance(table, dict):
+            loc = ("generate", number)
+            findings += check_generated(loc, table) + _check_law(loc, table)
+            if isinstance(table.get("name"), str):
+                findings += _check_name((*loc, "name"), table["name"])
     return findings
 
 

@@ -13,6 +13,7 @@ from pydantic import PrivateAttr, ValidationError
 
 from pbem.case.conflicts import find_conflicts
 from pbem.case.finding import Finding
+from pbem.case.generation import Group, expand
 from pbem.case.places import Loc, find_line, find_lines, format_place
 from pbem.case.repair import repair
 from pbem.case.schema import CaseFile
@@ -21,15 +22,39 @@ from pbem.errors import CaseError, Fault
 
 
 class Case(CaseFile):
-    """A case file that was read and found valid. `text`: the whole file; `source`: its path, as given."""
+    """A case file that was read and found valid. `text`: the whole file; `source`: its path, as given.
+
+    Curves, regions and laws of the tables [[generate]] are among those of the file, after them.
+    """
 
     text: str
     source: str
     _lines: Mapping[Loc, int] = PrivateAttr(default_factory=dict)
+    _groups: tuple[Group, ...] = PrivateAttr(default=())
+    _origin: Mapping[str, int] = PrivateAttr(default_factory=dict)
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """What the tables [[generate]] made."""
+        return self._groups
 
     def fault(self, loc: Loc, found: str, expected: str) -> Fault:
         """A fault with its place: `loc` is the path of a key, entries of lists from 0."""
-        return Fault(format_place(loc, find_line(self._lines, loc)), found, expected)
+        place = self._find_written(loc)
+        return Fault(format_place(place, find_line(self._lines, place)), found, expected)
+
+    def _find_written(self, loc: Loc) -> Loc:
+        """The path itself, or of a curve, region or law that was generated, that of the key that it was made from."""
+        if len(loc) == 4 and loc[0] == "regions" and isinstance(loc[3], int):  # a name in a list
+            names = getattr(self.regions.get(str(loc[1])), str(loc[2]), ())
+            if loc[3] < len(names) and names[loc[3]] in self._origin:
+                return ("generate", self._origin[names[loc[3]]])
+        if loc[:2] in self._lines:
+            return loc
+        if len(loc) < 2 or loc[0] not in ("curves", "regions", "interfaces") or loc[1] not in self._origin:
+            return loc
+        place = ("generate", self._origin[str(loc[1])])
+        return (*place, loc[2]) if len(loc) > 2 and (*place, loc[2]) in self._lines else place
 
 
 @dataclass(frozen=True)
@@ -94,11 +119,12 @@ def parse_draft(text: str, source: str = "case") -> Draft:
     if not raw:
         return _refuse("the file", "nothing (an empty file)", "the tables [materials.*], [curves] and [regions.*]")
     lines = find_lines(text)
-    findings = _order(find_conflicts(raw) + find_schema_findings(raw), lines)
+    findings = find_conflicts(raw) + find_schema_findings(raw)
+    case, more = _compose_draft(raw, findings, text, source, lines)
+    findings = _order(findings + more, lines)
     faults = tuple(
         Fault(format_place(f.loc, find_line(lines, f.loc)), f.found, f.expected) for f in findings
     )
-    case = _compose_draft(raw, findings, text, source, lines)
     return Draft(case, faults, not any(_concerns_loads(finding.loc) for finding in findings))
 
 
@@ -119,19 +145,36 @@ def _concerns_loads(loc: Loc) -> bool:
 
 
 def _order(findings: list[Finding], lines: Mapping[Loc, int]) -> list[Finding]:
-    """By line, each once."""
-    return sorted(dict.fromkeys(findings), key=lambda finding: find_line(lines, finding.loc) or 0)
+    """By line, each once; tables that are missing in the order of the schema."""
+    tables = list(CaseFile.model_fields)
+
+    def find_rank(finding: Finding) -> tuple[int, int]:
+        line, table = find_line(lines, finding.loc) or 0, finding.loc[0] if finding.loc else ""
+        return line, tables.index(str(table)) if not line and table in tables else 0
+
+    return sorted(dict.fromkeys(findings), key=find_rank)
 
 
 def _compose_draft(
     raw: Mapping[str, Any], findings: list[Finding], text: str, source: str, lines: Mapping[Loc, int]
-) -> Case | None:
+) -> tuple[Case | None, list[Finding]]:
+    """The case with what it generates, as far as it can be judged, and what is wrong with generating it."""
     patched = repair(raw, findings)
     if patched is None:
-        return None
+        return None, []
     try:
         case = Case.model_validate({**patched, "text": text, "source": source})
     except ValidationError:
-        return None
+        return None, []
     case._lines = lines
-    return case
+    if not case.generate:
+        return case, []
+    expansion, wrong = expand(case)
+    if expansion is None:
+        return None, wrong
+    case = case.model_copy(update={
+        "curves": expansion.curves, "regions": expansion.regions, "interfaces": expansion.interfaces,
+        "stages": expansion.stages,
+    })
+    case._groups, case._origin = expansion.groups, expansion.origin
+    return case, []

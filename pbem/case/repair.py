@@ -28,7 +28,7 @@ def repair(raw: Mapping[str, Any], findings: list[Finding]) -> dict[str, Any] | 
 
 def _patch(raw: dict[str, Any], loc: Loc) -> bool:
     """Take the wrong value out; False if the rest cannot be judged without it."""
-    if not loc or loc in (("materials",), ("curves",), ("regions",)):
+    if not loc or loc in (("materials",), ("curves",), ("regions",)) or loc[0] == "generate":
         return False
     table, key = str(loc[0]), str(loc[2]) if len(loc) > 2 else ""
     known = known_keys(loc[:2])

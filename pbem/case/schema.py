@@ -13,6 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 MOST_ELEMENTS = 100_000
+MOST_GENERATED = 1_000_000
 
 
 def _is_number(value: object) -> bool:
@@ -67,7 +68,10 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, l
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST), _SHORT]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST), _SHORT]
 Angle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-3600, le=3600), _SHORT]
+Part = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=1), _SHORT]
+Spread = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10), _SHORT]
 Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1, lt=0.5), _SHORT]
+HalfTurn = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90), _SHORT]
 FrictionAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=90), _SHORT]
 Power = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=10), _SHORT]
 Tolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=1), _SHORT]
@@ -185,6 +189,38 @@ class ContactTable(LawTable):
     between: tuple[Text, Text]
 
 
+class GenerateTable(LawTable):
+    """Random cracks or circular inclusions, each a curve `name_1`, `name_2`, ..., and the law of them all."""
+
+    kind: Literal["cracks", "inclusions"]
+    name: Text = Field(description="their curves (and regions of inclusions) are name_1, name_2, ...")
+    region: Text = Field(description="region in which they lie")
+    material: Text | None = Field(None, description="material of inclusions")
+    count: Annotated[int, Field(strict=True, ge=1, le=MOST_GENERATED)]
+    elements: Annotated[int, Field(strict=True, ge=1, le=MOST_ELEMENTS)] = Field(description="elements on each")
+    half_length: Positive | None = Field(None, description="half-length of cracks")
+    radius: Positive | None = Field(None, description="radius of inclusions")
+    distribution: Literal["uniform", "lognormal", "power"] = Field(
+        "uniform",
+        description="of the sizes: uniform in size (1 +- spread), lognormal with the median size, or a power law from "
+        "the size to the largest one",
+    )
+    spread: Spread = Field(0.0, description="of a uniform distribution, or standard deviation of the logarithm")
+    exponent: Positive | None = Field(None, description="a of the power law: numbers fall like size^-a")
+    largest: Positive | None = Field(None, description="largest size of the power law")
+    orientation: Angle | None = Field(None, description="of cracks, degrees from x; without: all directions alike")
+    orientation_spread: HalfTurn = Field(0.0, description="degrees: uniform in orientation +- spread")
+    density: Positive | None = Field(None, description="number per unit area; the centres lie in the area that follows")
+    fraction: Part | None = Field(None, description="or part of the area that inclusions take")
+    box: tuple[Number, Number, Number, Number] | None = Field(
+        None, description="or x and y of two opposite corners of a rectangle inside of which they lie"
+    )
+    shape: Literal["square", "disc"] = Field("square", description="of the area in which the centres lie")
+    center: Point = Field((0.0, 0.0), description="of that area")
+    distance: Positive = Field(description="least distance of any two, and from the sides of the box")
+    seed: Annotated[int, Field(strict=True, ge=0, le=2**53)] = Field(1, description="of the random numbers")
+
+
 class StressTable(Table):
     """Components of a stress."""
 
@@ -259,8 +295,9 @@ class CaseFile(Table):
     title: Text = ""
     units: UnitsTable = UnitsTable()
     materials: Annotated[Mapping[str, MaterialTable], Field(min_length=1)]
-    curves: Annotated[Mapping[str, CurveTable], Field(min_length=1)]
+    curves: Mapping[str, CurveTable] = {}
     regions: Annotated[Mapping[str, RegionTable], Field(min_length=1)]
+    generate: tuple[GenerateTable, ...] = ()
     boundary: Mapping[str, ConditionTable] = {}
     interfaces: Mapping[str, LawTable] = {}
     contacts: Mapping[str, ContactTable] = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +26,9 @@ from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shape import shape_curves
 from pbem.model.support import find_free_motions
 
+# Faults shown of what one table [[generate]] made.
+MOST_FAULTS = 5
+
 
 @dataclass(frozen=True)
 class _Topology:
@@ -41,7 +45,7 @@ def build_model(case: Case) -> Model:
     """Resolve and check a case. Raises CaseError with every fault of names, topology, laws, loads and support."""
     model, faults = _examine(case, conditions_known=True)
     if model is None or faults:
-        raise CaseError(case.source, tuple(faults))
+        raise CaseError(case.source, _shorten(faults))
     return model
 
 
@@ -56,8 +60,24 @@ def parse_model(text: str, source: str = "case") -> tuple[Case, Model]:
     model, faults = _examine(draft.case, draft.conditions_known) if draft.case else (None, [])
     faults = [*draft.faults, *faults]
     if draft.case is None or model is None or faults:
-        raise CaseError(source, tuple(faults))
+        raise CaseError(source, _shorten(faults))
     return draft.case, model
+
+
+def _shorten(faults: list[Fault]) -> tuple[Fault, ...]:
+    """Each fault once; of many at the same table [[generate]] the first few, and how many more there are."""
+    shown: list[Fault] = []
+    counts: Counter[str] = Counter()
+    for fault in dict.fromkeys(faults):
+        generated = fault.place.startswith("generate[")
+        counts[fault.place] += generated
+        if not generated or counts[fault.place] <= MOST_FAULTS:
+            shown.append(fault)
+    shown += [
+        Fault(place, f"{count - MOST_FAULTS} more of such faults", "none")
+        for place, count in counts.items() if count > MOST_FAULTS
+    ]
+    return tuple(shown)
 
 
 def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,7 +11,7 @@ from pbem.case.schema import LawTable, StageConditionTable
 from pbem.errors import Fault
 from pbem.model.background import Backgrounds, read_backgrounds
 from pbem.model.law import read_law
-from pbem.model.model import Condition, Contact, Interface, Quantity, Stage
+from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage
 from pbem.model.roles import Roles, unknown_name
 
 Loc = tuple[str | int, ...]
@@ -45,12 +45,19 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         conditions[name] = condition
         faults += wrong
     interfaces: dict[str, Interface] = {}
+    laws: dict[Hashable, Law] = {}
+    none = LawTable()
+    generated = {name for group in case.groups for name in group.members}
     for name in [*roles.shared, *roles.cracks]:
         sides = roles.shared[name] if name in roles.shared else (roles.cracks[name], None)
         default: Literal["bonded", "coulomb"] = "bonded" if name in roles.shared else "coulomb"
-        law, wrong = read_law(case, ("interfaces", name), case.interfaces.get(name, LawTable()), default)
-        interfaces[name] = Interface(name, sides[0], sides[1], law)
-        faults += wrong
+        table = case.interfaces.get(name, none)
+        # One table may stand for many interfaces that were generated together, and its faults for theirs.
+        key = (id(table), default) if name in generated else name
+        if key not in laws:
+            laws[key], wrong = read_law(case, ("interfaces", name), table, default)
+            faults += wrong
+        interfaces[name] = Interface(name, sides[0], sides[1], laws[key])
     contacts: dict[str, Contact] = {}
     for name, (first, second) in roles.contacts.items():
         law, wrong = read_law(case, ("contacts", name), case.contacts[name], "coulomb")

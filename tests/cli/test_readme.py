@@ -14,7 +14,7 @@ import pytest
 from pydantic import BaseModel
 
 import pbem
-from pbem.case.schema import CaseFile, ContactTable
+from pbem.case.schema import CaseFile, ContactTable, GenerateTable, LawTable
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -108,6 +108,8 @@ def find_table(annotation: Any) -> type[BaseModel] | None:
 def list_keys(table: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Paths of all keys as the README writes them, with their fields."""
     for key, field in table.model_fields.items():
+        if table is GenerateTable and key in LawTable.model_fields:
+            continue  # those of interfaces
         named = key in NAMES and "Mapping" in str(field.annotation)
         path = f"{prefix}{key}.{NAMES[key]}" if named else f"{prefix}{key}"
         inner = find_table(field.annotation)

@@ -146,7 +146,7 @@ def test_file_that_is_not_utf8(tmp_path: Path) -> None:
 
 def test_json_schema_knows_every_key() -> None:
     schema = json_schema()
-    assert set(schema["required"]) == {"materials", "curves", "regions"}
+    assert set(schema["required"]) == {"materials", "regions"}
     assert schema["additionalProperties"] is False
     law = schema["$defs"]["LawTable"]["properties"]
     assert "spring" in schema["$defs"]["ConditionTable"]["properties"]

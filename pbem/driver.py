@@ -74,6 +74,10 @@ def _solve(
     last: Step | None = broadcast(world, writer.last_step if writer else None)
     try:
         problem = assemble_problem(model, mesh, world)
+        for note in problem.notes:
+            listener.note(note)
+        if interior is not None:
+            interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
         store_steps(march(problem, listener, start), model.output_every, interior, writer)
     except BaseException as error:

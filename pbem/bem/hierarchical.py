@@ -125,12 +125,18 @@ def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
 class HierarchicalOperator:
     """The rows of B of some nodes (k,), in their order; sources and targets are the same trees."""
 
+    parts: Sorted
     nodes: Integer
     sources: SourceTree
     targets: TargetTree
     leaves: tuple[LeafRows, ...]
     free: sparse.csr_matrix
+    needed: Bool
     anchorings: tuple[Anchoring, ...] = ()
+
+    def keep_needed(self, v: Real) -> Real:
+        """v with zeros in the entries that the operator was told to leave out."""
+        return np.where(self.needed, v, 0.0)
 
     @property
     def rows(self) -> int:
@@ -195,7 +201,8 @@ def assemble_hierarchical(
         far *= factor
         rows = (2 * row_of_node[at][:, None] + np.arange(2)).ravel()
         leaves.append(LeafRows(int(leaf), rows, columns, near, far))
-    return HierarchicalOperator(nodes, sources, targets, tuple(leaves), collect_free_terms(mesh, nodes, scale))
+    free = collect_free_terms(mesh, nodes, scale)
+    return HierarchicalOperator(parts, nodes, sources, targets, tuple(leaves), free, needed)
 
 
 def _evaluate_leaf(

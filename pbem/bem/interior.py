@@ -49,7 +49,6 @@ class InteriorRows:
         self._points = points
         self._location = location
         self._sources = collect_sources(mesh, materials)
-        self._local = locate_nodes(mesh)
         self._chunks: list[_Chunk] = []
         kept = 0
         for region in range(len(materials)):
@@ -91,29 +90,31 @@ class InteriorRows:
         shear = 0.5 * (along_x[1::2] + along_y[0::2])
         return np.concatenate([displacement[0::2], displacement[1::2], along_x[0::2], along_y[1::2], shear])
 
-    def evaluate_boundary(self, displacement: Complex, traction: Complex, hoop_stress: Real) -> Values:
-        """Limits of the whole field at the points on the boundary, zero elsewhere; arguments (f,) on all faces.
 
-        Displacement, traction and hoop stress are interpolated on the element: the representation would divide by the
-        distance what the elements' polynomials differ by at their common ends.
-        """
-        mesh = self._mesh
-        moved, stress = np.zeros(len(self._points), dtype=complex), np.zeros((len(self._points), 3))
-        at = np.flatnonzero(self._location.element >= 0)
-        element, s = self._location.element[at], self._location.s[at, None]
-        local = self._local[element]
-        nodes = element[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
-        shapes = interpolate(local, s)[:, 0]
-        moved[at] = (shapes * displacement[nodes]).sum(axis=1)
-        tips = np.flatnonzero(mesh.tip[element])
-        if len(tips):
-            rooted = interpolate_tips(mesh.tip[element[tips]], local[tips], s[tips])[:, 0]
-            first, opposite = split_faces(mesh, displacement)
-            half_jump = 0.5 * (first - opposite)[nodes[tips]]
-            moved[at[tips]] += ((rooted - shapes[tips]) * half_jump).sum(axis=1)
-        carried, along = (shapes * traction[nodes]).sum(axis=1), (shapes * hoop_stress[nodes]).sum(axis=1)
-        stress[at] = _turn_stress(_find_normals(mesh, element, self._points[at]), carried, along)
-        return Values(moved, stress)
+def evaluate_limits(
+    mesh: Mesh, points: Complex, location: Location, displacement: Complex, traction: Complex, hoop_stress: Real
+) -> Values:
+    """Limits of the whole field at the points on the boundary, zero elsewhere; arguments (f,) on all faces.
+
+    Displacement, traction and hoop stress are interpolated on the element: the representation would divide by the
+    distance what the elements' polynomials differ by at their common ends.
+    """
+    moved, stress = np.zeros(len(points), dtype=complex), np.zeros((len(points), 3))
+    at = np.flatnonzero(location.element >= 0)
+    element, s = location.element[at], location.s[at, None]
+    local = locate_nodes(mesh)[element]
+    nodes = element[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
+    shapes = interpolate(local, s)[:, 0]
+    moved[at] = (shapes * displacement[nodes]).sum(axis=1)
+    tips = np.flatnonzero(mesh.tip[element])
+    if len(tips):
+        rooted = interpolate_tips(mesh.tip[element[tips]], local[tips], s[tips])[:, 0]
+        first, opposite = split_faces(mesh, displacement)
+        half_jump = 0.5 * (first - opposite)[nodes[tips]]
+        moved[at[tips]] += ((rooted - shapes[tips]) * half_jump).sum(axis=1)
+    carried, along = (shapes * traction[nodes]).sum(axis=1), (shapes * hoop_stress[nodes]).sum(axis=1)
+    stress[at] = _turn_stress(_find_normals(mesh, element, points[at]), carried, along)
+    return Values(moved, stress)
 
 
 def _evaluate(sources: Sources, points: Complex, normal: complex | None) -> Real:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
-from pbem.bem.hierarchical import RATIO, Sorted, list_columns, log_lengths
+from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_columns, log_lengths
+from pbem.bem.interior import Values
 from pbem.bem.leaf import Medium, target_matrix
+from pbem.bem.location import Location
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.tree import Interactions, build_forest, find_interactions
 
@@ -105,3 +107,31 @@ def place_points(
         log_lengths(parts, forest), met.far_target, met.far_source,
     )  # fmt: skip
     return PointRows(parts, sources, targets, met, point, on, local)
+
+
+class TreeRows:
+    """The elastic field at points inside regions, like pbem.bem.interior.InteriorRows, by cluster trees."""
+
+    def __init__(self, operator: HierarchicalOperator, points: Complex, location: Location) -> None:
+        self._mesh = operator.parts.mesh
+        self._outside = location.region < 0
+        self._inside = np.flatnonzero((location.region >= 0) & (location.element < 0))
+        nowhere = np.full(len(self._inside), -1)
+        self._rows = place_points(
+            operator.parts, operator.sources, points[self._inside], location.region[self._inside], nowhere,
+            np.zeros(len(nowhere)),
+        )  # fmt: skip
+
+    def evaluate(self, displacement: Complex, traction: Complex) -> Values:
+        """What the elastic field has inside; its displacement and traction (nodes,) on the boundary, jumps on cracks.
+
+        Zero at points on the boundary, NaN outside. All ranks call this together.
+        """
+        traction = np.where(self._mesh.node_crack, 0.0, traction)  # on a crack those of both faces cancel
+        field = np.concatenate([displacement, traction])
+        v = np.stack([field.real, field.imag], axis=1).ravel()
+        moved = np.where(self._outside, np.nan, 0.0) + 0j
+        stress = np.where(self._outside, np.nan, 0.0)[:, None] * np.ones(3)
+        moved[self._inside] = self._rows.displacement(v)
+        stress[self._inside] = self._rows.stress(v)
+        return Values(moved, stress)

@@ -7,6 +7,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import (
+    HierarchicalOperator,
     anchor_rows,
     assemble_hierarchical,
     choose_terms,
@@ -14,7 +15,7 @@ from pbem.bem.hierarchical import (
     sort_elements,
 )
 from pbem.bem.operator import add_anchor, assemble_displacement_rows, assemble_rows, scale_equations
-from pbem.bem.pointwise import place_points
+from pbem.bem.pointwise import PointRows, place_points
 from pbem.contact.anchor import anchor_motions
 from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import collect_laws
@@ -24,6 +25,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.support import find_free_motions
 from pbem.parallel import add_up, share_nodes
+from pbem.solve.accuracy import measure_product_error
 from pbem.solve.groups import divide_model, list_nodes, share_groups, surround_groups
 from pbem.solve.problem import Problem
 
@@ -32,6 +34,8 @@ Integer = NDArray[np.int64]
 
 # With more unknowns in one region than this the hierarchical operator is the faster one.
 DENSE_UNKNOWNS = 10_000
+# Beyond this rounding in the expansions outweighs what further terms bring.
+MOST_TERMS = 60
 
 
 def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
@@ -90,22 +94,14 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
     groups = divide_model(mesh)
     first, last = share_groups(mesh, groups, comm.rank, comm.size)
     elements = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups[first:last]]))
-    parts = sort_elements(mesh, materials, choose_terms(model.solver.tolerance))
-    leaves = parts.forest.leaves
-    cuts = np.linspace(0, len(leaves), comm.size + 1).astype(int)
-    own_leaves = leaves[cuts[comm.rank] : cuts[comm.rank + 1]]
-    sources = prepare_sources(parts, needed, own_leaves, lambda part: add_up(comm, part))
-    operator = assemble_hierarchical(parts, sources, list_nodes(mesh, elements), needed, model.size)
+    operator, error = _reach_tolerance(comm, model, mesh, needed, list_nodes(mesh, elements))
     anchors = anchor_motions(mesh, find_free_motions(model))
     for anchor in anchors:
         operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
     cracks = np.flatnonzero(mesh.node_crack)
     shares = np.linspace(0, len(cracks), comm.size + 1).astype(int)
     own_cracks = cracks[shares[comm.rank] : shares[comm.rank + 1]]
-    points = place_points(
-        parts, sources, mesh.position[own_cracks], mesh.node_region[own_cracks], mesh.node_element[own_cracks],
-        mesh.node_local[own_cracks],
-    ) if len(cracks) else None
+    points = place_nodes_on_cracks(operator, own_cracks) if len(cracks) else None
     modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
     return Problem(
         comm=comm,
@@ -122,6 +118,44 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
         anchors=anchors,
         crack_points=points,
         groups=tuple(surround_groups(mesh, groups, first, last)),
+        notes=(_describe_operator(operator, len(groups), model.solver.tolerance, error),),
+    )
+
+
+def place_nodes_on_cracks(operator: HierarchicalOperator, nodes: Integer) -> PointRows:
+    """Rows of the displacement at nodes (k,) on cracks: there the mean of both faces."""
+    mesh = operator.parts.mesh
+    return place_points(
+        operator.parts, operator.sources, mesh.position[nodes], mesh.node_region[nodes], mesh.node_element[nodes],
+        mesh.node_local[nodes],
+    )  # fmt: skip
+
+
+def _reach_tolerance(
+    comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: NDArray[np.bool_], nodes: Integer
+) -> tuple[HierarchicalOperator, float]:
+    """The operator of the given nodes with enough terms for the tolerance, and its measured relative error."""
+    tolerance = model.solver.tolerance
+    materials = [region.material for region in model.regions]
+    terms = choose_terms(tolerance)
+    while True:
+        parts = sort_elements(mesh, materials, terms)
+        leaves = parts.forest.leaves
+        cuts = np.linspace(0, len(leaves), comm.size + 1).astype(int)
+        own = leaves[cuts[comm.rank] : cuts[comm.rank + 1]]
+        sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
+        operator = assemble_hierarchical(parts, sources, nodes, needed, model.size)
+        error = measure_product_error(comm, operator, model.size)
+        if error <= tolerance or terms >= MOST_TERMS:
+            return operator, error
+        terms = min(MOST_TERMS, max(terms + 2, choose_terms(tolerance**2 / error)))
+
+
+def _describe_operator(operator: HierarchicalOperator, groups: int, tolerance: float, error: float) -> str:
+    forest = operator.parts.forest
+    return (
+        f"hierarchical operator: {len(forest.leaves)} clusters of elements, {operator.parts.terms} terms, {groups} "
+        f"groups in the preconditioner; relative error of its products {error:.1e} (asked: {tolerance:.0e})"
     )
 
 

@@ -6,9 +6,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.hoop import evaluate_hoop_stress
-from pbem.bem.interior import InteriorRows, Values
+from pbem.bem.interior import InteriorRows, Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
+from pbem.bem.operator import RowOperator
+from pbem.bem.pointwise import TreeRows
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -31,12 +34,17 @@ class InteriorField:
         shares = np.linspace(0, len(points), comm.size + 1).astype(int)
         own = points[shares[comm.rank] : shares[comm.rank + 1]]
         self._model, self._mesh, self._comm = model, mesh, comm
+        self._rows: InteriorRows | TreeRows | None = None
         self._points = own
         self._location = locate_points(mesh, [region.infinite for region in model.regions], own)
-        self._rows = InteriorRows(mesh, [region.material for region in model.regions], own, self._location)
         parts = [self._location.region, self._location.element, self._location.s]
         region, element, s = (gather_parts(comm, np.asarray(part, dtype=float)) for part in parts)
         self.location = Location(region.astype(np.int64), element.astype(np.int64), s)
+
+    def prepare(self, operator: RowOperator | HierarchicalOperator) -> None:
+        """Evaluate by the trees of a hierarchical operator, if it is one."""
+        if isinstance(operator, HierarchicalOperator):
+            self._rows = TreeRows(operator, self._points, self._location)
 
     def evaluate(self, step: Step) -> Interior:
         """Displacement and stress at all points after a step, on every rank; all ranks call this together.
@@ -58,9 +66,14 @@ class InteriorField:
             for background in (balanced, far):
                 moved[inside] += background.displacement(self._points[inside])
                 stress[inside] += background.stress(self._points[inside])
+        if self._rows is None:
+            materials = [region.material for region in self._model.regions]
+            self._rows = InteriorRows(mesh, materials, self._points, self._location)
         elastic = self._rows.evaluate(displacement, traction)
         hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
-        limit = self._rows.evaluate_boundary(step.displacement, step.traction, hoop_stress)
+        limit = evaluate_limits(
+            mesh, self._points, self._location, step.displacement, step.traction, hoop_stress
+        )
         return self._gather(Values(moved + elastic.displacement + limit.displacement,
                                    stress + elastic.stress + limit.stress))
 

@@ -20,9 +20,10 @@ Complex = NDArray[np.complex128]
 ONE_GROUP = 1500
 # Elements of a group at most; both sides of an interface count.
 GROUP_ELEMENTS = 48
-# Groups around a group are taken until they have so many unknowns together, or so many times those of the group.
-NEIGHBOUR_UNKNOWNS = 400
-NEIGHBOUR_SHARE = 4.0
+# Groups around a group are taken until they have so many unknowns together, or so many times those of the group;
+# those that have an end point in common with it are always taken.
+NEIGHBOUR_UNKNOWNS = 100
+NEIGHBOUR_SHARE = 0.5
 MOST_NEIGHBOURS = 24
 
 
@@ -69,6 +70,7 @@ def surround_groups(mesh: Mesh, groups: list[Integer], first: int, last: int) ->
     size = np.array([len(group) for group in groups]) * 2 * (mesh.order + 1)
     tree = cKDTree(np.column_stack([center.real, center.imag]))
     count = min(4 * MOST_NEIGHBOURS, len(groups))
+    ends = [set(np.concatenate([mesh.start[group], mesh.end[group]]).tolist()) for group in groups]
     result = []
     for number in range(first, last):
         _, near = tree.query([center[number].real, center[number].imag], k=count)
@@ -77,7 +79,9 @@ def surround_groups(mesh: Mesh, groups: list[Integer], first: int, last: int) ->
         gap = np.abs(center[near] - center[number]) - radius[near] - radius[number]
         near = near[np.lexsort((near, gap))][:MOST_NEIGHBOURS]
         room = max(NEIGHBOUR_UNKNOWNS, NEIGHBOUR_SHARE * size[number])
-        taken = near[np.cumsum(size[near]) <= room]
+        touching = np.array([bool(ends[number] & ends[k]) for k in near], dtype=bool)
+        near = np.concatenate([near[touching], near[~touching]])
+        taken = near[(np.cumsum(size[near]) <= room) | (np.arange(len(near)) < touching.sum())]
         around = np.sort(np.concatenate([groups[number], *(groups[k] for k in taken)]))
         result.append(Group(groups[number], around))
     return result

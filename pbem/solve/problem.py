@@ -38,7 +38,7 @@ class Problem:
     crack_rows, crack_nodes: this rank's share of the rows that recover the mean displacement of crack faces; of the
     hierarchical operator crack_points take their place.
     block_columns: for every block of a dense operator, the unknowns on which its region depends.
-    groups: this rank's groups of elements, of the hierarchical operator.
+    groups: this rank's groups of elements, of the hierarchical operator. notes: what the user should know of it.
     """
 
     comm: MPI.Intracomm
@@ -55,6 +55,7 @@ class Problem:
     anchors: tuple[Anchor, ...]
     crack_points: PointRows | None = None
     groups: tuple[Group, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def unknowns(self) -> int:

@@ -19,6 +19,8 @@ Real = NDArray[np.float64]
 
 # Most iterations of GMRES for one linear system, without restart.
 MOST_ITERATIONS = 300
+# GMRES is started at most so often for one linear system.
+MOST_ATTEMPTS = 4
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
 
@@ -68,19 +70,25 @@ class KrylovTangent:
             return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
         self._left.setArray(self._guess(-forced))
         self._right.setArray(-forced)
-        self._solver.solve(self._right, self._left)
-        self.iterations.append(int(self._solver.getIterationNumber()))
-        unknowns = self.gather(np.array(self._left.getArray()))
-        v = constraints.evaluate(unknowns)
-        residual = problem.measure(problem.apply(v, load)) / scale
-        if not residual <= problem.model.solver.newton_tolerance:
-            raise ConvergenceError(
-                "linear solver",
-                f"GMRES reached a relative residual of {residual:.1e} in {self.iterations[-1]} iterations (asked: "
-                f"{problem.model.solver.newton_tolerance:.1e})",
-            )
-        self.solution = unknowns
-        return Solved(unknowns, v, residual)
+        tolerance, residual = problem.model.solver.newton_tolerance, np.inf
+        for _ in range(MOST_ATTEMPTS):
+            before = residual
+            self._solver.solve(self._right, self._left)
+            self.iterations.append(int(self._solver.getIterationNumber()))
+            unknowns = self.gather(np.array(self._left.getArray()))
+            v = constraints.evaluate(unknowns)
+            residual = problem.measure(problem.apply(v, load)) / scale
+            if residual <= tolerance:
+                self.solution = unknowns
+                return Solved(unknowns, v, residual)
+            # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
+            if self.iterations[-1] == MOST_ITERATIONS or not residual < 0.1 * before:
+                break
+        raise ConvergenceError(
+            "linear solver",
+            f"GMRES reached a relative residual of {residual:.1e} in {self.iterations[-1]} iterations (asked: "
+            f"{tolerance:.1e})",
+        )
 
     def _guess(self, right: Real) -> Real:
         """This rank's part of that multiple of the last solution whose product is nearest to the right-hand side.

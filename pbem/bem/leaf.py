@@ -88,7 +88,7 @@ def _place_points(sources: Sources, terms: int) -> tuple[Complex, Complex, Real]
 
     At a tip the points are those of the square root of the distance, in which its shapes are polynomials.
     """
-    s, weight = _gauss_points(terms + 3)
+    s, weight = _gauss_points(terms + 4)
     order = len(sources.local) - 1
     on_crack = sources.local if sources.crack_local is None else sources.crack_local
     root, half = 0.5 * (1 + s), 0.5 * weight  # t = root^2 from the tip
@@ -121,7 +121,7 @@ def trace_elements(sources: Sources, local: Real) -> tuple[Complex, Complex]:
 
 def _traction_density(sources: Sources, terms: int) -> Real:
     """Traction at the integration points (e, q) by nodal values; none on cracks."""
-    s, _ = _gauss_points(terms + 3)
+    s, _ = _gauss_points(terms + 4)
     local = sources.local
     shapes = s[:, None] ** np.arange(len(local)) @ interpolate_shapes(local)
     tangent = np.zeros(sources.count) if sources.sweep is None else np.tan(0.25 * sources.sweep)

@@ -1,10 +1,10 @@
 """Kernels of order 2 against what they must cost at the least, in one run on one thread.
 
-The reference, per pair of collocation point and element, is one logarithm and one arc tangent and writing the same bytes
-into the same memory, written before. The two functions are measured three times: in a loop of C with the flags of
-setup.py, in one with -O2 alone (no vector functions), and by NumPy. Points lie on the elements of a circle-like polygon,
-circles are arcs, cracks have no traction columns; a field's cracks have eight elements, of which two are tips. Rows go
-to memory as a whole and, as when an operator is assembled, again and again into the same piece of the cache.
+The reference, per pair of collocation point and element, is one logarithm and one arc tangent and writing the same
+bytes into the same memory, written before. The two functions are measured three times: in a loop of C with the flags of
+setup.py, in one with -O2 alone (no vector functions), and by NumPy. Points lie on the elements of a circle-like
+polygon, circles are arcs, cracks have no traction columns; a field's cracks have eight elements, of which two are tips.
+Rows go to memory as a whole and, as when an operator is assembled, again and again into the same piece of the cache.
 
 usage: OMP_NUM_THREADS=1 .venv/bin/python scripts/bench_kernels.py [--elements N] [--repeat N]
 """
@@ -218,8 +218,8 @@ def print_small_call(repeat: int) -> None:
     out = (np.zeros((200, 300)), np.zeros((200, 300)))
     seconds = time_best(lambda: evaluate_rows(polygon, point, on, None, True, None, out), 100 * repeat)
     one = time_best(lambda: evaluate_rows(polygon, point[:1], on[:1], None, True, None, out), 100 * repeat)
-    print(f"\n100 points x 50 elements, both kernels: {seconds * 1e6:.0f} us a call ({seconds * 2e5:.1f} ns per pair); ", end="")
-    print(f"1 x 50: {one * 1e6:.1f} us")
+    print(f"\nboth kernels, 100 points x 50 elements: {seconds * 1e6:.0f} us a call, {seconds * 2e5:.1f} ns per pair")
+    print(f"1 point x 50 elements: {one * 1e6:.1f} us a call")
 
 
 def main() -> None:

@@ -51,22 +51,21 @@ static int check_lengths(const Py_buffer *b, Py_ssize_t n, Py_ssize_t m, Py_ssiz
 /* Returns 0 if memory is short. */
 static int fill_checked_rows(const Rows *r)
 {
-    Py_ssize_t count;
     Kind kinds[FAMILIES];
-    Arc *arcs = prepare_arcs(r, &count);
-    NearPairs near = {.count = 0};
-    int enough = !count || arcs;
+    Workspace *work = malloc(sizeof(Workspace));
+    int enough = work != NULL;
     for (int family = 0; family < FAMILIES; family++) {
         kinds[family] = prepare_kind(r, family);
         enough = enough && (!kinds[family].groups || (kinds[family].frame && kinds[family].element));
     }
     if (enough) {
+        work->near.count = 0;
         Py_BEGIN_ALLOW_THREADS
-        fill_rows(r, arcs, kinds, &near);
+        fill_rows(r, kinds, work);
         Py_END_ALLOW_THREADS
     }
-    free(arcs);
     for (int family = 0; family < FAMILIES; family++) release_kind(&kinds[family]);
+    free(work);
     return enough;
 }
 
@@ -122,5 +121,6 @@ static struct PyModuleDef module = {
 PyMODINIT_FUNC PyInit__kernels(void)
 {
     prepare_series();
+    prepare_gauss();
     return PyModule_Create(&module);
 }

@@ -1,4 +1,4 @@
-/* Integrals over a circular arc, in closed form near it and by Gauss points away from it.
+/* Integrals over a circular arc, in closed form; away from it far_arcs.h takes Gauss points.
  *
  * With the centre as origin, an arc of half-angle theta about the direction a is the image of s in [-1, 1] under
  *
@@ -19,9 +19,6 @@
 #define PBEM_ARCS_H
 #include "moments.h"
 
-#define ARC_POINTS 16
-#define ARC_PANELS 8 /* for half a circle, with a tip */
-
 typedef struct {
     cplx c[MAX_SHAPES], d[MAX_SHAPES], q[MAX_SHAPES], dq[MAX_SHAPES];
     cplx s[MAX_SHAPES], x[MAX_SHAPES], y[MAX_SHAPES];
@@ -35,21 +32,8 @@ typedef struct {
     cplx infinity, origin;       /* the poles -i/q and i/q */
     Moments at_infinity, at_origin;
     double node_weight[MAX_SHAPES]; /* by which nodal tractions become coefficients: 1/(1 + q^2 s^2) */
-    int points;                     /* Gauss points; dzeta with weight, power: the densities there */
-    cplx zeta[ARC_PANELS * ARC_POINTS], dzeta[ARC_PANELS * ARC_POINTS];
-    double weight[ARC_PANELS * ARC_POINTS], power[MAX_SHAPES][ARC_PANELS * ARC_POINTS];
 } Arc;
 
-static const double GAUSS_NODE[ARC_POINTS / 2] = {
-    0.0950125098376374402, 0.2816035507792589133, 0.4580167776572273863, 0.6178762444026437484,
-    0.7554044083550030339, 0.8656312023878317438, 0.9445750230732325761, 0.9894009349916499326};
-static const double GAUSS_WEIGHT[ARC_POINTS / 2] = {
-    0.1894506104550684963, 0.1826034150449235889, 0.1691565193950025382, 0.1495959888165767321,
-    0.1246289712555338720, 0.0951585116824927848, 0.0622535239386478929, 0.0271524594117540949};
-
-/* Distance from the middle of the arc, in chords of half the arc, beyond which 16 Gauss points a panel are exact to
- * rounding. They are used near the centre and opposite to the arc as well, where the closed form has its poles. */
-static const double ARC_FAR = 2.0, ARC_PANEL = 0.8, ARC_CENTER = 1.0 / 3;
 static const double ARC_LARGEST = 3.1416; /* sweep of an element, radians: a half circle and its rounding */
 
 static void evaluate_reference(const Arc *arc, cplx s, int on, Moments *m)
@@ -58,25 +42,6 @@ static void evaluate_reference(const Arc *arc, cplx s, int on, Moments *m)
         evaluate_tip_moments(s, on, arc->order, arc->family, m);
     else
         evaluate_moments(s, on, arc->order, m);
-}
-
-/* Gauss points on panels of the arc; with a tip, panels of the root of the distance from it: densities are polynomials. */
-static void place_points(Arc *arc, double sweep)
-{
-    const int tip = is_tip(arc->family), panels = (tip ? 2 : 1) * (int)ceil(fabs(sweep) / ARC_PANEL);
-    arc->points = panels * ARC_POINTS;
-    for (int g = 0; g < arc->points; g++) {
-        const int panel = g / ARC_POINTS, i = g % ARC_POINTS / 2;
-        const double x = (panel + 0.5 * (1 + (g % 2 ? 1 : -1) * GAUSS_NODE[i])) / panels; /* in [0, 1] */
-        const double s = !tip ? 2 * x - 1 : arc->family == TIP_AT_START ? 2 * x * x - 1 : 1 - 2 * x * x;
-        const double ds = GAUSS_WEIGHT[i] / panels * (tip ? 2 * x : 1);
-        const cplx below = 1 - I * arc->q * s;
-        arc->weight[g] = ds;
-        arc->zeta[g] = arc->apex * (1 + I * arc->q * s) / below;
-        arc->dzeta[g] = arc->apex * 2 * I * arc->q / (below * below) * ds;
-        arc->power[0][g] = tip ? x : 1;
-        for (int k = 1; k <= arc->order; k++) arc->power[k][g] = arc->power[k - 1][g] * (tip ? x * x : s);
-    }
 }
 
 static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int order, int family,
@@ -95,35 +60,6 @@ static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int ord
     evaluate_reference(arc, arc->infinity, 0, &arc->at_infinity);
     evaluate_reference(arc, arc->origin, 0, &arc->at_origin);
     for (int k = 0; k <= order; k++) arc->node_weight[k] = 1 / (1 + arc->q * arc->q * local[k] * local[k]);
-    place_points(arc, sweep);
-}
-
-static void sum_far_arc(const Arc *arc, cplx z, ArcMoments *m)
-{
-    const double R2 = arc->radius * arc->radius, J = arc->jacobian;
-    for (int k = 0; k <= arc->order; k++) {
-        m->c[k] = m->d[k] = m->q[k] = m->dq[k] = m->s[k] = m->x[k] = m->y[k] = 0;
-        m->n[k] = 0;
-    }
-    for (int g = 0; g < arc->points; g++) {
-        const cplx zeta = arc->zeta[g], inverse = 1 / (zeta - z), across = conj(zeta - z);
-        const cplx c = arc->dzeta[g] * inverse, d = c * inverse;
-        const cplx turned = -R2 / (zeta * zeta); /* d conj(zeta) = turned dzeta */
-        const cplx q = across * d - turned * c, dq = 2 * across * d * inverse - turned * d;
-        const double ds = J * arc->weight[g], n = ds * log(cabs(zeta - z));
-        const cplx x = ds * inverse, s = x * across, y = s * inverse;
-        for (int k = 0; k <= arc->order; k++) {
-            const double p = arc->power[k][g];
-            m->c[k] += p * c;
-            m->d[k] += p * d;
-            m->q[k] += p * q;
-            m->dq[k] += p * dq;
-            m->n[k] += p * n;
-            m->s[k] += p * s;
-            m->x[k] += p * x;
-            m->y[k] += p * y;
-        }
-    }
 }
 
 static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMoments *m)
@@ -164,20 +100,11 @@ static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMomen
     }
 }
 
-static inline double square(cplx z) { return creal(z) * creal(z) + cimag(z) * cimag(z); }
-
 /* s_on: the point's coordinate if it lies on the arc. */
 static void evaluate_arc_moments(const Arc *arc, cplx point, int on, double s_on, ArcMoments *m)
 {
-    const cplx z = point - arc->center;
     for (int k = 0; k <= arc->order; k++) m->l[k] = arc->jacobian * ((k % 2) ? 0.0 : 2.0 / (k + 1));
-    const double R2 = arc->radius * arc->radius;
-    const int far = square(z - arc->apex) > ARC_FAR * ARC_FAR * arc->reach * arc->reach ||
-                    square(z) < ARC_CENTER * ARC_CENTER * R2 || square(z + arc->apex) < R2;
-    if (far && !on)
-        sum_far_arc(arc, z, m);
-    else
-        close_near_arc(arc, z, on, s_on, m);
+    close_near_arc(arc, point - arc->center, on, s_on, m);
 }
 
 #endif

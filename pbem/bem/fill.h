@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "arcs.h"
+#include "far_arcs.h"
 #include "kinds.h"
 #include "moments.h"
 
@@ -109,29 +110,54 @@ static void evaluate_arc(const Rows *r, const Arc *arc, Py_ssize_t i, Py_ssize_t
         combine_arc_displacement(r, &m, tractions, out);
 }
 
-/* An arc or a crack tip: what cannot be done in batches. */
-static void fill_element(const Rows *r, const Arc *arcs, Py_ssize_t i, Py_ssize_t j)
+/* A point near a crack tip. */
+static void fill_near_tip(const Rows *r, Py_ssize_t i, Py_ssize_t j)
 {
-    const int shapes = r->order + 1, family = r->family[j], is_arc = r->sweep[j] != 0;
-    const int tractions = r->traction && family == BOUNDARY;
-    const Py_ssize_t width = 2 * r->elements * shapes, at = 2 * i * width + 2 * j * shapes;
-    const double *shape = r->shape + family * shapes * shapes;
+    const int shapes = r->order + 1;
     Factors f;
-    if (is_arc)
-        evaluate_arc(r, &arcs[j], i, j, tractions, &f);
-    else
-        evaluate_tip(r, i, j, &f);
-    put_shapes(r->displacement + at, width, shapes, shape, NULL, f.Pu, f.Qu);
-    if (tractions) put_shapes(r->traction + at, width, shapes, shape, is_arc ? arcs[j].node_weight : NULL, f.Pt, f.Qt);
+    evaluate_tip(r, i, j, &f);
+    put_shapes(locate_block(r, r->displacement, i, j), 2 * r->elements * shapes, shapes,
+               r->shape + r->family[j] * shapes * shapes, NULL, f.Pu, f.Qu);
 }
 
-/* Points that are done with all elements of a tile before the next ones: their rows stay in the cache. */
-#define MOST_POINTS 128
+static void fill_near_arc(const Rows *r, const Arc *arc, Py_ssize_t i, Py_ssize_t j)
+{
+    const int shapes = r->order + 1, tractions = r->traction && arc->family == BOUNDARY;
+    const Py_ssize_t width = 2 * r->elements * shapes;
+    const double *shape = r->shape + arc->family * shapes * shapes;
+    Factors f;
+    evaluate_arc(r, arc, i, j, tractions, &f);
+    put_shapes(locate_block(r, r->displacement, i, j), width, shapes, shape, NULL, f.Pu, f.Qu);
+    if (tractions) put_shapes(locate_block(r, r->traction, i, j), width, shapes, shape, arc->node_weight, f.Pt, f.Qt);
+}
 
-static void fill_near_tip(const Rows *r, Py_ssize_t i, Py_ssize_t j) { fill_element(r, NULL, i, j); }
+/* Room for the work on one element after the other. */
+typedef struct {
+    NearPairs near;
+    SortedPoints sorted;
+    Arc arc;
+    FarArc far;
+} Workspace;
 
-/* arcs: one for every element, prepared where the element is an arc. */
-static void fill_rows(const Rows *r, const Arc *arcs, const Kind *kinds, NearPairs *near)
+/* All points against the arc j. */
+static void fill_arc(const Rows *r, Py_ssize_t j, Workspace *work)
+{
+    SortedPoints *sorted = &work->sorted;
+    const double *shape = r->shape + r->family[j] * (r->order + 1) * (r->order + 1);
+    prepare_arc(&work->arc, r->start[j], r->center[j], r->sweep[j], r->order, r->family[j], r->local);
+    prepare_far_arc(&work->far, &work->arc, r->sweep[j]);
+    for (Py_ssize_t first = 0; first < r->points; first += MOST_SORTED) {
+        const Py_ssize_t last = first + MOST_SORTED < r->points ? first + MOST_SORTED : r->points;
+        sort_points(r, &work->far, j, first, last, sorted);
+        for (int level = 0; level < LEVELS; level++)
+            if (sorted->count[level])
+                fill_listed(r, use_rule(&work->far, &work->arc, shape, level), j, sorted->point[level],
+                            sorted->count[level]);
+        for (int p = 0; p < sorted->count[LEVELS]; p++) fill_near_arc(r, &work->arc, sorted->point[LEVELS][p], j);
+    }
+}
+
+static void fill_rows(const Rows *r, const Kind *kinds, Workspace *work)
 {
     for (int k = 0; k < FAMILIES; k++) {
         const Kind *kind = &kinds[k];
@@ -140,24 +166,11 @@ static void fill_rows(const Rows *r, const Arc *arcs, const Kind *kinds, NearPai
             if (is_tip(k))
                 for (Py_ssize_t group = first; group < last; group++) fill_tips(r, kind, group, fill_near_tip);
             else
-                fill_kind(r, kind, first, last, near);
+                fill_kind(r, kind, first, last, &work->near);
         }
     }
     for (Py_ssize_t j = 0; j < r->elements; j++)
-        if (r->sweep[j] != 0)
-            for (Py_ssize_t i = 0; i < r->points; i++) fill_element(r, arcs, i, j);
-}
-
-/* Prepared arcs, one slot an element; NULL if there are none (*count is 0) or memory is short. */
-static Arc *prepare_arcs(const Rows *r, Py_ssize_t *count)
-{
-    *count = 0;
-    for (Py_ssize_t j = 0; j < r->elements; j++) *count += r->sweep[j] != 0;
-    Arc *arcs = *count ? malloc(r->elements * sizeof(Arc)) : NULL;
-    for (Py_ssize_t j = 0; arcs && j < r->elements; j++)
-        if (r->sweep[j] != 0)
-            prepare_arc(&arcs[j], r->start[j], r->center[j], r->sweep[j], r->order, r->family[j], r->local);
-    return arcs;
+        if (r->sweep[j] != 0) fill_arc(r, j, work);
 }
 
 #endif

@@ -229,6 +229,7 @@ static void fill_tips(const Rows *r, const Kind *kind, Py_ssize_t group,
 /* The straight elements of a family; frame NULL if there are none or memory is short. */
 static Kind prepare_kind(const Rows *r, int family)
 {
+    const int with_logarithm = r->traction && !r->normal;
     const int shapes = r->order + 1;
     Kind kind = {.family = family, .factor = {.kappa = r->kappa, .shear_modulus = r->shear_modulus,
                                               .log_length = r->log_length}};
@@ -245,21 +246,29 @@ static Kind prepare_kind(const Rows *r, int family)
     Py_ssize_t at = 0;
     for (Py_ssize_t j = 0; j < r->elements; j++) {
         if (r->sweep[j] != 0 || r->family[j] != family) continue;
-        const cplx half = 0.5 * (r->end[j] - r->start[j]), middle = 0.5 * (r->end[j] + r->start[j]);
-        const double h = cabs(half);
         do {
             Frame *f = &kind.frame[at / LANES];
             const int lane = at % LANES;
-            f->mx[lane] = creal(middle);
-            f->my[lane] = cimag(middle);
-            f->ex[lane] = creal(half) / h;
-            f->ey[lane] = cimag(half) / h;
-            f->h[lane] = h;
-            f->inverse_h[lane] = 1 / h;
-            f->log_h[lane] = log(h);
+            f->mx[lane] = 0.5 * (creal(r->end[j]) + creal(r->start[j]));
+            f->my[lane] = 0.5 * (cimag(r->end[j]) + cimag(r->start[j]));
+            f->ex[lane] = 0.5 * (creal(r->end[j]) - creal(r->start[j]));
+            f->ey[lane] = 0.5 * (cimag(r->end[j]) - cimag(r->start[j]));
             kind.element[at / LANES][lane] = j;
             at++;
         } while (at >= count && at % LANES);
+    }
+    for (Py_ssize_t group = 0; group < kind.groups; group++) {
+        Frame *f = &kind.frame[group];
+        const Lanes square = f->ex * f->ex + f->ey * f->ey;
+        for (int lane = 0; lane < LANES; lane++) f->h[lane] = sqrt(square[lane]);
+        f->inverse_h = 1 / f->h;
+        f->ex *= f->inverse_h;
+        f->ey *= f->inverse_h;
+        if (with_logarithm && family == BOUNDARY) {
+            Lanes both[FUNCTION_BATCH / LANES] = {square, square};
+            take_batch_of_logarithms((double *)both);
+            f->log_h = 0.5 * both[0];
+        }
     }
     return kind;
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +44,39 @@ class Sources:
     def count(self) -> int:
         return len(self.start)
 
-    def select(self, numbers: Integer) -> Sources:
-        """The elements of the given numbers (k,), in that order."""
-        return replace(
-            self, start=self.start[numbers], end=self.end[numbers], family=self.family[numbers],
-            center=None if self.center is None else self.center[numbers],
-            sweep=None if self.sweep is None else self.sweep[numbers],
-        )  # fmt: skip
+    @cached_property
+    def shape(self) -> Real:
+        """Coefficients (4, p + 1, p + 1) of the shapes: family by power by node."""
+        on_crack = self.local if self.crack_local is None else self.crack_local
+        tips = tip_shapes(tuple(on_crack))
+        return np.stack([interpolate_shapes(self.local), *tips, interpolate_shapes(on_crack)])
+
+    @cached_property
+    def elements(self) -> tuple[Complex, Complex, Complex, Real, NDArray[np.int8], Real]:
+        """start, end, center, sweep, family, local as the kernels read them: contiguous, none missing."""
+        center = np.zeros(self.count, dtype=complex) if self.center is None else self.center
+        sweep = np.zeros(self.count) if self.sweep is None else self.sweep
+        return (
+            np.ascontiguousarray(self.start, dtype=complex),
+            np.ascontiguousarray(self.end, dtype=complex),
+            np.ascontiguousarray(center, dtype=complex),
+            np.ascontiguousarray(sweep, dtype=float),
+            np.ascontiguousarray(self.family, dtype=np.int8),
+            np.ascontiguousarray(self.local, dtype=float),
+        )
+
+    def select(self, indices: Integer) -> Sources:
+        """Some of the elements, in the given order, e.g. a block of a hierarchical operator; in microseconds."""
+        selected = replace(
+            self,
+            start=self.start[indices],
+            end=self.end[indices],
+            family=self.family[indices],
+            center=None if self.center is None else self.center[indices],
+            sweep=None if self.sweep is None else self.sweep[indices],
+        )
+        vars(selected)["shape"] = self.shape  # the same nodes
+        return selected
 
 
 def evaluate_rows(
@@ -73,26 +100,17 @@ def evaluate_rows(
     q = tan(sweep/4); tractions are such polynomials times 1 + q^2 s^2.
     Source: Kolosov-Muskhelishvili potentials of the single and double layer; Cauchy integrals in closed form.
     """
-    on_crack = sources.local if sources.crack_local is None else sources.crack_local
-    shape = np.stack([interpolate_shapes(sources.local), *tip_shapes(tuple(on_crack)), interpolate_shapes(on_crack)])
     size = (2 * len(point), 2 * sources.count * len(sources.local))
     displacement, traction = (np.empty(size), np.zeros(size) if tractions else None) if out is None else (
         out[0][: size[0]], out[1][: size[0]] if tractions else None
     )  # fmt: skip
-    center = np.zeros(sources.count, dtype=complex) if sources.center is None else sources.center
-    sweep = np.zeros(sources.count) if sources.sweep is None else sources.sweep
     local = np.zeros(len(point)) if on_local is None else on_local
     _kernels.rows(
         np.ascontiguousarray(point, dtype=complex),
         np.ascontiguousarray(on, dtype=np.int64),
         np.ascontiguousarray(local, dtype=float),
-        np.ascontiguousarray(sources.start, dtype=complex),
-        np.ascontiguousarray(sources.end, dtype=complex),
-        np.ascontiguousarray(center, dtype=complex),
-        np.ascontiguousarray(sweep, dtype=float),
-        np.ascontiguousarray(sources.family, dtype=np.int8),
-        np.ascontiguousarray(sources.local),
-        shape,
+        *sources.elements,
+        sources.shape,
         sources.kappa, sources.shear_modulus, sources.length,
         displacement,
         None if normal is None else np.ascontiguousarray(normal, dtype=complex),

@@ -289,3 +289,33 @@ def test_without_tractions_the_rows_of_displacements_are_the_same(order: int) ->
         scale = np.abs(one).reshape(len(one), 100, -1).max(axis=2)
         assert np.all(np.abs(one - other).reshape(len(one), 100, -1).max(axis=2) <= 1e-13 * scale)
         assert without[1] is None
+
+
+@orders
+def test_selected_elements_keep_their_columns(order: int) -> None:
+    sources = make_many(order, 40)
+    chosen = np.array([31, 2, 3, 17, 8])
+    points, off = np.random.default_rng(3).normal(size=(6, 2)) @ [1, 1j], np.full(6, -1)
+    columns = (2 * (order + 1) * chosen[:, None] + np.arange(2 * (order + 1))).ravel()
+    for normal in (None, np.exp(1j * np.arange(6))):
+        whole, part = (evaluate_rows(one, points, off, normal) for one in (sources, sources.select(chosen)))
+        for all_columns, own in zip(whole, part, strict=True):
+            assert all_columns is not None and own is not None
+            scale = np.abs(own).max()
+            np.testing.assert_allclose(own, all_columns[:, columns], rtol=0, atol=1e-13 * scale)
+
+
+@orders
+def test_rows_do_not_depend_on_how_many_points_are_given_together(order: int) -> None:
+    # To the last digit: then neither do they depend on the number of ranks.
+    sources = make_many(order, 90)
+    points = np.concatenate([np.random.default_rng(4).normal(size=(300, 2)) @ [1, 1j], sources.start[:20] + 1e-3])
+    off, normals = np.full(len(points), -1), np.exp(1j * np.arange(len(points)))
+    for normal in (None, normals):
+        whole = evaluate_rows(sources, points, off, normal)
+        for begin, end in ((0, 1), (1, 8), (8, 301), (301, 320)):
+            own = slice(begin, end)
+            part = evaluate_rows(sources, points[own], off[own], None if normal is None else normal[own])
+            for all_rows, rows in zip(whole, part, strict=True):
+                assert all_rows is not None and rows is not None
+                np.testing.assert_array_equal(rows, all_rows[2 * begin : 2 * end])

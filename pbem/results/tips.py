@@ -49,8 +49,8 @@ class TipRules:
         factors = []
         for jump in (contact.opening - self.gap, -contact.slip):
             total = np.bincount(self.end, self.coefficient * jump[self.pair], minlength=len(self.is_tip))
-            total += 0.0  # no negative zeros
-            factors.append(np.where(self.is_tip, total, np.nan).reshape(-1, 2))
+            # No negative zeros.
+            factors.append(np.where(self.is_tip, total + 0.0, np.nan).reshape(-1, 2))
         return factors[0], factors[1]
 
 
@@ -89,7 +89,7 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
 
 
 def _read_from_elements(mesh: Mesh, tips: list[tuple[int, int, int, Integer]]) -> Terms:
-    """Terms of the ends with a tip element, or with one element alone: its number, the element, which end, its pairs."""
+    """Terms of ends with a tip element, or with one element alone; their numbers, elements, which ends, and pairs."""
     number, element, end = (np.array(column) for column in list(zip(*tips, strict=True))[:3])
     s = find_coordinates(mesh.start[element], mesh.end[element], mesh.sweep[element],
                          mesh.position.reshape(mesh.elements, -1)[element])

@@ -176,3 +176,11 @@ def second_face_nodes(mesh: Mesh) -> Integer:
     per_element = mesh.order + 1
     crack = np.flatnonzero(mesh.crack)
     return (crack[:, None] * per_element + np.arange(per_element)[::-1]).ravel()
+
+
+def sort_pairs(mesh: Mesh) -> dict[str, NDArray[np.int64]]:
+    """Per interface that has contact pairs, their indices into Mesh.pairs, by arc length."""
+    pairs = mesh.pairs
+    order = np.lexsort((pairs.arc_length, pairs.interface))
+    ends = np.searchsorted(pairs.interface[order], np.arange(len(mesh.interface_names) + 1))
+    return {name: order[ends[i]:ends[i + 1]] for i, name in enumerate(mesh.interface_names) if ends[i + 1] > ends[i]}

@@ -167,6 +167,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         notes=(*topology.notes, *grading, *_note_choices(case)),
         initial_stress=loading.initial_stress,
         contacts=loading.contacts,
+        groups=case.groups,
     )
 
 

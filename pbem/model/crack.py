@@ -9,9 +9,10 @@ import numpy as np
 
 from pbem.case import Case
 from pbem.errors import Fault
+from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve
 from pbem.model.intersection import inner_points, project
-from pbem.model.junction import Boxes, format_point
+from pbem.model.junction import format_point
 from pbem.model.loop import Loops, is_inside, loop_legs
 from pbem.model.model import Loop
 
@@ -70,32 +71,48 @@ def check_near_misses(
     faults = []
     tips = find_tips(curves, cracks)
     legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
-    boxes = Boxes([leg for _, leg in legs], NEAR_MISS * size)
-    for name, ends in tips.items():
-        for is_tip, point in zip(ends, (curves[name].start, curves[name].end), strict=True):
-            for number in boxes.around(point) if is_tip else []:
-                other, leg = legs[number]
-                distance = project(leg, point)[1]
-                if other != name and distance < NEAR_MISS * size:
-                    found = f"crack '{name}' ending at {format_point(point)}, {distance:.2g} off curve '{other}'"
-                    faults.append(case.fault(("curves", name), found, "an end on the curve, or clearly away from it"))
-                    break
+    boxes = Boxes.around_legs([leg for _, leg in legs], NEAR_MISS * size)
+    points = [
+        (name, point) for name, ends in tips.items()
+        for is_tip, point in zip(ends, (curves[name].start, curves[name].end), strict=True) if is_tip
+    ]
+    told = set()
+    at, numbers = boxes.find_around(np.array([point for _, point in points], dtype=complex))
+    for which, number in zip(at.tolist(), numbers.tolist(), strict=True):
+        (name, point), (other, leg) = points[which], legs[number]
+        if other == name or which in told:
+            continue
+        distance = project(leg, point)[1]
+        if distance < NEAR_MISS * size:
+            told.add(which)
+            found = f"crack '{name}' ending at {format_point(point)}, {distance:.2g} off curve '{other}'"
+            faults.append(case.fault(("curves", name), found, "an end on the curve, or clearly away from it"))
     return faults
 
 
 def check_inside(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops) -> list[Fault]:
     """A fault for every crack with a leg outside its region (legs do not cross, so one outside point tells)."""
     faults = []
-    for name, region in cracks.items():
-        if region not in loops:
+    for region, names in _group_by_region(cracks).items():
+        if region not in loops or not loops[region]:
             continue
-        points = np.concatenate([inner_points(leg) for leg in curves[name].legs])
-        outside = points[~is_inside(curves, loops[region], points)]
-        if len(outside):
+        samples = [np.concatenate([inner_points(leg) for leg in curves[name].legs]) for name in names]
+        owner = np.repeat(np.arange(len(names)), [len(points) for points in samples])
+        points = np.concatenate(samples)
+        outside = np.flatnonzero(~is_inside(curves, loops[region], points))
+        for number, first in zip(*np.unique(owner[outside], return_index=True), strict=True):
+            name, point = names[number], complex(points[outside[first]])
             loc = ("regions", region, "cracks", case.regions[region].cracks.index(name))
-            found = f"crack '{name}' outside region '{region}', at {format_point(complex(outside[0]))}"
+            found = f"crack '{name}' outside region '{region}', at {format_point(point)}"
             faults.append(case.fault(loc, found, "a crack inside its region, which it may touch with its ends"))
     return faults
+
+
+def _group_by_region(cracks: Mapping[str, str]) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for name, region in cracks.items():
+        groups.setdefault(region, []).append(name)
+    return groups
 
 
 def check_closing(
@@ -116,8 +133,11 @@ def check_closing(
             found = f"crack '{name}' closing a ring of cracks, which cuts region '{region}' in two"
             expected = "cracks that enclose nothing: make the enclosed part a region, and the ring its interface"
             faults.append(case.fault(("curves", name), found, expected))
+    of_region = _group_by_region(cracks)
     for region in loops:
-        own = [name for name, of in cracks.items() if of == region and name not in closing]
+        own = [name for name in of_region.get(region, []) if name not in closing]
+        if not own:
+            continue
         cutting = _find_cutting(curves, own, loops[region])
         notes += [
             f"Crack '{name}' cuts region '{region}' in two; its parts are held together only by what the crack carries."

@@ -8,11 +8,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbem.case import Case
 from pbem.errors import Fault
+from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import coincide, extremes, meeting_points, project
+from pbem.model.intersection import coincide, meeting_points, project
 from pbem.model.shape import share
 
 Places = Mapping[str, tuple[complex, ...]]
@@ -32,41 +34,27 @@ def format_point(point: complex) -> str:
     return f"({point.real:.6g}, {point.imag:.6g})"
 
 
-class Boxes:
-    """Bounding boxes of legs, to find the few that can meet."""
-
-    def __init__(self, legs: list[Leg], tolerance: float) -> None:
-        points = [extremes(leg) for leg in legs]
-        self.low = np.array([(p.real.min() - tolerance, p.imag.min() - tolerance) for p in points]).reshape(-1, 2)
-        self.high = np.array([(p.real.max() + tolerance, p.imag.max() + tolerance) for p in points]).reshape(-1, 2)
-
-    def around(self, point: complex) -> list[int]:
-        at = (point.real, point.imag)
-        return [int(i) for i in np.flatnonzero(((self.low <= at) & (self.high >= at)).all(axis=1))]
-
-    def pairs(self) -> Iterator[tuple[int, int]]:
-        for i in range(len(self.low)):
-            later = (self.low[i + 1:] <= self.high[i]) & (self.high[i + 1:] >= self.low[i])
-            for j in np.flatnonzero(later.all(axis=1)):
-                yield i, i + 1 + int(j)
+def _pair(found: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Iterator[tuple[int, int]]:
+    return zip(found[0].tolist(), found[1].tolist(), strict=True)
 
 
 def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCurves:
     """Split every leg in whose interior an end of another curve lies; the break is exactly that end."""
     legs = [(name, index, leg) for name, curve in curves.items() for index, leg in enumerate(curve.legs)]
-    boxes = Boxes([leg for _, _, leg in legs], tolerance)
+    boxes = Boxes.around_legs([leg for _, _, leg in legs], tolerance)
     breaks: dict[tuple[str, int], dict[complex, float]] = defaultdict(dict)
     notes = []
-    for name, curve in curves.items():
-        for end in [] if curve.closed else dict.fromkeys((curve.start, curve.end)):
-            for number in boxes.around(end):
-                other, index, leg = legs[number]
-                t, distance = project(leg, end)
-                if other == name or end in (leg.start, leg.end) or distance > tolerance or not 0 < t < 1:
-                    continue
-                if end not in breaks[other, index]:
-                    notes.append(f"'{other}' is split at {format_point(end)}, where '{name}' ends.")
-                breaks[other, index][end] = t
+    ends = [(name, end) for name, curve in curves.items() if not curve.closed for end in (curve.start, curve.end)]
+    for at, number in _pair(boxes.find_around(np.array([end for _, end in ends], dtype=complex))):
+        (name, end), (other, index, leg) = ends[at], legs[number]
+        if other == name or end in (leg.start, leg.end):
+            continue
+        t, distance = project(leg, end)
+        if distance > tolerance or not 0 < t < 1:
+            continue
+        if end not in breaks[other, index]:
+            notes.append(f"'{other}' is split at {format_point(end)}, where '{name}' ends.")
+        breaks[other, index][end] = t
     result = {}
     for name, curve in curves.items():
         pieces = [piece for i, leg in enumerate(curve.legs) for piece in _split_leg(leg, breaks.get((name, i), {}))]
@@ -104,8 +92,8 @@ def find_crossings(
     """
     legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
     found: dict[tuple[str, str], Fault] = {}
-    boxes = Boxes([leg for _, leg in legs], tolerance)
-    for i, j in boxes.pairs():
+    boxes = Boxes.around_legs([leg for _, leg in legs], tolerance)
+    for i, j in _pair(boxes.find_pairs()):
         (name, leg), (other, other_leg) = legs[i], legs[j]
         if (name, other) in found or {name, other} in touching:
             continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pbem.case import Case
 from pbem.case.finding import list_names
 from pbem.errors import Fault
+from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve, Leg
 from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
 from pbem.model.junction import format_point
@@ -49,7 +50,21 @@ def is_inside(
 ) -> NDArray[np.bool_]:
     """Which points (off the loops) lie in the region of these loops, which is infinite if none of them is outer."""
     around = 1 if any(loop.outer for loop in loops) else 0
-    return winding_number(loop_legs(curves, loops), points) == around
+    legs = [loop_legs(curves, (loop,)) for loop in loops]
+    return wind_around(legs, points) == around
+
+
+def wind_around(loops: Sequence[list[Leg]], points: NDArray[np.complex128]) -> NDArray[np.int64]:
+    """How often all of some loops run counter-clockwise around each point (n,); none does that lies beside it."""
+    total = np.zeros(len(points), dtype=np.int64)
+    at, number = Boxes.of_corners([surround(legs) for legs in loops]).find_around(points)
+    order = np.argsort(number, kind="stable")
+    at, begin = at[order], np.searchsorted(number[order], np.arange(len(loops) + 1))
+    for which, legs in enumerate(loops):
+        near = at[begin[which]:begin[which + 1]]
+        if len(near):
+            total[near] += winding_number(legs, points[near])
+    return total
 
 
 def find_loops(
@@ -199,24 +214,26 @@ def _nest(
     ]
     faults = []
     loc = ("regions", region, "boundary")
-    boxes = [surround(chain.legs) for chain in chains]
-    low, high = (np.array(corners) for corners in zip(*boxes, strict=True))
+    boxes = Boxes.of_corners([surround(chain.legs) for chain in chains])
+    near: dict[int, list[int]] = {i: [] for i in range(len(chains))}
+    meeting = boxes.find_meeting(boxes) if len(chains) > 1 else ()
+    for i, j in zip(*(numbers.tolist() for numbers in meeting), strict=True):
+        if j != outer:
+            near[i].append(j)
     for i, chain in enumerate(turned):
-        names = list_names([side.curve for side in chain.sides], 4)
+        if i == outer:
+            continue
         points = np.concatenate([inner_points(leg, 3) for leg in chain.legs])
-        near = (low.real <= high[i].real) & (low.imag <= high[i].imag)
-        near &= (high.real >= low[i].real) & (high.imag >= low[i].imag)
-        for j in (int(number) for number in np.flatnonzero(near | (np.arange(len(chains)) == outer))):
+        for j in sorted([*near[i], *([outer] if outer >= 0 else [])]):
             if i == j:
                 continue
-            other = turned[j]
-            around = list_names([side.curve for side in other.sides], 4)
-            inside = winding_number(other.legs, points) != 0
+            inside = winding_number(turned[j].legs, points) != 0
+            names, around = (list_names([side.curve for side in turned[k].sides], 4) for k in (i, j))
             if j == outer and not inside.all():
                 found = f"the loop of {names} outside the loop of {around}"
                 expected = "one connected region inside one outer loop: make separate parts separate regions"
                 faults.append(case.fault(loc, found, expected))
-            elif j != outer and i != outer and inside.any():
+            elif j != outer and inside.any():
                 found = f"the loop of {names} inside the inner loop of {around}"
                 expected = "inner loops side by side: what lies inside a hole is another region"
                 faults.append(case.fault(loc, found, expected))

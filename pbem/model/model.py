@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from pbem.case.generation import Group
 from pbem.model.curve import Curve
 from pbem.model.material import Material
 
@@ -161,6 +162,7 @@ class Model:
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
+    groups: the curves that were generated together.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -183,3 +185,4 @@ class Model:
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
+    groups: tuple[Group, ...] = ()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.case import Case
 from pbem.errors import Fault
+from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve, Leg
 from pbem.model.intersection import (
     inner_points,
@@ -61,10 +62,10 @@ def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: 
     """
     faults = []
     bodies = [_make_body(case, curves, name, own) for name, own in loops.items()]
-    boxes = {name: surround(curve.legs) for name, curve in curves.items()}
     touching = {curve: other for pair in roles.contacts.values() for curve, other in (pair, pair[::-1])}
-    for first, second in _pair_near(bodies):
-        found = _overlap(curves, boxes, first, second, touching, tolerance)
+    for (i, j), near in _pair_near(bodies, curves, touching).items():
+        first, second = bodies[i], bodies[j]
+        found = _overlap(curves, first, second, near, tolerance)
         if found:
             expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
             text = f"region '{second.name}' overlapping region '{first.name}' ({found})"
@@ -72,40 +73,54 @@ def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: 
     return faults
 
 
-def _pair_near(bodies: list[_Body]) -> Iterator[tuple[_Body, _Body]]:
-    """Pairs whose boxes meet, each in the order of the file; two infinite regions are a fault of their own."""
-    low = np.array([body.low for body in bodies])
-    high = np.array([body.high for body in bodies])
-    for i, body in enumerate(bodies):
-        near = (low.real <= body.high.real) & (low.imag <= body.high.imag)
-        near &= (high.real >= body.low.real) & (high.imag >= body.low.imag)
-        for j in np.flatnonzero(near[i + 1:]):
-            other = bodies[i + 1 + int(j)]
-            if not (body.infinite and other.infinite):
-                yield body, other
+def _pair_near(
+    bodies: list[_Body], curves: Mapping[str, Curve], touching: Mapping[str, str]
+) -> dict[tuple[int, int], list[tuple[_Body, str]]]:
+    """Pairs of bodies in the order of the file, with the curves of either that may lie in the other: those whose boxes
+    meet its own, and which it neither has nor touches. Two infinite regions are a fault of their own."""
+    owners: dict[str, list[int]] = {}
+    for number, body in enumerate(bodies):
+        for curve in body.sides:
+            owners.setdefault(curve, []).append(number)
+    pairs: dict[tuple[int, int], list[tuple[_Body, str]]] = {
+        (own[0], own[1]): [] for own in owners.values() if len(own) == 2
+    }
+    names = list(owners)
+    for number, at in _meet(bodies, [curves[name] for name in names]):
+        body, curve = bodies[number], names[at]
+        if curve in body.sides or touching.get(curve) in body.sides:
+            continue
+        for other in owners[curve]:
+            pairs.setdefault((min(number, other), max(number, other)), []).append((body, curve))
+    return {
+        pair: sorted(pairs[pair], key=lambda entry, first=bodies[pair[0]]: entry[0] is not first)  # type: ignore[misc]
+        for pair in sorted(pairs) if not all(bodies[number].infinite for number in pair)
+    }
+
+
+def _meet(bodies: list[_Body], curves: list[Curve]) -> Iterator[tuple[int, int]]:
+    """Numbers of bodies and of curves whose boxes meet; an infinite body meets all."""
+    finite = [number for number, body in enumerate(bodies) if not body.infinite]
+    boxes = Boxes.of_corners([surround(curve.legs) for curve in curves])
+    at, found = boxes.find_meeting(Boxes.of_corners([(bodies[number].low, bodies[number].high) for number in finite]))
+    yield from ((finite[i], j) for i, j in zip(at.tolist(), found.tolist(), strict=True))
+    for number, body in enumerate(bodies):
+        if body.infinite:
+            yield from ((number, j) for j in range(len(curves)))
 
 
 def _overlap(
-    curves: Mapping[str, Curve],
-    boxes: Mapping[str, tuple[complex, complex]],
-    first: _Body,
-    second: _Body,
-    touching: Mapping[str, str],
-    tolerance: float,
+    curves: Mapping[str, Curve], first: _Body, second: _Body, near: list[tuple[_Body, str]], tolerance: float
 ) -> str:
-    for curve, forward in first.sides.items():
-        if second.sides.get(curve) == forward:
+    """near: curves of one of them that may lie in the other, and that other."""
+    fewer, more = sorted((first.sides, second.sides), key=len)
+    for curve, forward in fewer.items():
+        if more.get(curve) == forward:
             return f"both lie on the same side of '{curve}'"
-    for body, other in ((first, second), (second, first)):
-        for curve in other.sides:
-            low, high = boxes[curve]
-            beside = high.real < body.low.real or low.real > body.high.real
-            apart = beside or high.imag < body.low.imag or low.imag > body.high.imag
-            if apart or curve in body.sides or touching.get(curve) in body.sides:
-                continue
-            points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
-            if (body.find_depth(points) > tolerance).any():
-                return f"'{curve}' lies inside"
+    for body, curve in near:
+        points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
+        if (body.find_depth(points) > tolerance).any():
+            return f"'{curve}' lies inside"
     return ""
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.laws import find_joint
-from pbem.mesh.mesh import Faces, Mesh, list_faces
+from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.configuration import dump_configuration
+from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
 
 ITERATION = np.dtype(
@@ -27,16 +30,16 @@ PAIR_DATASETS = {
     "mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8",
     "slip_path": "f8", "broken": "?",
 }
+# What an interface shows of them; the rest is for going on with a run.
+SHOWN = ("mode", "opening", "slip", "traction_n", "traction_s")
+FACTORS = ("KI", "KII")
 ENERGIES = ("external", "elastic", "dissipated")
 CHUNK_BYTES = 32768
 
 
-def sort_pairs(mesh: Mesh) -> dict[str, NDArray[np.int64]]:
-    """Per interface that has contact pairs, their indices into Mesh.pairs, by arc length."""
-    pairs = mesh.pairs
-    order = np.lexsort((pairs.arc_length, pairs.interface))
-    ends = np.searchsorted(pairs.interface[order], np.arange(len(mesh.interface_names) + 1))
-    return {name: order[ends[i]:ends[i + 1]] for i, name in enumerate(mesh.interface_names) if ends[i + 1] > ends[i]}
+def join_pairs(interfaces: Mapping[str, NDArray[np.int64]]) -> NDArray[np.int64]:
+    """The indices of `sort_pairs`, one interface after the other: the order of the columns under /all/contact."""
+    return np.concatenate([np.zeros(0, dtype=np.int64), *interfaces.values()])
 
 
 def to_columns(points: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -46,8 +49,9 @@ def to_columns(points: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 def open_file(path: Path, mode: str) -> h5py.File:
     """Open a result file for writing ("w") or for going on ("r+")."""
-    # Without locks, so that the file may be read while it is written; the 1.8 format stores long lists of names.
-    return h5py.File(path, mode, libver=("v108", "v108"), locking=False)
+    # Without locks, so that the file may be read while it is written; the 1.8 format stores long lists of names. Only
+    # views need more; a file that is all of the 1.10 format could not be opened after its run was killed.
+    return h5py.File(path, mode, libver=("v108", "v110"), locking=False)
 
 
 def write_attributes(
@@ -82,20 +86,10 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     for name in ("displacement", "traction"):
         _create_growing(fields, name, (len(faces.position), 2), "f8")
     _create_growing(fields, "hoop_stress", (len(faces.position),), "f8")
-    reactions = file.create_group("reactions")
-    reactions.attrs["names"] = _text(list(model.conditions))
-    for name in model.conditions:
-        _create_growing(reactions, name, (2,), "f8")
-    contact = file.create_group("contact")
-    interfaces = sort_pairs(mesh)
-    contact.attrs["names"] = _text(list(interfaces))
-    for name, pairs in interfaces.items():
-        _write_interface(_create_group(contact, name), model, mesh, name, pairs)
-    tips = file.create_group("tips")
-    tips.attrs["names"] = _text(list(model.crack_tips))
-    for name in model.crack_tips:
-        for factor in ("KI", "KII"):
-            _create_growing(tips.require_group(name), factor, (2,), "f8")
+    together = file.create_group("all")
+    _write_reactions(file.create_group("reactions"), together, list(model.conditions))
+    _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
+    _write_tips(file.create_group("tips"), together.create_group("tips"), list(model.crack_tips))
     energy = file.create_group("energy")
     for name in ENERGIES:
         _create_growing(energy, name, (), "f8")
@@ -130,35 +124,72 @@ def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces) -> None:
         group["curve"].attrs["names"] = _text(mesh.curve_names)
 
 
-def _write_interface(group: h5py.Group, model: Model, mesh: Mesh, name: str, pairs: NDArray[np.int64]) -> None:
-    group["position"] = to_columns(mesh.pairs.position[pairs])
-    group["normal"] = to_columns(mesh.pairs.normal[pairs])
-    group["arc_length"] = mesh.pairs.arc_length[pairs]
-    for quantity, kind in PAIR_DATASETS.items():
-        _create_growing(group, quantity, (len(pairs),), kind)
+def _write_reactions(group: h5py.Group, together: h5py.Group, names: list[str]) -> None:
+    group.attrs["names"] = _text(names)
+    if not names:
+        return
+    source = Columns(_create_growing(together, "reactions", (len(names), 2), "f8"))
+    for number, name in enumerate(names):
+        source.create_view(group.id, name, number)
+
+
+def _write_tips(group: h5py.Group, together: h5py.Group, names: list[str]) -> None:
+    group.attrs["names"] = _text(names)
+    if not names:
+        return
+    sources = {factor: Columns(_create_growing(together, factor, (len(names), 2), "f8")) for factor in FACTORS}
+    for number, name in enumerate(names):
+        crack = create_group(group.id, name)
+        for factor, source in sources.items():
+            source.create_view(crack, factor, number)
+
+
+def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
+    """All pairs in one place, interface by interface, and what belongs to each interface in a group of its name."""
+    interfaces = sort_pairs(mesh)
+    group.attrs["names"] = _text(list(interfaces))
+    group.attrs["groups"] = json.dumps([dataclasses.asdict(each) for each in model.groups])
+    counts = [len(pairs) for pairs in interfaces.values()]
+    order = join_pairs(interfaces)
+    together["interface"] = np.repeat(np.arange(len(counts)), counts).astype("i4")
+    fixed = {
+        "position": to_columns(mesh.pairs.position[order]), "normal": to_columns(mesh.pairs.normal[order]),
+        "arc_length": mesh.pairs.arc_length[order],
+    }  # fmt: skip
+    for name, values in fixed.items():
+        together[name] = values
+    if not counts:
+        return
+    sources = {
+        quantity: Columns(_create_growing(together, quantity, (len(order),), kind))
+        for quantity, kind in PAIR_DATASETS.items()
+    }
+    first = 0
+    for name, pairs in interfaces.items():
+        interface, last = create_group(group.id, name), first + len(pairs)
+        for quantity, values in fixed.items():
+            create_array(interface, quantity, values[first:last])
+        for quantity in SHOWN:
+            sources[quantity].create_view(interface, quantity, first, len(pairs))
+        _describe_interface(interface, model, mesh, name, bool(mesh.pairs.crack[pairs].any()))
+        first = last
+
+
+def _describe_interface(group: h5py.h5g.GroupID, model: Model, mesh: Mesh, name: str, crack: bool) -> None:
     joint = find_joint(model, name)
-    group.attrs["first"] = joint.first
-    group.attrs["second"] = joint.second or ""
-    group.attrs["crack"] = bool(mesh.pairs.crack[pairs].any())
-    group.attrs["law"] = joint.law.kind
+    set_attribute(group, "first", joint.first)
+    set_attribute(group, "second", joint.second or "")
+    set_attribute(group, "crack", crack)
+    set_attribute(group, "law", joint.law.kind)
     for key, value in vars(joint.law).items():
         if key != "kind" and isinstance(value, str | bool | int | float):
-            group.attrs[key] = value
+            set_attribute(group, key, value)
 
 
-def _create_group(parent: h5py.Group, name: str) -> h5py.Group:
-    """A group that keeps all its attributes in its header: from the ninth on they would go elsewhere, and HDF5 1.10
-    crashes when it copies texts from there."""
-    properties = h5py.h5p.create(h5py.h5p.GROUP_CREATE)
-    properties.set_attr_phase_change(64, 32)
-    h5py.h5g.create(parent.id, name.encode(), gcpl=properties)
-    return parent[name]
-
-
-def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: str) -> None:
+def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: str) -> h5py.Dataset:
     row = max(1, int(np.prod(shape))) * np.dtype(kind).itemsize
-    chunk = (max(1, min(64, CHUNK_BYTES // row)), *shape)
-    group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=chunk)
+    chunk = (max(1, min(64, CHUNK_BYTES // row)), *(max(1, length) for length in shape))
+    return group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=chunk)
 
 
 def append_row(dataset: h5py.Dataset, row: NDArray[Any]) -> None:

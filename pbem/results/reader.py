@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError
 from pbem.results.contents import Elements, Energies, Nodes, Steps, Tips, Units
-from pbem.results.layout import ENERGIES
+from pbem.results.layout import ENERGIES, FACTORS
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -242,10 +242,9 @@ def _read(path: Path, file: h5py.File) -> Results:
             tip=_read_indices(elements, "tip"),
         ),
         steps=steps,
-        reactions={name: _freeze(file["reactions"][name][:k]) for name in _names(file["reactions"])},
+        reactions=_read_reactions(file, k),
         contact=_Interfaces(path, _names(file["contact"]), k),
-        tips={name: Tips(*(_freeze(file["tips"][name][kind][:k]) for kind in ("KI", "KII")))
-              for name in _names(file["tips"])},
+        tips=_read_tips(file, k),
         energy=Energies(*(_freeze(file["energy"][kind][:k]) for kind in ENERGIES)),
         interior=_read_interior(path, file, k),
         convergence=_freeze(file["convergence"][...]),
@@ -275,6 +274,22 @@ def _read_contact(path: Path, file: h5py.File, name: str, steps: int) -> Contact
         path=path, name=name, first=str(group.attrs["first"]), second=str(group.attrs["second"]) or None, law=law,
         steps=steps, pairs=len(group["arc_length"]),
     )
+
+
+def _read_reactions(file: h5py.File, steps: int) -> dict[str, Real]:
+    names = _names(file["reactions"])
+    if not names:
+        return {}
+    together = _freeze(file["all/reactions"][:steps])
+    return {name: together[:, number] for number, name in enumerate(names)}
+
+
+def _read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
+    names = _names(file["tips"])
+    if not names:
+        return {}
+    KI, KII = (_freeze(file["all/tips"][kind][:steps]) for kind in FACTORS)
+    return {name: Tips(KI[:, number], KII[:, number]) for number, name in enumerate(names)}
 
 
 def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:

@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 
 from pbem.errors import ResultFileError
-from pbem.mesh.mesh import Mesh, list_faces
+from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.energy import Energy
-from pbem.results.layout import ENERGIES, ITERATION, PAIR_DATASETS, STEP_DATASETS, sort_pairs, to_columns
+from pbem.results.layout import ENERGIES, PAIR_DATASETS, STEP_DATASETS, join_pairs, to_columns
 from pbem.solve.step import ContactState, Step
 
 
@@ -22,6 +22,8 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
     if file.attrs["case"] != model.source:
         raise ResultFileError(path, "holds the results of another case, or the case file was changed since; "
                                     "run without resuming, or name another output file")
+    if "all" not in file:
+        raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     position = to_columns(list_faces(mesh).position)
     stored = file["nodes/position"][...]
     if stored.shape != position.shape or np.abs(stored - position).max() > 1e-12 * model.size:
@@ -36,9 +38,9 @@ def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
     if k == 0:
         return None
     contact = {name: np.zeros(mesh.pairs.count, dtype=kind) for name, kind in PAIR_DATASETS.items()}
-    for interface, pairs in sort_pairs(mesh).items():
-        for name, values in contact.items():
-            values[pairs] = file["contact"][interface][name][k - 1]
+    pairs = join_pairs(sort_pairs(mesh))
+    for name, values in contact.items() if len(pairs) else ():
+        values[pairs] = file["all/contact"][name][k - 1]
     fields = {name: file["fields"][name][k - 1] @ np.array([1, 1j]) for name in ("displacement", "traction")}
     return Step(
         number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
@@ -57,9 +59,11 @@ def truncate(file: h5py.File, last_number: int) -> None:
     k = min(len(file["steps"][name]) for name in STEP_DATASETS)
 
     def cut(_: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.maxshape[0] is None and item.dtype != ITERATION:
+        if isinstance(item, h5py.Dataset) and item.maxshape[0] is None:
             item.resize(k, axis=0)
 
-    file.visititems(cut)
+    # What is in other groups are views of these.
+    for group in ("steps", "fields", "all", "energy", *(["interior"] if "interior" in file else [])):
+        file[group].visititems(cut)
     convergence = file["convergence"]
     convergence.resize(int(np.searchsorted(convergence["step"], last_number, side="right")), axis=0)

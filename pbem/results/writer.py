@@ -15,18 +15,19 @@ from numpy.typing import NDArray
 
 from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.errors import ConvergenceError, ResultFileError, StorageError
-from pbem.mesh.mesh import Mesh, list_faces
+from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.layout import (
     ENERGIES,
+    FACTORS,
     ITERATION,
     PAIR_DATASETS,
     STEP_DATASETS,
     append_row,
     extend,
+    join_pairs,
     open_file,
-    sort_pairs,
     to_columns,
     write_attributes,
     write_header,
@@ -122,9 +123,10 @@ class ResultWriter:
         self._every = max(1, model.output_every)
         faces = list_faces(mesh)
         self._weight = faces.weight
-        self._nodes_of_curve = {name: np.flatnonzero(faces.curve == _index(mesh.curve_names, name))
-                                for name in model.conditions}
-        self._pairs_of_interface = sort_pairs(mesh)
+        numbers = {name: number for number, name in enumerate(model.conditions)}
+        condition_of_curve = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)
+        self._condition = condition_of_curve[faces.curve]
+        self._pairs = join_pairs(sort_pairs(mesh))
         self._tip_rules = collect_tip_rules(model, mesh)
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         self._pending: Step | None = None
@@ -174,22 +176,27 @@ class ResultWriter:
             append_row(file["interior/stress"], interior.stress)
         append_row(file["fields/displacement"], to_columns(step.displacement))
         append_row(file["fields/traction"], to_columns(step.traction))
-        for name, nodes in self._nodes_of_curve.items():
-            force = complex(np.dot(self._weight[nodes], step.traction[nodes]))
-            append_row(file["reactions"][name], np.array([force.real, force.imag]))
-        for name, pairs in self._pairs_of_interface.items():
-            group = file["contact"][name]
-            for quantity in PAIR_DATASETS:
-                append_row(group[quantity], getattr(step.contact, quantity)[pairs])
-        for name, factors in self._tip_rules.evaluate(step.contact).items():
-            for kind, factor in zip(("KI", "KII"), factors, strict=True):
-                append_row(file["tips"][name][kind], factor)
+        together = file["all"]
+        if self._model.conditions:
+            append_row(together["reactions"], to_columns(self._sum_reactions(step.traction)))
+        for quantity in PAIR_DATASETS if len(self._pairs) else ():
+            append_row(together["contact"][quantity], getattr(step.contact, quantity)[self._pairs])
+        if self._model.crack_tips:
+            for kind, factors in zip(FACTORS, self._tip_rules.evaluate_all(step.contact), strict=True):
+                append_row(together["tips"][kind], factors)
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
             append_row(file["steps"][quantity], np.array(value))
+
+    def _sum_reactions(self, traction: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Integral (c,) of the traction over every outer curve."""
+        outer = self._condition >= 0
+        force, of = (self._weight * traction)[outer], self._condition[outer]
+        count = len(self._model.conditions)
+        return np.bincount(of, force.real, count) + 1j * np.bincount(of, force.imag, count)
 
     def finish(self) -> None:
         """Set the status to "finished" and close the file."""
@@ -228,10 +235,6 @@ class ResultWriter:
             else:
                 self.fail(type(error).__name__, str(error))
         self._file.close()
-
-
-def _index(names: tuple[str, ...], name: str) -> int:
-    return names.index(name) if name in names else -1
 
 
 def _iteration_row(step: int, iteration: Iteration) -> tuple[float, ...]:

@@ -62,7 +62,7 @@ class Clock:
         self.seconds[piece] = self.seconds.get(piece, 0.0) + time.perf_counter() - begin
 
 
-def make_step(mesh, laws, number: int):  # noqa: ANN001, ANN201
+def make_step(mesh, laws, number: int):
     """A step with numbers that are not zero: every third pair open, the others slipping or sticking in turn."""
     from pbem.mesh.mesh import list_faces
     from pbem.solve.step import ContactState, Iteration, Step

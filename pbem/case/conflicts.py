@@ -33,6 +33,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
             findings += _check_law(loc, table)
     findings += _check_generate(raw)
     findings += _check_stages(raw)
+    findings += _check_solver(raw)
     findings += _check_options(raw)
     for name in ("materials", "curves", "regions", "contacts"):
         findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc, str(loc[-1]))]
@@ -194,6 +195,17 @@ def _check_stages(raw: Mapping[str, Any]) -> list[Finding]:
         elif isinstance(name, str):
             names[name] = number
     return findings
+
+
+def _check_solver(raw: Mapping[str, Any]) -> list[Finding]:
+    solver = raw.get("solver")
+    if not isinstance(solver, dict) or solver.get("operator") != "hierarchical":
+        return []
+    linear = solver.get("linear", "auto")
+    if linear not in ("lu", "mumps"):
+        return []
+    found = f"{show(linear)} with operator = \"hierarchical\", which stores no matrix to factor"
+    return [Finding(("solver", "linear"), found, "\"auto\" or \"gmres\", or operator = \"dense\"")]
 
 
 def _check_options(raw: Mapping[str, Any]) -> list[Finding]:

@@ -49,6 +49,8 @@ def is_hierarchical(model: Model, mesh: Mesh) -> bool:
     """Whether a model is computed with the hierarchical operator."""
     if model.solver.operator != "auto":
         return model.solver.operator == "hierarchical"
+    if model.solver.linear in ("lu", "mumps"):
+        return False
     return 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
 
 

@@ -344,6 +344,12 @@ WRONG = {
         "solver.newton_max_iterations",
         ">= 1",
     ),
+    "factors of an operator that is not stored": (
+        "[materials",
+        '[solver]\noperator = "hierarchical"\nlinear = "mumps"\n[materials',
+        "solver.linear (line 4)",
+        'found "mumps" with operator = "hierarchical"',
+    ),
     "tolerance": ("[materials", "[solver]\nnewton_tolerance = 0.0\n[materials", "solver.newton_tolerance", "> 0"),
     "option with a dash": (
         "[materials",

@@ -66,8 +66,14 @@ static void prepare_gauss(void)
 typedef struct {
     int points;
     double x[MOST_ARC_POINTS], y[MOST_ARC_POINTS], ex[MOST_ARC_POINTS], ey[MOST_ARC_POINTS];
-    double H[MOST_ARC_POINTS][MAX_SHAPES], G[MOST_ARC_POINTS][MAX_SHAPES], integral[MAX_SHAPES];
+    double H[MAX_SHAPES][MOST_ARC_POINTS], G[MAX_SHAPES][MOST_ARC_POINTS], integral[MAX_SHAPES];
 } ArcRule;
+
+/* What a rule has in common with those of other arcs: coordinates, and weights times the values of the shapes. */
+typedef struct {
+    int points, family, panels;
+    double s[MOST_ARC_POINTS], weight[MAX_SHAPES][MOST_ARC_POINTS];
+} ReferenceRule;
 
 /* An element's rules, made when they are first needed, and where the points stand: panels and their middles. */
 typedef struct {
@@ -75,9 +81,8 @@ typedef struct {
     double reach;
     cplx middle[MOST_PANELS];
     ArcRule rule[LEVELS];
+    ReferenceRule reference[LEVELS]; /* of the last element that needed them */
 } FarArc;
-
-static cplx place_on_arc(const Arc *arc, double s) { return arc->apex * (1 + I * arc->q * s) / (1 - I * arc->q * s); }
 
 static void prepare_far_arc(FarArc *far, const Arc *arc, double sweep)
 {
@@ -89,50 +94,65 @@ static void prepare_far_arc(FarArc *far, const Arc *arc, double sweep)
     memset(far->ready, 0, sizeof far->ready);
     for (int p = 0; p < far->panels; p++) {
         const double turn = sweep * ((p + 0.5) / far->panels - 0.5);
-        far->middle[p] = arc->center + arc->apex * cexp(I * turn);
+        far->middle[p] = arc->center + arc->apex * (far->panels > 1 ? cexp(I * turn) : 1);
     }
 }
 
 /* shape: coefficients by power and node, powers being s^k or root^(2 k + 1). */
-static void add_arc_point(ArcRule *rule, const Arc *arc, const double *shape, double s, double root, double weight)
+static void prepare_reference(ReferenceRule *to, int order, int family, int panels, int level, const double *shape)
 {
-    const int shapes = arc->order + 1, g = rule->points++;
-    const double size = 1 + arc->q * arc->q * s * s, by = root != 0 ? root * root : s;
-    const cplx from_center = place_on_arc(arc, s), zeta = arc->center + from_center;
-    const cplx tangent = (arc->q > 0 ? I : -I) * from_center / arc->radius;
-    rule->x[g] = creal(zeta);
-    rule->y[g] = cimag(zeta);
-    rule->ex[g] = creal(tangent);
-    rule->ey[g] = cimag(tangent);
-    for (int j = 0; j < shapes; j++) {
-        double value = shape[arc->order * shapes + j];
-        for (int k = arc->order - 1; k >= 0; k--) value = value * by + shape[k * shapes + j];
-        value *= weight * arc->jacobian * (root != 0 ? root : 1);
-        rule->H[g][j] = value / size;
-        rule->G[g][j] = value * arc->node_weight[j];
-        rule->integral[j] += rule->G[g][j];
+    const int shapes = order + 1, tip = is_tip(family), half = tip && panels == 1, count = LEVEL_POINTS[level];
+    const int parts = tip && !half ? 2 * panels : panels;
+    to->points = parts * count;
+    to->family = family;
+    to->panels = panels;
+    for (int g = 0; g < to->points; g++) {
+        const double node = gauss_node[half][level][g % count], part = gauss_weight[half][level][g % count] / parts;
+        const double x = half ? node : (g / count + 0.5 * (1 + node)) / parts; /* in [0, 1] */
+        const double s = !tip ? 2 * x - 1 : family == TIP_AT_START ? 2 * x * x - 1 : 1 - 2 * x * x;
+        const double power = tip ? x * x : s;
+        to->s[g] = s;
+        for (int j = 0; j < shapes; j++) {
+            double value = shape[order * shapes + j];
+            for (int k = order - 1; k >= 0; k--) value = value * power + shape[k * shapes + j];
+            /* on a tip the density has one root more, and ds = 4 x dx */
+            to->weight[j][g] = value * part * (tip ? (half ? 4 : 2) * x * x : 1);
+        }
     }
 }
 
 static const ArcRule *use_rule(FarArc *far, const Arc *arc, const double *shape, int level)
 {
     ArcRule *rule = &far->rule[level];
+    ReferenceRule *from = &far->reference[level];
     if (far->ready[level]) return rule;
     far->ready[level] = 1;
-    memset(rule->integral, 0, sizeof rule->integral);
-    rule->points = 0;
-    const int tip = is_tip(arc->family), half = tip && far->panels == 1;
-    const int panels = tip && !half ? 2 * far->panels : far->panels;
-    for (int p = 0; p < panels; p++)
-        for (int i = 0; i < LEVEL_POINTS[level]; i++) {
-            const double node = gauss_node[half][level][i], weight = gauss_weight[half][level][i] / panels;
-            const double x = half ? node : (p + 0.5 * (1 + node)) / panels; /* in [0, 1] */
-            if (!tip)
-                add_arc_point(rule, arc, shape, 2 * x - 1, 0, weight);
-            else /* ds = 4 x dx */
-                add_arc_point(rule, arc, shape, (arc->family == TIP_AT_START ? 1 : -1) * (2 * x * x - 1), x,
-                              (half ? 4 : 2) * x * weight);
+    if (from->points == 0 || from->family != arc->family || from->panels != far->panels)
+        prepare_reference(from, arc->order, arc->family, far->panels, level, shape);
+    const int points = rule->points = from->points;
+    const double ax = creal(arc->apex), ay = cimag(arc->apex), cx = creal(arc->center), cy = cimag(arc->center);
+    const double turn = (arc->q > 0 ? 1 : -1) / arc->radius;
+    double stretch[MOST_ARC_POINTS];
+    for (int g = 0; g < points; g++) {
+        const double qs = arc->q * from->s[g], inverse = 1 / (1 + qs * qs);
+        const double cosine = (1 - qs * qs) * inverse, sine = 2 * qs * inverse;
+        const double dx = ax * cosine - ay * sine, dy = ax * sine + ay * cosine;
+        stretch[g] = inverse;
+        rule->x[g] = cx + dx;
+        rule->y[g] = cy + dy;
+        rule->ex[g] = -turn * dy;
+        rule->ey[g] = turn * dx;
+    }
+    for (int j = 0; j <= arc->order; j++) {
+        const double jacobian = arc->jacobian, by_node = jacobian * arc->node_weight[j];
+        double sum = 0;
+        for (int g = 0; g < points; g++) {
+            rule->H[j][g] = jacobian * stretch[g] * from->weight[j][g];
+            rule->G[j][g] = by_node * from->weight[j][g];
+            sum += rule->G[j][g];
         }
+        rule->integral[j] = sum;
+    }
     return rule;
 }
 
@@ -202,8 +222,8 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
         for (int j = 0; j < shapes; j++)
 #pragma GCC unroll 4
             for (int part = 0; part < 4; part++) {
-                a[part][j] += rule->H[g][j] * h[part];
-                if (tractions && (stress || part != 1)) b[part][j] += rule->G[g][j] * t[part];
+                a[part][j] += rule->H[j][g] * h[part];
+                if (tractions && (stress || part != 1)) b[part][j] += rule->G[j][g] * t[part];
             }
     }
     Blocks hb, gb;

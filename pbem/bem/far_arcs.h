@@ -62,17 +62,21 @@ static void prepare_gauss(void)
     }
 }
 
-/* Points on an arc: place, unit tangent, weights of its nodes' displacements and tractions. */
+/* Points on an arc: place, unit tangent, weights of its nodes' displacements and tractions, of the latter's integrals from
+ * the middle; ends of the arc and the integrals there. */
 typedef struct {
     int points;
     double x[MOST_ARC_POINTS], y[MOST_ARC_POINTS], ex[MOST_ARC_POINTS], ey[MOST_ARC_POINTS];
-    double H[MAX_SHAPES][MOST_ARC_POINTS], G[MAX_SHAPES][MOST_ARC_POINTS], integral[MAX_SHAPES];
+    double H[MAX_SHAPES][MOST_ARC_POINTS], G[MAX_SHAPES][MOST_ARC_POINTS], N[MAX_SHAPES][MOST_ARC_POINTS];
+    double end_x[2], end_y[2], end_N[2][MAX_SHAPES];
 } ArcRule;
 
-/* What a rule has in common with those of other arcs: coordinates, and weights times the values of the shapes. */
+/* What a rule has in common with those of other arcs: coordinates, weights times the shapes and times their integrals
+ * from the middle. */
 typedef struct {
     int points, family, panels;
-    double s[MOST_ARC_POINTS], weight[MAX_SHAPES][MOST_ARC_POINTS];
+    double s[MOST_ARC_POINTS], weight[MAX_SHAPES][MOST_ARC_POINTS], integral[MAX_SHAPES][MOST_ARC_POINTS];
+    double end[2][MAX_SHAPES];
 } ReferenceRule;
 
 /* An element's rules, made when they are first needed, and where the points stand: panels and their middles. */
@@ -98,6 +102,14 @@ static void prepare_far_arc(FarArc *far, const Arc *arc, double sweep)
     }
 }
 
+/* Integral from 0 to s of the shape j with coefficients by power and node. */
+static double integrate_shape(int shapes, const double *shape, int j, double s)
+{
+    double value = 0;
+    for (int k = shapes - 1; k >= 0; k--) value = (value + shape[k * shapes + j] / (k + 1)) * s;
+    return value;
+}
+
 /* shape: coefficients by power and node, powers being s^k or root^(2 k + 1). */
 static void prepare_reference(ReferenceRule *to, int order, int family, int panels, int level, const double *shape)
 {
@@ -117,8 +129,11 @@ static void prepare_reference(ReferenceRule *to, int order, int family, int pane
             for (int k = order - 1; k >= 0; k--) value = value * power + shape[k * shapes + j];
             /* on a tip the density has one root more, and ds = 4 x dx */
             to->weight[j][g] = value * part * (tip ? (half ? 4 : 2) * x * x : 1);
+            to->integral[j][g] = part * integrate_shape(shapes, shape, j, s);
         }
     }
+    for (int j = 0; j < shapes; j++)
+        for (int end = 0; end < 2; end++) to->end[end][j] = integrate_shape(shapes, shape, j, 2 * end - 1);
 }
 
 static const ArcRule *use_rule(FarArc *far, const Arc *arc, const double *shape, int level)
@@ -145,13 +160,19 @@ static const ArcRule *use_rule(FarArc *far, const Arc *arc, const double *shape,
     }
     for (int j = 0; j <= arc->order; j++) {
         const double jacobian = arc->jacobian, by_node = jacobian * arc->node_weight[j];
-        double sum = 0;
         for (int g = 0; g < points; g++) {
-            rule->H[j][g] = jacobian * stretch[g] * from->weight[j][g];
+            const double length = jacobian * stretch[g];
+            rule->H[j][g] = length * from->weight[j][g];
             rule->G[j][g] = by_node * from->weight[j][g];
-            sum += rule->G[j][g];
+            rule->N[j][g] = by_node * length * from->integral[j][g];
         }
-        rule->integral[j] = sum;
+        for (int end = 0; end < 2; end++) rule->end_N[end][j] = by_node * from->end[end][j];
+    }
+    for (int end = 0; end < 2; end++) {
+        const double qs = end ? arc->q : -arc->q, inverse = 1 / (1 + qs * qs);
+        const double cosine = (1 - qs * qs) * inverse, sine = 2 * qs * inverse;
+        rule->end_x[end] = cx + ax * cosine - ay * sine;
+        rule->end_y[end] = cy + ax * sine + ay * cosine;
     }
     return rule;
 }
@@ -179,19 +200,11 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
     const int shapes = order + 1, logarithm = tractions && !stress;
     const int64_t width = 2 * r->elements * shapes;
     const Lanes zero = spread(0);
-    Lanes logs[MOST_ARC_POINTS + 1], a[4][MAX_SHAPES], b[4][MAX_SHAPES];
+    Lanes logs[2], a[4][MAX_SHAPES], b[4][MAX_SHAPES];
 #pragma GCC unroll 4
     for (int j = 0; j < shapes; j++)
 #pragma GCC unroll 4
         for (int part = 0; part < 4; part++) a[part][j] = b[part][j] = zero;
-    if (logarithm) {
-        for (int g = 0; g < rule->points; g++) {
-            const Lanes rx = rule->x[g] - zx, ry = rule->y[g] - zy;
-            logs[g] = rx * rx + ry * ry;
-        }
-        logs[rule->points] = spread(1);
-        take_logarithms((double *)logs, (rule->points + 1) / 2 * FUNCTION_BATCH);
-    }
     for (int g = 0; g < rule->points; g++) {
         const Lanes rx = rule->x[g] - zx, ry = rule->y[g] - zy, inverse = 1 / (rx * rx + ry * ry);
         const Lanes vr = rx * inverse, vi = -ry * inverse, v2r = vr * vr - vi * vi, v2i = 2 * vr * vi; /* 1/r, 1/r^2 */
@@ -213,7 +226,7 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
             h[1] = MULTIPLY_IMAGINARY(ex, ey, vr, vi);
             h[2] = y * v2r;
             h[3] = y * v2i;
-            t[0] = logarithm ? logs[g] : zero;
+            t[0] = h[0];
             t[1] = zero;
             t[2] = rx * vr + ry * vi;
             t[3] = rx * vi - ry * vr;
@@ -223,8 +236,24 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
 #pragma GCC unroll 4
             for (int part = 0; part < 4; part++) {
                 a[part][j] += rule->H[j][g] * h[part];
-                if (tractions && (stress || part != 1)) b[part][j] += rule->G[j][g] * t[part];
+                if (tractions && (stress || part > 1))
+                    b[part][j] += rule->G[j][g] * t[part];
+                else if (tractions && part == 0)
+                    b[part][j] -= rule->N[j][g] * t[part];
             }
+    }
+    if (logarithm) {
+        /* n by parts: the shapes' integrals times ln|r| at the ends, less their integral with its derivative, Re c */
+        for (int end = 0; end < 2; end++) {
+            const Lanes rx = rule->end_x[end] - zx, ry = rule->end_y[end] - zy;
+            logs[end] = rx * rx + ry * ry;
+        }
+        take_batch_of_logarithms((double *)logs);
+        for (int end = 0; end < 2; end++) {
+            const Lanes value = (end ? 0.5 : -0.5) * logs[end] - (end ? 1 : -1) * r->log_length;
+#pragma GCC unroll 4
+            for (int j = 0; j < shapes; j++) b[0][j] += rule->end_N[end][j] * value;
+        }
     }
     Blocks hb, gb;
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1)), g = r->shear_modulus / (M_PI * (kappa + 1));
@@ -246,8 +275,7 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
         } else {
             put_lanes(&hb, j, fu * (kappa + 1) * *A[1], fu * (1 - kappa) * *A[0], 2 * fu * *A[2], -2 * fu * *A[3]);
             if (tractions)
-                put_symmetric(&gb, j, -2 * kappa * ft * (0.5 * *B[0] - rule->integral[j] * r->log_length), ft * *B[2],
-                              -ft * *B[3]);
+                put_symmetric(&gb, j, -2 * kappa * ft * *B[0], ft * *B[2], -ft * *B[3]);
         }
     }
     store_row(shapes, hb.xx, hb.xy, H, 0);

@@ -1,4 +1,4 @@
-/* Circular arcs away from the point: Gauss points that are exact to rounding, four collocation points at a time.
+/* Circular arcs away from the point: Gauss points that are exact to rounding, several collocation points at a time.
  *
  * With r = zeta - z from the collocation point to the point zeta of the arc, unit tangent e there and y = Im(conj(r) e),
  * the integrands of arcs.h are, by arc length (c, d, q, dq) and times conj(zeta - z) and so on (x, s, y, n)
@@ -193,14 +193,14 @@ static int choose_level(const FarArc *far, cplx z)
     return level < LEVELS && far->panels > 1 ? LEVELS - 1 : level;
 }
 
-/* Rows of four points on the element of a rule. */
+/* Rows of some points on the element of a rule. */
 INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const ArcRule *rule, Lanes zx, Lanes zy,
                      Lanes Nx, Lanes Ny, double *const *H, double *const *G)
 {
     const int shapes = order + 1, logarithm = tractions && !stress;
     const int64_t width = 2 * r->elements * shapes;
     const Lanes zero = spread(0);
-    Lanes logs[2], a[4][MAX_SHAPES], b[4][MAX_SHAPES];
+    Lanes logs[FUNCTION_BATCH / LANES], a[4][MAX_SHAPES], b[4][MAX_SHAPES];
 #pragma GCC unroll 4
     for (int j = 0; j < shapes; j++)
 #pragma GCC unroll 4
@@ -248,6 +248,7 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
             const Lanes rx = rule->end_x[end] - zx, ry = rule->end_y[end] - zy;
             logs[end] = rx * rx + ry * ry;
         }
+        for (int i = 2; i < FUNCTION_BATCH / LANES; i++) logs[i] = spread(1);
         take_batch_of_logarithms((double *)logs);
         for (int end = 0; end < 2; end++) {
             const Lanes value = (end ? 0.5 : -0.5) * logs[end] - (end ? 1 : -1) * r->log_length;

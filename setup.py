@@ -1,7 +1,8 @@
 """The compiled part of the build and the cases that are installed with the package; the rest is in pyproject.toml.
 
 PBEM_MARCH names the processor to build for (as gcc's -march, or -mcpu on other machines than x86), e.g. x86-64-v3.
-Unset it is the processor of this machine; empty, the compiler's default.
+Unset it is the processor of this machine, or the compiler's default where the compiler does not know how to name that;
+empty, the compiler's default.
 """
 
 import glob
@@ -9,6 +10,8 @@ import os
 import platform
 
 from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import CompileError
 
 # The parts of -ffast-math that let logarithm and arc tangent be vectorised. NaN and infinity keep their meaning, and
 # nothing of it reaches the linker, where -ffast-math would change the arithmetic of the whole process.
@@ -34,7 +37,24 @@ def select_processor_flags() -> list[str]:
     return [f"-march={processor}" if on_x86 else f"-mcpu={processor}"]
 
 
+class BuildKernels(build_ext):
+    """Builds for this processor if the compiler can, otherwise for any; a processor that was named is kept."""
+
+    def build_extension(self, ext: Extension) -> None:
+        """Build one extension."""
+        try:
+            super().build_extension(ext)
+        except CompileError:
+            processor = select_processor_flags()
+            if not processor or "PBEM_MARCH" in os.environ:
+                raise
+            print(f"the compiler refused {processor[0]}: once more without it; the kernels will be slower")
+            ext.extra_compile_args = [flag for flag in ext.extra_compile_args if flag not in processor]
+            super().build_extension(ext)
+
+
 setup(
+    cmdclass={"build_ext": BuildKernels},
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
     package_dir={"pbem.cases": "cases"},
     package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"]},

@@ -59,7 +59,6 @@ static int fill_checked_rows(const Rows *r)
         enough = enough && (!kinds[family].groups || (kinds[family].frame && kinds[family].element));
     }
     if (enough) {
-        work->near.count = 0;
         Py_BEGIN_ALLOW_THREADS
         fill_rows(r, kinds, work);
         Py_END_ALLOW_THREADS

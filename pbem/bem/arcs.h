@@ -57,9 +57,14 @@ static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int ord
     arc->family = family;
     arc->infinity = -I / arc->q;
     arc->origin = I / arc->q;
+    for (int k = 0; k <= order; k++) arc->node_weight[k] = 1 / (1 + arc->q * arc->q * local[k] * local[k]);
+}
+
+/* The moments at the poles, which only the closed form needs. */
+static void prepare_poles(Arc *arc)
+{
     evaluate_reference(arc, arc->infinity, 0, &arc->at_infinity);
     evaluate_reference(arc, arc->origin, 0, &arc->at_origin);
-    for (int k = 0; k <= order; k++) arc->node_weight[k] = 1 / (1 + arc->q * arc->q * local[k] * local[k]);
 }
 
 static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMoments *m)

@@ -1,4 +1,4 @@
-/* From moments of four straight elements to the blocks of their nodes; see _kernels.c for the formulas' source. */
+/* From moments of straight elements to the blocks of their nodes; see _kernels.c for the formulas' source. */
 #ifndef PBEM_COMBINE_H
 #define PBEM_COMBINE_H
 #include "straight.h"
@@ -98,7 +98,7 @@ INLINE void combine_tractions(int shapes, int tractions, const Factor *c, const 
     }
 }
 
-/* Shape, combine and store four pairs. H, G: where each lane's rows begin; G is not read without tractions. */
+/* Shape, combine and store the pairs. H, G: where each lane's rows begin; G is not read without tractions. */
 INLINE void store_pairs(int order, int tractions, int stress, const Factor *c, const Frame *f, Lanes Nx, Lanes Ny,
                         LaneMoments *m, int64_t width, double *const *H, double *const *G)
 {

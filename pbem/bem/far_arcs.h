@@ -1,4 +1,4 @@
-/* Circular arcs away from the point: Gauss points that are exact to rounding, four collocation points at a time.
+/* Circular arcs away from the point: Gauss points that are exact to rounding, several collocation points at a time.
  *
  * With r = zeta - z from the collocation point to the point zeta of the arc, unit tangent e there and y = Im(conj(r) e),
  * the integrands of arcs.h are, by arc length (c, d, q, dq) and times conj(zeta - z) and so on (x, s, y, n)
@@ -62,12 +62,22 @@ static void prepare_gauss(void)
     }
 }
 
-/* Points on an arc: place, unit tangent, weights of its nodes' displacements and tractions. */
+/* Points on an arc: place, unit tangent, weights of its nodes' displacements and tractions, of the latter's integrals from
+ * the middle; ends of the arc and the integrals there. */
 typedef struct {
     int points;
     double x[MOST_ARC_POINTS], y[MOST_ARC_POINTS], ex[MOST_ARC_POINTS], ey[MOST_ARC_POINTS];
-    double H[MOST_ARC_POINTS][MAX_SHAPES], G[MOST_ARC_POINTS][MAX_SHAPES], integral[MAX_SHAPES];
+    double H[MAX_SHAPES][MOST_ARC_POINTS], G[MAX_SHAPES][MOST_ARC_POINTS], N[MAX_SHAPES][MOST_ARC_POINTS];
+    double end_x[2], end_y[2], end_N[2][MAX_SHAPES];
 } ArcRule;
+
+/* What a rule has in common with those of other arcs: coordinates, weights times the shapes and times their integrals
+ * from the middle. */
+typedef struct {
+    int points, family, panels;
+    double s[MOST_ARC_POINTS], weight[MAX_SHAPES][MOST_ARC_POINTS], integral[MAX_SHAPES][MOST_ARC_POINTS];
+    double end[2][MAX_SHAPES];
+} ReferenceRule;
 
 /* An element's rules, made when they are first needed, and where the points stand: panels and their middles. */
 typedef struct {
@@ -75,9 +85,8 @@ typedef struct {
     double reach;
     cplx middle[MOST_PANELS];
     ArcRule rule[LEVELS];
+    ReferenceRule reference[LEVELS]; /* of the last element that needed them */
 } FarArc;
-
-static cplx place_on_arc(const Arc *arc, double s) { return arc->apex * (1 + I * arc->q * s) / (1 - I * arc->q * s); }
 
 static void prepare_far_arc(FarArc *far, const Arc *arc, double sweep)
 {
@@ -89,50 +98,82 @@ static void prepare_far_arc(FarArc *far, const Arc *arc, double sweep)
     memset(far->ready, 0, sizeof far->ready);
     for (int p = 0; p < far->panels; p++) {
         const double turn = sweep * ((p + 0.5) / far->panels - 0.5);
-        far->middle[p] = arc->center + arc->apex * cexp(I * turn);
+        far->middle[p] = arc->center + arc->apex * (far->panels > 1 ? cexp(I * turn) : 1);
     }
 }
 
-/* shape: coefficients by power and node, powers being s^k or root^(2 k + 1). */
-static void add_arc_point(ArcRule *rule, const Arc *arc, const double *shape, double s, double root, double weight)
+/* Integral from 0 to s of the shape j with coefficients by power and node. */
+static double integrate_shape(int shapes, const double *shape, int j, double s)
 {
-    const int shapes = arc->order + 1, g = rule->points++;
-    const double size = 1 + arc->q * arc->q * s * s, by = root != 0 ? root * root : s;
-    const cplx from_center = place_on_arc(arc, s), zeta = arc->center + from_center;
-    const cplx tangent = (arc->q > 0 ? I : -I) * from_center / arc->radius;
-    rule->x[g] = creal(zeta);
-    rule->y[g] = cimag(zeta);
-    rule->ex[g] = creal(tangent);
-    rule->ey[g] = cimag(tangent);
-    for (int j = 0; j < shapes; j++) {
-        double value = shape[arc->order * shapes + j];
-        for (int k = arc->order - 1; k >= 0; k--) value = value * by + shape[k * shapes + j];
-        value *= weight * arc->jacobian * (root != 0 ? root : 1);
-        rule->H[g][j] = value / size;
-        rule->G[g][j] = value * arc->node_weight[j];
-        rule->integral[j] += rule->G[g][j];
+    double value = 0;
+    for (int k = shapes - 1; k >= 0; k--) value = (value + shape[k * shapes + j] / (k + 1)) * s;
+    return value;
+}
+
+/* shape: coefficients by power and node, powers being s^k or root^(2 k + 1). */
+static void prepare_reference(ReferenceRule *to, int order, int family, int panels, int level, const double *shape)
+{
+    const int shapes = order + 1, tip = is_tip(family), half = tip && panels == 1, count = LEVEL_POINTS[level];
+    const int parts = tip && !half ? 2 * panels : panels;
+    to->points = parts * count;
+    to->family = family;
+    to->panels = panels;
+    for (int g = 0; g < to->points; g++) {
+        const double node = gauss_node[half][level][g % count], part = gauss_weight[half][level][g % count] / parts;
+        const double x = half ? node : (g / count + 0.5 * (1 + node)) / parts; /* in [0, 1] */
+        const double s = !tip ? 2 * x - 1 : family == TIP_AT_START ? 2 * x * x - 1 : 1 - 2 * x * x;
+        const double power = tip ? x * x : s;
+        to->s[g] = s;
+        for (int j = 0; j < shapes; j++) {
+            double value = shape[order * shapes + j];
+            for (int k = order - 1; k >= 0; k--) value = value * power + shape[k * shapes + j];
+            /* on a tip the density has one root more, and ds = 4 x dx */
+            to->weight[j][g] = value * part * (tip ? (half ? 4 : 2) * x * x : 1);
+            to->integral[j][g] = part * integrate_shape(shapes, shape, j, s);
+        }
     }
+    for (int j = 0; j < shapes; j++)
+        for (int end = 0; end < 2; end++) to->end[end][j] = integrate_shape(shapes, shape, j, 2 * end - 1);
 }
 
 static const ArcRule *use_rule(FarArc *far, const Arc *arc, const double *shape, int level)
 {
     ArcRule *rule = &far->rule[level];
+    ReferenceRule *from = &far->reference[level];
     if (far->ready[level]) return rule;
     far->ready[level] = 1;
-    memset(rule->integral, 0, sizeof rule->integral);
-    rule->points = 0;
-    const int tip = is_tip(arc->family), half = tip && far->panels == 1;
-    const int panels = tip && !half ? 2 * far->panels : far->panels;
-    for (int p = 0; p < panels; p++)
-        for (int i = 0; i < LEVEL_POINTS[level]; i++) {
-            const double node = gauss_node[half][level][i], weight = gauss_weight[half][level][i] / panels;
-            const double x = half ? node : (p + 0.5 * (1 + node)) / panels; /* in [0, 1] */
-            if (!tip)
-                add_arc_point(rule, arc, shape, 2 * x - 1, 0, weight);
-            else /* ds = 4 x dx */
-                add_arc_point(rule, arc, shape, (arc->family == TIP_AT_START ? 1 : -1) * (2 * x * x - 1), x,
-                              (half ? 4 : 2) * x * weight);
+    if (from->points == 0 || from->family != arc->family || from->panels != far->panels)
+        prepare_reference(from, arc->order, arc->family, far->panels, level, shape);
+    const int points = rule->points = from->points;
+    const double ax = creal(arc->apex), ay = cimag(arc->apex), cx = creal(arc->center), cy = cimag(arc->center);
+    const double turn = (arc->q > 0 ? 1 : -1) / arc->radius;
+    double stretch[MOST_ARC_POINTS];
+    for (int g = 0; g < points; g++) {
+        const double qs = arc->q * from->s[g], inverse = 1 / (1 + qs * qs);
+        const double cosine = (1 - qs * qs) * inverse, sine = 2 * qs * inverse;
+        const double dx = ax * cosine - ay * sine, dy = ax * sine + ay * cosine;
+        stretch[g] = inverse;
+        rule->x[g] = cx + dx;
+        rule->y[g] = cy + dy;
+        rule->ex[g] = -turn * dy;
+        rule->ey[g] = turn * dx;
+    }
+    for (int j = 0; j <= arc->order; j++) {
+        const double jacobian = arc->jacobian, by_node = jacobian * arc->node_weight[j];
+        for (int g = 0; g < points; g++) {
+            const double length = jacobian * stretch[g];
+            rule->H[j][g] = length * from->weight[j][g];
+            rule->G[j][g] = by_node * from->weight[j][g];
+            rule->N[j][g] = by_node * length * from->integral[j][g];
         }
+        for (int end = 0; end < 2; end++) rule->end_N[end][j] = by_node * from->end[end][j];
+    }
+    for (int end = 0; end < 2; end++) {
+        const double qs = end ? arc->q : -arc->q, inverse = 1 / (1 + qs * qs);
+        const double cosine = (1 - qs * qs) * inverse, sine = 2 * qs * inverse;
+        rule->end_x[end] = cx + ax * cosine - ay * sine;
+        rule->end_y[end] = cy + ax * sine + ay * cosine;
+    }
     return rule;
 }
 
@@ -152,26 +193,18 @@ static int choose_level(const FarArc *far, cplx z)
     return level < LEVELS && far->panels > 1 ? LEVELS - 1 : level;
 }
 
-/* Rows of four points on the element of a rule. */
+/* Rows of some points on the element of a rule. */
 INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const ArcRule *rule, Lanes zx, Lanes zy,
                      Lanes Nx, Lanes Ny, double *const *H, double *const *G)
 {
     const int shapes = order + 1, logarithm = tractions && !stress;
     const int64_t width = 2 * r->elements * shapes;
     const Lanes zero = spread(0);
-    Lanes logs[MOST_ARC_POINTS + 1], a[4][MAX_SHAPES], b[4][MAX_SHAPES];
+    Lanes logs[FUNCTION_BATCH / LANES], a[4][MAX_SHAPES], b[4][MAX_SHAPES];
 #pragma GCC unroll 4
     for (int j = 0; j < shapes; j++)
 #pragma GCC unroll 4
         for (int part = 0; part < 4; part++) a[part][j] = b[part][j] = zero;
-    if (logarithm) {
-        for (int g = 0; g < rule->points; g++) {
-            const Lanes rx = rule->x[g] - zx, ry = rule->y[g] - zy;
-            logs[g] = rx * rx + ry * ry;
-        }
-        logs[rule->points] = spread(1);
-        take_logarithms((double *)logs, (rule->points + 1) / 2 * FUNCTION_BATCH);
-    }
     for (int g = 0; g < rule->points; g++) {
         const Lanes rx = rule->x[g] - zx, ry = rule->y[g] - zy, inverse = 1 / (rx * rx + ry * ry);
         const Lanes vr = rx * inverse, vi = -ry * inverse, v2r = vr * vr - vi * vi, v2i = 2 * vr * vi; /* 1/r, 1/r^2 */
@@ -193,7 +226,7 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
             h[1] = MULTIPLY_IMAGINARY(ex, ey, vr, vi);
             h[2] = y * v2r;
             h[3] = y * v2i;
-            t[0] = logarithm ? logs[g] : zero;
+            t[0] = h[0];
             t[1] = zero;
             t[2] = rx * vr + ry * vi;
             t[3] = rx * vi - ry * vr;
@@ -202,9 +235,26 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
         for (int j = 0; j < shapes; j++)
 #pragma GCC unroll 4
             for (int part = 0; part < 4; part++) {
-                a[part][j] += rule->H[g][j] * h[part];
-                if (tractions && (stress || part != 1)) b[part][j] += rule->G[g][j] * t[part];
+                a[part][j] += rule->H[j][g] * h[part];
+                if (tractions && (stress || part > 1))
+                    b[part][j] += rule->G[j][g] * t[part];
+                else if (tractions && part == 0)
+                    b[part][j] -= rule->N[j][g] * t[part];
             }
+    }
+    if (logarithm) {
+        /* n by parts: the shapes' integrals times ln|r| at the ends, less their integral with its derivative, Re c */
+        for (int end = 0; end < 2; end++) {
+            const Lanes rx = rule->end_x[end] - zx, ry = rule->end_y[end] - zy;
+            logs[end] = rx * rx + ry * ry;
+        }
+        for (int i = 2; i < FUNCTION_BATCH / LANES; i++) logs[i] = spread(1);
+        take_batch_of_logarithms((double *)logs);
+        for (int end = 0; end < 2; end++) {
+            const Lanes value = (end ? 0.5 : -0.5) * logs[end] - (end ? 1 : -1) * r->log_length;
+#pragma GCC unroll 4
+            for (int j = 0; j < shapes; j++) b[0][j] += rule->end_N[end][j] * value;
+        }
     }
     Blocks hb, gb;
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1)), g = r->shear_modulus / (M_PI * (kappa + 1));
@@ -226,8 +276,7 @@ INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const 
         } else {
             put_lanes(&hb, j, fu * (kappa + 1) * *A[1], fu * (1 - kappa) * *A[0], 2 * fu * *A[2], -2 * fu * *A[3]);
             if (tractions)
-                put_symmetric(&gb, j, -2 * kappa * ft * (0.5 * *B[0] - rule->integral[j] * r->log_length), ft * *B[2],
-                              -ft * *B[3]);
+                put_symmetric(&gb, j, -2 * kappa * ft * *B[0], ft * *B[2], -ft * *B[3]);
         }
     }
     store_row(shapes, hb.xx, hb.xy, H, 0);

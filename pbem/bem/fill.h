@@ -153,12 +153,15 @@ static void fill_arc(const Rows *r, Py_ssize_t j, Workspace *work)
             if (sorted->count[level])
                 fill_listed(r, use_rule(&work->far, &work->arc, shape, level), j, sorted->point[level],
                             sorted->count[level]);
+        if (sorted->count[LEVELS]) prepare_poles(&work->arc);
         for (int p = 0; p < sorted->count[LEVELS]; p++) fill_near_arc(r, &work->arc, sorted->point[LEVELS][p], j);
     }
 }
 
 static void fill_rows(const Rows *r, const Kind *kinds, Workspace *work)
 {
+    work->near.count = 0;
+    for (int level = 0; level < LEVELS; level++) work->far.reference[level].points = 0;
     for (int k = 0; k < FAMILIES; k++) {
         const Kind *kind = &kinds[k];
         for (Py_ssize_t first = 0; first < kind->groups; first += TILE) {

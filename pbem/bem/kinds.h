@@ -1,4 +1,4 @@
-/* Rows of straight elements: sorted by kind, four at a time, the near ones apart. */
+/* Rows of straight elements: sorted by kind, several at a time, the near ones apart. */
 #ifndef PBEM_KINDS_H
 #define PBEM_KINDS_H
 #include <stdlib.h>
@@ -19,7 +19,7 @@ typedef struct {
     double *displacement, *traction; /* outputs: row 2 i + component, column 2 (element * shapes + j) + component */
 } Rows;
 
-/* The straight elements of one family, four by four; the last one repeats where the number is not divisible. */
+/* The straight elements of one family, by groups of lanes; the last one repeats where the number is not divisible. */
 typedef struct {
     Py_ssize_t groups;
     int family;
@@ -29,7 +29,7 @@ typedef struct {
 } Kind;
 
 /* Groups that are done for one point after the other; pairs near each other that are done together. */
-#define TILE 32
+#define TILE (128 / LANES)
 #define MOST_NEAR 256
 
 typedef struct {
@@ -37,6 +37,8 @@ typedef struct {
     int64_t point[MOST_NEAR], group[MOST_NEAR];
     int lane[MOST_NEAR];
 } NearPairs;
+
+static int round_up(int count, int step) { return (count + step - 1) / step * step; }
 
 static int is_repeated(const int64_t *element, int lane) { return lane && element[lane] == element[lane - 1]; }
 
@@ -46,7 +48,7 @@ static double *locate_block(const Rows *r, double *out, Py_ssize_t point, int64_
     return out ? out + 2 * shapes * (2 * point * r->elements + element) : NULL;
 }
 
-/* Four of the near pairs side by side: their elements, points, normals and the places of their rows. */
+/* Some of the near pairs side by side: their elements, points, normals and the places of their rows. */
 typedef struct {
     Frame frame;
     Lanes x, y, off, Nx, Ny; /* off: 0 on the element, otherwise 1 */
@@ -90,7 +92,7 @@ INLINE void fill_near_pairs(int order, int tractions, int stress, const Rows *r,
     NearLanes all[MOST_NEAR / LANES];
     Lanes log_ratio[MOST_NEAR / LANES], log_ends[MOST_NEAR / LANES];
     Lanes along[MOST_NEAR / LANES], angle[MOST_NEAR / LANES];
-    const int count = (near->count + FUNCTION_BATCH - 1) / FUNCTION_BATCH * FUNCTION_BATCH;
+    const int count = round_up(near->count, FUNCTION_BATCH);
     for (int p = 0; p < count / LANES; p++) {
         gather_pairs(r, kind, near, p * LANES, &all[p]);
         const Lanes x = all[p].x, y = all[p].y;
@@ -136,8 +138,9 @@ INLINE void fill_tile(int order, int tractions, int stress, const Rows *r, const
         }
         if (tractions && !stress) {
             memcpy(logs, ends, count * sizeof(Lanes));
-            if (count % 2) logs[count] = spread(1);
-            take_logarithms((double *)logs, (count + 1) / 2 * FUNCTION_BATCH);
+            const int full = round_up(count * LANES, FUNCTION_BATCH);
+            for (int g = count; g < full / LANES; g++) logs[g] = spread(1);
+            take_logarithms((double *)logs, full);
         }
         for (int g = 0; g < count; g++) {
             const int64_t *element = kind->element[first + g];
@@ -265,9 +268,10 @@ static Kind prepare_kind(const Rows *r, int family)
         f->ex *= f->inverse_h;
         f->ey *= f->inverse_h;
         if (with_logarithm && family == BOUNDARY) {
-            Lanes both[FUNCTION_BATCH / LANES] = {square, square};
-            take_batch_of_logarithms((double *)both);
-            f->log_h = 0.5 * both[0];
+            Lanes batch[FUNCTION_BATCH / LANES];
+            for (int i = 0; i < FUNCTION_BATCH / LANES; i++) batch[i] = square;
+            take_batch_of_logarithms((double *)batch);
+            f->log_h = 0.5 * batch[0];
         }
     }
     return kind;

@@ -1,22 +1,29 @@
-/* Four pairs of point and element at a time: vectors of four doubles, and how their results are stored. */
+/* Several pairs of point and element at a time: vectors of doubles, and how their results are stored.
+ *
+ * Four lanes where the processor has registers of that length, otherwise two.
+ */
 #ifndef PBEM_LANES_H
 #define PBEM_LANES_H
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
+#ifdef __AVX__
 #define LANES 4
+#else
+#define LANES 2
+#endif
 /* Orders and kinds of rows are constants of the callers: inlining makes straight code of loops over nodes. */
 #define INLINE static inline __attribute__((always_inline))
 
 typedef double Lanes __attribute__((vector_size(LANES * sizeof(double))));
-typedef double Pair __attribute__((vector_size(2 * sizeof(double))));
+
+typedef int64_t LaneIndex __attribute__((vector_size(LANES * sizeof(double))));
 
 #ifdef __clang__
-#define SHUFFLE(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l)
+#define SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else
-typedef int64_t LaneIndex __attribute__((vector_size(LANES * sizeof(int64_t))));
-#define SHUFFLE(a, b, i, j, k, l) __builtin_shuffle(a, b, (LaneIndex){i, j, k, l})
+#define SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (LaneIndex){__VA_ARGS__})
 #endif
 
 /* Loops of a fixed number, apart from all others: the compiler gives them to the vector functions of the C library, and
@@ -45,45 +52,65 @@ static void take_arguments(double *y, const double *x, int count)
     for (int p = 0; p < count; p += FUNCTION_BATCH) take_batch_of_arguments(y + p, x + p);
 }
 
-INLINE Lanes spread(double value) { return (Lanes){value, value, value, value}; }
+INLINE Lanes spread(double value) { return (Lanes){0} + value; }
 
+/* The complex product (a + ib)(c + id) in lanes. */
+#define MULTIPLY_REAL(a, b, c, d) ((a) * (c) - (b) * (d))
+#define MULTIPLY_IMAGINARY(a, b, c, d) ((a) * (d) + (b) * (c))
+
+#if LANES == 4
 INLINE double find_least(Lanes a)
 {
     const double left = a[0] < a[1] ? a[0] : a[1], right = a[2] < a[3] ? a[2] : a[3];
     return left < right ? left : right;
 }
 
-/* The complex product (a + ib)(c + id) in lanes. */
-#define MULTIPLY_REAL(a, b, c, d) ((a) * (c) - (b) * (d))
-#define MULTIPLY_IMAGINARY(a, b, c, d) ((a) * (d) + (b) * (c))
+/* Pairs (x, y) of the even lanes, of the odd lanes. */
+INLINE Lanes pair_even(Lanes x, Lanes y) { return SHUFFLE(x, y, 0, 4, 2, 6); }
+INLINE Lanes pair_odd(Lanes x, Lanes y) { return SHUFFLE(x, y, 1, 5, 3, 7); }
 
-INLINE void store_pair(double *out, Lanes a, int upper)
+/* The pairs a and b side by side, for every other lane from the first of out on. */
+INLINE void store_joined(double *const *out, int64_t at, Lanes a, Lanes b)
 {
-    const Pair half = upper ? (Pair){a[2], a[3]} : (Pair){a[0], a[1]};
-    memcpy(out, &half, sizeof half);
+    const Lanes first = SHUFFLE(a, b, 0, 1, 4, 5), second = SHUFFLE(a, b, 2, 3, 6, 7);
+    memcpy(out[0] + at, &first, sizeof first);
+    memcpy(out[2] + at, &second, sizeof second);
 }
+
+typedef double Pair __attribute__((vector_size(2 * sizeof(double))));
+
+INLINE void store_single(double *const *out, int64_t at, Lanes a)
+{
+    const Pair first = {a[0], a[1]}, second = {a[2], a[3]};
+    memcpy(out[0] + at, &first, sizeof first);
+    memcpy(out[2] + at, &second, sizeof second);
+}
+#else
+INLINE double find_least(Lanes a) { return a[0] < a[1] ? a[0] : a[1]; }
+INLINE Lanes pair_even(Lanes x, Lanes y) { return SHUFFLE(x, y, 0, 2); }
+INLINE Lanes pair_odd(Lanes x, Lanes y) { return SHUFFLE(x, y, 1, 3); }
+INLINE void store_single(double *const *out, int64_t at, Lanes a) { memcpy(out[0] + at, &a, sizeof a); }
+
+INLINE void store_joined(double *const *out, int64_t at, Lanes a, Lanes b)
+{
+    store_single(out, at, a);
+    store_single(out, at + 2, b);
+}
+#endif
 
 /* One row of the blocks of every lane's element: x[node], y[node] side by side at the lane's own place. */
 INLINE void store_row(int shapes, const Lanes *x, const Lanes *y, double *const *out, int64_t offset)
 {
-    Lanes even[LANES], odd[LANES]; /* of lanes 0 and 2, 1 and 3 */
-    for (int node = 0; node < shapes; node++) {
-        even[node] = SHUFFLE(x[node], y[node], 0, 4, 2, 6);
-        odd[node] = SHUFFLE(x[node], y[node], 1, 5, 3, 7);
-    }
+#pragma GCC unroll 2
     for (int node = 0; node + 1 < shapes; node += 2) {
-        const Lanes whole[LANES] = {
-            SHUFFLE(even[node], even[node + 1], 0, 1, 4, 5), SHUFFLE(odd[node], odd[node + 1], 0, 1, 4, 5),
-            SHUFFLE(even[node], even[node + 1], 2, 3, 6, 7), SHUFFLE(odd[node], odd[node + 1], 2, 3, 6, 7)};
-        for (int lane = 0; lane < LANES; lane++)
-            memcpy(out[lane] + offset + 2 * node, &whole[lane], sizeof(Lanes));
+        const int64_t at = offset + 2 * node;
+        store_joined(out, at, pair_even(x[node], y[node]), pair_even(x[node + 1], y[node + 1]));
+        store_joined(out + 1, at, pair_odd(x[node], y[node]), pair_odd(x[node + 1], y[node + 1]));
     }
     if (shapes % 2) {
         const int node = shapes - 1;
-        store_pair(out[0] + offset + 2 * node, even[node], 0);
-        store_pair(out[1] + offset + 2 * node, odd[node], 0);
-        store_pair(out[2] + offset + 2 * node, even[node], 1);
-        store_pair(out[3] + offset + 2 * node, odd[node], 1);
+        store_single(out, offset + 2 * node, pair_even(x[node], y[node]));
+        store_single(out + 1, offset + 2 * node, pair_odd(x[node], y[node]));
     }
 }
 

@@ -1,4 +1,4 @@
-/* Moments of straight elements, four pairs of point and element at a time; see _kernels.c for what they are.
+/* Moments of straight elements, several pairs of point and element at a time; see _kernels.c for what they are.
  *
  * Far from an element only the highest c is summed, in v = 1/w; the others follow without loss of digits. With q = v^2
  * and Y = 2/(w^2 - 1) = d_0:
@@ -15,7 +15,7 @@
 #include "lanes.h"
 #include "moments.h"
 
-/* Elements of four lanes: middle, unit direction, half-length, its inverse and its logarithm. */
+/* Elements, one a lane: middle, unit direction, half-length, its inverse and its logarithm. */
 typedef struct {
     Lanes mx, my, ex, ey, h, inverse_h, log_h;
 } Frame;

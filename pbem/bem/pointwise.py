@@ -50,7 +50,7 @@ class PointRows:
 
     def _evaluate(self, v: Real, normals: tuple[complex | None, ...]) -> Complex:
         fields = self.targets.spread(self.sources.collect(v), self.sources.forest)
-        far = np.ascontiguousarray(fields).view(float).reshape(len(fields), -1)
+        far = np.ascontiguousarray(fields).view(float).reshape(len(fields), 4 * (self.parts.terms + 1))
         forest = self.targets.forest
         leaves = forest.leaves
         begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))

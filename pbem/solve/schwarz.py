@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lapack
 
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rows import Sources, evaluate_rows
@@ -88,11 +88,13 @@ class SchwarzPreconditioner:
         wanted = np.flatnonzero(np.isin(around, _both(list_nodes(self._mesh, inverse.group.elements))))
         unit = np.zeros((len(around), len(wanted)))
         unit[wanted, np.arange(len(wanted))] = 1.0
-        with np.errstate(all="ignore"):
-            factors = lu_factor(local, overwrite_a=True, check_finite=False)
-            rows = lu_solve(factors, unit, trans=1, overwrite_b=True, check_finite=False).T
+        factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(local), overwrite_a=True)
+        if not zero_pivot:
+            rows = lapack.dgetrs(factors, pivots, unit, trans=1)[0].T
+            if np.isfinite(rows).all():
+                return np.ascontiguousarray(rows)
         # A group that nothing holds without the rest of the model: its residual serves as it is.
-        return np.ascontiguousarray(rows) if np.isfinite(rows).all() else np.ascontiguousarray(unit.T)
+        return np.ascontiguousarray(unit.T)
 
     def _form(
         self, elements: Integer, around: Integer, constraints: sparse.csc_matrix, free: sparse.csr_matrix
@@ -102,9 +104,12 @@ class SchwarzPreconditioner:
         nodes = around[::2] // 2
         local = free[around][:, around].toarray()
         chosen = constraints[:, around].tocsr()
+        # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
+        moved = np.flatnonzero(np.diff(chosen.indptr)) // 2 % mesh.nodes
+        sources = np.union1d(elements, mesh.node_element[moved])
         for region in np.unique(mesh.region[elements]):
             own = np.flatnonzero(mesh.node_region[nodes] == region)
-            values, columns = self._evaluate(int(region), elements[mesh.region[elements] == region], nodes[own])
+            values, columns = self._evaluate(int(region), sources[mesh.region[sources] == region], nodes[own])
             local[_both(own)] += (chosen[columns].T @ values.T).T
         return local
 
@@ -114,7 +119,8 @@ class SchwarzPreconditioner:
         sources: Sources = self._sources[region].select(elements - self._first_element[region])
         bounded = bool((sources.family == 0).any())
         on = np.searchsorted(elements, mesh.node_element[nodes])
-        columns = _both(nodes)
+        seen = list_nodes(mesh, elements)
+        columns = _both(seen)
         if bounded:
             columns = np.concatenate([columns, 2 * mesh.nodes + columns])
         values = np.empty((2 * len(nodes), len(columns)))
@@ -128,16 +134,24 @@ class SchwarzPreconditioner:
         values *= -np.repeat(self._scale[nodes], 2)[:, None]
         for anchor in self._anchors:
             if anchor.region == region:
-                self._anchor(values, nodes, anchor)
+                self._anchor(values, nodes, seen, anchor)
         return values, columns
 
     @staticmethod
-    def _anchor(values: Real, nodes: Integer, anchor: Anchor) -> None:
-        place = np.searchsorted(anchor.nodes, nodes)
-        known = (place < len(anchor.nodes)) & (anchor.nodes[np.minimum(place, len(anchor.nodes) - 1)] == nodes)
-        pattern, functional = anchor.pattern[place[known]], anchor.functional[place[known]]
-        at = _both(np.flatnonzero(known))
-        values[np.ix_(at, at)] += np.outer(_split(pattern), _split(functional))
+    def _anchor(values: Real, nodes: Integer, seen: Integer, anchor: Anchor) -> None:
+        """Add an anchor's part in the equations of nodes and the displacements of those seen."""
+        at, pattern = _look_up(anchor.nodes, anchor.pattern, nodes)
+        on, functional = _look_up(anchor.nodes, anchor.functional, seen)
+        values[np.ix_(_both(at), _both(on))] += np.outer(_split(pattern), _split(functional))
+
+
+def _look_up(
+    known: Integer, value: NDArray[np.complex128], nodes: Integer
+) -> tuple[Integer, NDArray[np.complex128]]:
+    """Places in nodes (k,) of those that are known (sorted), and their values."""
+    place = np.minimum(np.searchsorted(known, nodes), len(known) - 1)
+    at = np.flatnonzero(known[place] == nodes)
+    return at, value[place[at]]
 
 
 def _both(nodes: Integer) -> Integer:

@@ -1,0 +1,107 @@
+"""Groups of elements: together they are the model, on any number of ranks, each with its neighbours around it."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pbem.mesh.mesh import Mesh
+from pbem.solve import groups
+from pbem.solve.groups import divide_model, list_nodes, share_groups, surround_groups
+from tests.unit.far_sample import TEXTS, make_sample
+
+each_sample = pytest.mark.parametrize("name", TEXTS)
+
+
+@pytest.fixture(autouse=True)
+def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups, "ONE_GROUP", 0)
+    monkeypatch.setattr(groups, "GROUP_ELEMENTS", 10)
+
+
+def take_mesh(name: str) -> Mesh:
+    return make_sample(name).mesh
+
+
+@each_sample
+def test_every_element_is_in_one_group_of_its_curve(name: str) -> None:
+    mesh = take_mesh(name)
+    divided = divide_model(mesh)
+    assert sorted(np.concatenate(divided)) == list(range(mesh.elements))
+    assert len(divided) > 5
+    for group in divided:
+        assert 1 <= len(group) <= 10 and (np.diff(group) > 0).all()
+        assert len(np.unique(mesh.curve[group])) == 1
+
+
+def test_a_small_model_is_one_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = take_mesh("panel")
+    monkeypatch.setattr(groups, "ONE_GROUP", 2 * mesh.nodes)
+    (group,) = divide_model(mesh)
+    np.testing.assert_array_equal(group, np.arange(mesh.elements))
+    (only,) = surround_groups(mesh, [group], 0, 1)
+    np.testing.assert_array_equal(only.around, group)
+    monkeypatch.setattr(groups, "ONE_GROUP", 2 * mesh.nodes - 1)
+    assert len(divide_model(mesh)) > 1
+
+
+def test_both_sides_of_an_interface_are_in_one_group() -> None:
+    mesh = take_mesh("blocks SST")
+    group_of = np.empty(mesh.elements, dtype=np.int64)
+    for number, group in enumerate(divide_model(mesh)):
+        group_of[group] = number
+    first, second = mesh.node_element[mesh.pairs.first], mesh.node_element[mesh.pairs.second]
+    assert (group_of[first] == group_of[second]).mean() > 0.9
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 8, 200])
+@each_sample
+def test_ranks_share_all_groups(name: str, ranks: int) -> None:
+    mesh = take_mesh(name)
+    divided = divide_model(mesh)
+    bounds = [share_groups(mesh, divided, rank, ranks) for rank in range(ranks)]
+    assert bounds[0][0] == 0 and bounds[-1][1] == len(divided)
+    for (_, last), (first, _) in pairwise(bounds):
+        assert first == last
+    shares = [sum(len(group) for group in divided[first:last]) for first, last in bounds]
+    if ranks <= len(divided):
+        assert min(shares) > 0 and max(shares) <= mesh.elements / ranks + 2 * 10
+
+
+@each_sample
+def test_groups_are_surrounded_by_those_next_to_them(name: str) -> None:
+    mesh = take_mesh(name)
+    divided = divide_model(mesh)
+    found = surround_groups(mesh, divided, 0, len(divided))
+    whole = np.arange(mesh.elements)
+    for group, surrounded in zip(divided, found, strict=True):
+        np.testing.assert_array_equal(surrounded.elements, group)
+        assert set(group) < set(surrounded.around) <= set(whole)
+        assert (np.diff(surrounded.around) > 0).all()
+        # As many as there is room for, and those that it touches.
+        ends = np.concatenate([mesh.start[group], mesh.end[group]])
+        touching = [other for other in divided if np.isin([mesh.start[other], mesh.end[other]], ends).any()]
+        assert all(set(other) <= set(surrounded.around) for other in touching)
+        unknowns = 2 * (mesh.order + 1)
+        extra = unknowns * (len(surrounded.around) - sum(len(other) for other in touching))
+        assert extra <= max(groups.NEIGHBOUR_UNKNOWNS, groups.NEIGHBOUR_SHARE * unknowns * len(group))
+
+
+def test_a_share_of_the_groups_is_surrounded_alike() -> None:
+    mesh = take_mesh("cracks")
+    divided = divide_model(mesh)
+    whole = surround_groups(mesh, divided, 0, len(divided))
+    part = surround_groups(mesh, divided, 3, 7)
+    assert len(part) == 4
+    for one, other in zip(part, whole[3:7], strict=True):
+        np.testing.assert_array_equal(one.elements, other.elements)
+        np.testing.assert_array_equal(one.around, other.around)
+
+
+def test_nodes_are_listed_in_the_elements_order() -> None:
+    mesh = take_mesh("cracks")
+    nodes = list_nodes(mesh, np.array([7, 2]))
+    np.testing.assert_array_equal(nodes, [21, 22, 23, 6, 7, 8])
+    np.testing.assert_array_equal(mesh.node_element[nodes], [7] * 3 + [2] * 3)

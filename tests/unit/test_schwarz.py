@@ -1,0 +1,164 @@
+"""The preconditioner of groups: the inverse if there is one, formed anew where modes change, harmless if singular."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.mesh.generate import generate_mesh
+from pbem.parallel import world
+from pbem.solve import groups
+from pbem.solve.assembly import assemble_problem
+from pbem.solve.groups import Group
+from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.problem import Problem
+from pbem.solve.schwarz import SchwarzPreconditioner
+from tests.identities.solving import assemble_tangent, linearise_pairs
+from tests.unit.far_sample import TEXTS, read_sample, shrink_leaves
+
+Real = NDArray[np.float64]
+each_sample = pytest.mark.parametrize("name", TEXTS)
+
+
+@pytest.fixture
+def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups, "ONE_GROUP", 0)
+    monkeypatch.setattr(groups, "GROUP_ELEMENTS", 12)
+    monkeypatch.setattr(groups, "NEIGHBOUR_UNKNOWNS", 150)
+
+
+def assemble(name: str, operator: str = "hierarchical") -> Problem:
+    model = read_sample(name, operator)
+    return assemble_problem(model, generate_mesh(model), world)
+
+
+def constrain(problem: Problem, modes: ModeState | None = None) -> ConstraintMap:
+    return problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 1.0))
+
+
+def draw_modes(problem: Problem, seed: int) -> ModeState:
+    random = np.random.default_rng(seed)
+    count = problem.mesh.pairs.count
+    return ModeState(random.choice([STICK, SLIP, OPEN], count).astype(np.int8), random.choice([-1.0, 1.0], count))
+
+
+def precondition(problem: Problem) -> SchwarzPreconditioner:
+    tangent = make_tangent(problem)
+    assert isinstance(tangent, KrylovTangent)
+    return tangent.preconditioner
+
+
+def apply(preconditioner: SchwarzPreconditioner, residual: Real) -> Real:
+    result = np.full(len(residual), np.nan)
+    preconditioner.apply(residual, result)
+    return result
+
+
+@pytest.mark.parametrize("modes", ["stick", "mixed"])
+@each_sample
+def test_with_one_group_it_is_the_inverse(name: str, modes: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups, "ONE_GROUP", 10**6)
+    problem = assemble(name)
+    chosen = draw_modes(problem, 1) if modes == "mixed" and name in ("cracks", "infinite", "panel") else None
+    preconditioner = precondition(problem)
+    assert preconditioner.update(constrain(problem, chosen)) == 1
+    exact = assemble_tangent(assemble(name, "dense"), chosen)
+    random = np.random.default_rng(3).normal(size=problem.unknowns)
+    solution = apply(preconditioner, random)
+    left = np.linalg.norm(exact @ solution - random) / np.linalg.norm(random)
+    assert left < 1e-15 * np.linalg.cond(exact) + 1e-9
+
+
+@each_sample
+def test_with_one_group_gmres_ends_at_once(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups, "ONE_GROUP", 10**6)
+    shrink_leaves(monkeypatch)
+    problem = assemble(name)
+    tangent = make_tangent(problem)
+    assert isinstance(tangent, KrylovTangent)
+    solved = tangent.solve(constrain(problem), problem.evaluate_load(0, 1.0))
+    # The inverse is that of the exact tangent operator, the product has the errors of the expansions.
+    assert sum(tangent.iterations) <= 3 and solved.residual <= 1e-9
+    tangent.destroy()
+
+
+@pytest.mark.parametrize("name", ["cracks", "panel", "infinite", "inclusions"])
+def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) -> None:
+    problem = assemble(name)
+    preconditioner, count = precondition(problem), len(problem.groups)
+    residual = np.random.default_rng(2).normal(size=problem.unknowns)
+    modes = draw_modes(problem, 5)
+    assert preconditioner.update(constrain(problem, modes)) == count > 5
+    assert preconditioner.update(constrain(problem, modes)) == 0
+    changed = ModeState(modes.mode.copy(), modes.sign.copy())
+    changed.mode[0] = OPEN if modes.mode[0] == STICK else STICK
+    affected = preconditioner.update(constrain(problem, changed))
+    slot = problem.mesh.node_element[problem.mesh.pairs.slot[0]]
+    assert 1 <= affected < count or count < 8
+    assert affected >= sum(slot in group.around for group in problem.groups)
+    fresh = precondition(problem)
+    fresh.update(constrain(problem, changed))
+    np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+    # And back.
+    preconditioner.update(constrain(problem, modes))
+    fresh = precondition(problem)
+    fresh.update(constrain(problem, modes))
+    np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+
+
+@each_sample
+def test_each_group_has_the_exact_rows_of_its_own_tangent(name: str, many_groups: None) -> None:
+    """Each group's part is that of the solution of the tangent operator's rows and columns of group and neighbours."""
+    problem = assemble(name)
+    preconditioner = precondition(problem)
+    preconditioner.update(constrain(problem))
+    exact = assemble_tangent(assemble(name, "dense"))
+    residual = np.random.default_rng(2).normal(size=problem.unknowns)
+    found = apply(preconditioner, residual)
+    assert np.isfinite(found).all(), "every unknown belongs to a group"
+    for inverse in preconditioner.inverses:
+        local = exact[np.ix_(inverse.around, inverse.around)]
+        at = np.isin(inverse.around, (2 * problem.operator.nodes[:, None] + np.arange(2)).ravel()[inverse.own])
+        expected = np.linalg.solve(local, residual[inverse.around])[at]
+        limit = 1e-14 * np.linalg.cond(local) * np.abs(expected).max()
+        np.testing.assert_allclose(found[inverse.own], expected, rtol=0, atol=limit)
+
+
+def test_a_group_without_an_inverse_passes_its_residual_on(many_groups: None) -> None:
+    problem = assemble("cracks")
+    preconditioner = precondition(problem)
+    constraints = constrain(problem)
+    # Nothing depends on the unknowns of the first group's first node.
+    column = int(preconditioner.inverses[0].around[0])
+    keep = sparse.diags((np.arange(problem.unknowns) != column).astype(float))
+    preconditioner.update(replace(constraints, matrix=(constraints.matrix @ keep).tocsr()))
+    residual = np.random.default_rng(2).normal(size=problem.unknowns)
+    result = apply(preconditioner, residual)
+    assert np.isfinite(result).all()
+    hit = [inverse for inverse in preconditioner.inverses if column in inverse.around]
+    assert hit
+    for inverse in hit:
+        rows = (2 * problem.operator.nodes[:, None] + np.arange(2)).ravel()[inverse.own]
+        np.testing.assert_array_equal(result[inverse.own], residual[rows])
+    preconditioner.update(constraints)
+    fresh = precondition(problem)
+    fresh.update(constraints)
+    np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+
+
+def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the whole model around every group the preconditioner is the inverse again."""
+    problem = assemble("cracks")
+    whole = np.arange(problem.mesh.elements)
+    problem = replace(problem, groups=tuple(Group(group.elements, whole) for group in problem.groups[:]))
+    preconditioner = precondition(problem)
+    preconditioner.update(constrain(problem))
+    exact = assemble_tangent(assemble("cracks", "dense"))
+    residual = np.random.default_rng(2).normal(size=problem.unknowns)
+    np.testing.assert_allclose(exact @ apply(preconditioner, residual), residual, rtol=0, atol=1e-9)

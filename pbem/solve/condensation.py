@@ -1,8 +1,8 @@
 """The unknowns of contact pairs apart from all others: a change of modes is a small system of equations.
 
 A pair's state q (p_n, p_s, g_n, g_s) is q = T x_c + o in its mode, and only this part of the constraint map changes
-with the modes: v = M_0' x_f + E q + m, with B E the operator's columns of the pairs' states. Split every state along the
-pair's two columns T_0 in a reference operator K_0 and two more columns C, q = T_0 a + C b. Then
+with the modes: v = M_0' x_f + E q + m, with B E the operator's columns of the pairs' states. Split every state along
+the pair's two columns T_0 in a reference operator K_0 and two more columns C, q = T_0 a + C b. Then
 
     K_0 (x_f, a) + B E C b + B m = 0,    that is    (x_f, a) = y - W b,   W = K_0^-1 B E C,   y = -K_0^-1 B m
 

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +29,16 @@ from pbem.model.build import read_model
 from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
+from pbem.solve.factored import FactoredTangent
+from pbem.solve.krylov import make_tangent
 from pbem.solve.march import start_from_rest
 from pbem.solve.newton import solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.step import SilentReporter
-from pbem.solve.tangent import Tangent
+from pbem.solve.tangent import AnyTangent
 
 Real = NDArray[np.float64]
+T = TypeVar("T", bound=AnyTangent)
 
 CASES = ("panel_frictionless_closing", "panel_friction_closing", "two_blocks", "layers_push_stiff")
 JOINT_STIFFNESSES = (0.125, 0.25, 0.5, 1.0, 2.0)
@@ -63,7 +67,7 @@ def project(problem: Problem, trial: Real, stiffness: Real, slip_before: Real, l
     return PairState(p_n, p_s, (normal - p_n) / stiffness, slip_before + (tangential - p_s) / stiffness)
 
 
-def solve_classically(problem: Problem, tangent: Tangent, load: Load, factor: float) -> tuple[PairState, int]:
+def solve_classically(problem: Problem, tangent: FactoredTangent, load: Load, factor: float) -> tuple[PairState, int]:
     """Converge one step from rest with the constant elastic operator; returns the pairs and the number of iterations.
 
     factor: joint stiffness in moduli per element length. Diverging iterations count as MOST_ITERATIONS.
@@ -95,18 +99,20 @@ def solve_classically(problem: Problem, tangent: Tangent, load: Load, factor: fl
     return state, MOST_ITERATIONS
 
 
-def solve_by_tangent(problem: Problem, tangent: Tangent, load: Load) -> tuple[PairState, int]:
+def solve_by_tangent(problem: Problem, tangent: AnyTangent, load: Load) -> tuple[PairState, int]:
     """Converge one step from rest with the tangent operator; returns the pairs and the number of iterations."""
     solution = solve_step(problem, tangent, start_from_rest(problem).memory, load, SilentReporter())
     return solution.pairs, len(solution.iterations)
 
 
-def time_best(problem: Problem, solve: Callable[[Tangent], tuple[PairState, int]], repeat: int) -> Timed:
+def time_best(
+    problem: Problem, make: Callable[[Problem], T], solve: Callable[[T], tuple[PairState, int]], repeat: int
+) -> Timed:
     """The fastest of some runs, factorisation included."""
     best = np.inf
     for _ in range(repeat):
         begin = time.perf_counter()
-        tangent = Tangent(problem)
+        tangent = make(problem)
         pairs, iterations = solve(tangent)
         tangent.destroy()
         best = min(best, time.perf_counter() - begin)
@@ -117,9 +123,11 @@ def measure(model: Model, repeat: int) -> str:
     """One line of the table."""
     problem = assemble_problem(model, generate_mesh(model), world)
     load = problem.evaluate_load(0, 1.0)
-    newton = time_best(problem, lambda tangent: solve_by_tangent(problem, tangent, load), repeat)
+    newton = time_best(problem, make_tangent, lambda tangent: solve_by_tangent(problem, tangent, load), repeat)
     trials = {
-        factor: time_best(problem, lambda tangent, f=factor: solve_classically(problem, tangent, load, f), 1)
+        factor: time_best(
+            problem, FactoredTangent, lambda tangent, f=factor: solve_classically(problem, tangent, load, f), 1
+        )
         for factor in JOINT_STIFFNESSES
     }
     factor, classical = min(trials.items(), key=lambda item: item[1].iterations)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import petsc4py
@@ -57,138 +58,223 @@ def petsc_options(options: Mapping[str, str]) -> Iterator[None]:
             database.delValue(PREFIX + name)
 
 
-class LinearSolver:
-    """Holds the distributed matrix, its Krylov solver and its factors; rows in contiguous shares of the ranks.
+def list_options() -> list[str]:
+    """Names of the options that PETSc's database holds under the program's prefix."""
+    return list(PETSc.Options(PREFIX).getAll())
 
-    reuse: keep the factors of an earlier matrix as preconditioner while GMRES converges quickly with them.
+
+class LinearSolver:
+    """LU factors of a distributed matrix as preconditioner of GMRES; rows in contiguous shares of the ranks.
+
+    The matrix is filled once and gives its storage to its factors. GMRES multiplies by `multiply`, from this rank's
+    part of a vector to this rank's part of the product: with the operator that was factorised it ends in one
+    iteration, with one near to it in some. All methods are called by all ranks together.
+
+    seconds: of the last factorisation and the filling before it; iterations, iteration_seconds: of the last solution.
     """
 
-    def __init__(self, comm: MPI.Intracomm, method: Method, local_rows: int, rows: int, reuse: bool) -> None:
+    def __init__(
+        self, comm: MPI.Intracomm, method: Method, local_rows: int, rows: int, multiply: Callable[[Real], Real]
+    ) -> None:
         self.method = method
-        self.reuse = reuse
         self.comm = comm
-        self.factored = False  # factors are there that have served a solution
         self.shape = ((local_rows, rows), (local_rows, rows))
         self.matrix: PETSc.Mat | None = None
         self.solver: PETSc.KSP | None = None
-        self.converted: PETSc.Mat | None = None  # ScaLAPACK's copy of the dense matrix, which it factors
         self.factor_type = "mumps" if method == "mumps" else ("petsc" if comm.size == 1 else "scalapack")
         self.workspace = 30  # per cent by which MUMPS may exceed its estimate (ICNTL(14))
-        self.right, self.left = self._make_vectors()
+        # ScaLAPACK has shares of its own: vectors change them on their way to it and back.
+        inner = share_equally(rows, comm.size) if self.factor_type == "scalapack" else comm.allgather(local_rows)
+        self.outer, self.inner = np.array(comm.allgather(local_rows)), np.array(inner)
+        self.inner_shape = 2 * ((int(self.inner[comm.rank]), rows),)
+        self.operator = PETSc.Mat().createPython(self.inner_shape, _Product(self._multiply), comm=comm)
+        self.multiply = multiply
+        self.operator.setUp()
+        self.right, self.left = self.operator.createVecs()
+        self.seconds = self.iteration_seconds = 0.0
+        self.iterations = 0
+        self._filling = 0.0
 
-    def _make_vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
-        right = PETSc.Vec().createMPI(self.shape[0], comm=self.comm)
-        return right, right.duplicate()
+    @property
+    def factored(self) -> bool:
+        """Whether there are factors; the user's options may have put something else in their place."""
+        return self.solver is not None and self.solver.getPC().getType() == "lu"
 
-    def allocate(self, inside: Integer, outside: Integer) -> None:
-        """Make the matrix; inside, outside (local_rows,): numbers of columns in which each row can be non-zero.
+    def begin_filling(self, counts: tuple[Integer, Integer] | None = None) -> None:
+        """Make an empty matrix in place of the former and its factors.
 
-        Inside are the columns with the numbers of this rank's rows.
+        counts, for MUMPS: numbers (local_rows,) of columns in which each row can be non-zero, inside and outside of the
+        columns with the numbers of this rank's rows.
         """
+        self._filling = time.perf_counter()
+        self._release()
         if self.method == "lu":
-            self.matrix = PETSc.Mat().createDense(self.shape, comm=self.comm)
+            self.matrix = PETSc.Mat().createDense(self.inner_shape, comm=self.comm)
             self.matrix.setUp()
             return
+        assert counts is not None
         self.matrix = PETSc.Mat().create(comm=self.comm)
         self.matrix.setSizes(self.shape)
         self.matrix.setType("aij")
-        self.matrix.setPreallocationNNZ((inside.astype(PETSc.IntType), outside.astype(PETSc.IntType)))
+        self.matrix.setPreallocationNNZ(tuple(count.astype(PETSc.IntType) for count in counts))
         self.matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, True)
 
-    def fill(self, rows: Integer, columns: Integer, values: Real) -> None:
-        """Set a dense block: local row numbers, global column numbers, values (rows, columns)."""
+    def fill_columns(self, first: int, values: Real) -> None:
+        """Set some columns (local_rows, k) of a dense matrix, from the first on; all ranks together."""
         assert self.matrix is not None
-        if self.method == "lu":
-            self.matrix.getDenseArray()[np.ix_(rows, columns)] = values
-            return
+        self.matrix.getDenseArray()[:, first : first + values.shape[1]] = self._share(values, self.outer, self.inner)
+
+    def fill(self, rows: Integer, columns: Integer, values: Real) -> None:
+        """Set a dense block of a sparse matrix: local row numbers, global column numbers, values (rows, columns)."""
+        assert self.matrix is not None
         begin = self.matrix.getOwnershipRange()[0]
         self.matrix.setValues(
             (rows + begin).astype(PETSc.IntType), columns.astype(PETSc.IntType), np.ascontiguousarray(values)
         )
 
-    def finish_filling(self) -> None:
-        """End an update of the matrix; its factors are made anew at the next solution unless they are reused."""
+    def factorise(self) -> None:
+        """Factorise the filled matrix.
+
+        Raises ConvergenceError ("singular tangent" or "linear solver") on all ranks alike; then there are no factors.
+        """
         assert self.matrix is not None
         self.matrix.assemble()
-        if not (self.reuse and self.factored):
-            self._renew()
-
-    def _make_solver(self) -> None:
-        solver = PETSc.KSP().create(comm=self.comm)
-        solver.setOptionsPrefix(PREFIX)
         if self.factor_type == "scalapack":
-            assert self.matrix is not None
-            self.converted = self.matrix.convert("scalapack", out=PETSc.Mat())
-        solver.setOperators(self.matrix, self.converted)
+            dense = self.matrix
+            self.matrix = self._scatter(dense)
+            dense.destroy()
+        while not self._set_up():
+            code = self._find_mumps_code()
+            self._destroy_solver()
+            if code not in MORE_ROOM_HELPS or self.workspace >= MOST_WORKSPACE:
+                self._release()
+                raise _explain_factors(code)
+            self.workspace = 2 * self.workspace + 50
+        assert self.solver is not None
+        if self.factor_type == "mumps":  # it has a copy of its own
+            self.solver.setOperators(self.operator, self.operator)
+            self.matrix.destroy()
+            self.matrix = None
+        else:
+            self.solver.setOperators(self.operator, self.matrix)
+        self.seconds = self._slowest(time.perf_counter() - self._filling)
+
+    def _set_up(self) -> bool:
+        """Make the Krylov solver and the factors; whether there are any."""
+        solver = self.solver = PETSc.KSP().create(comm=self.comm)
+        solver.setOptionsPrefix(PREFIX)
+        solver.setOperators(self.matrix, self.matrix)  # products are those of `multiply` once there are factors
         # Not "preonly": with factors as preconditioner GMRES ends in one iteration, and heeds the user's options.
         solver.setType("fgmres")
         solver.setTolerances(rtol=1e-13, atol=0.0, divtol=1e10, max_it=60)
         preconditioner = solver.getPC()
         preconditioner.setType("lu")
         preconditioner.setFactorSolverType(self.factor_type)
-        if self.factor_type == "mumps":
+        preconditioner.setReusePreconditioner(True)
+        with _factors_in_place(self.factor_type != "mumps"):
+            solver.setFromOptions()
+        if preconditioner.getType() == "lu" and preconditioner.getFactorSolverType() == "mumps":
+            # Only now: a factor that was made before would not know the prefix of the user's options, which win.
             preconditioner.setFactorSetUpSolverType()
             factor = preconditioner.getFactorMatrix()
             factor.setMumpsIcntl(7, 2)
             factor.setMumpsIcntl(14, self.workspace)
-        if self.reuse:
-            preconditioner.setReusePreconditioner(True)
-        solver.setFromOptions()
-        self.solver = solver
-
-    def _destroy_solver(self) -> None:
-        for item in (self.solver, self.converted):
-            if item is not None:
-                item.destroy()
-        self.solver = self.converted = None
-        self.factored = False
-
-    def solve(self, rhs: Real) -> Real:
-        """This rank's part of the solution for this rank's part of the right-hand side.
-
-        Raises ConvergenceError ("singular tangent" or "linear solver") on all ranks alike.
-        """
-        for _ in range(6):
-            assert self.solver is not None
-            self.right.setArray(rhs)
-            reason = self._run_solver()
-            if reason > 0:
-                self.factored = True
-                return np.array(self.left.getArray())
-            if not self._recover():
-                break
-        raise self._explain(reason)
-
-    def _run_solver(self) -> int:
-        """Solve, and return PETSc's reason to end; a zero pivot of dense factors is a failed set-up too."""
-        assert self.solver is not None
         try:
-            self.solver.solve(self.right, self.left)
+            solver.setUp()
+            preconditioner.setUp()
         except PETSc.Error as error:
             if error.ierr != {"petsc": ZERO_PIVOT, "scalapack": LIBRARY_ERROR}.get(self.factor_type):
                 raise
-            # PETSc has left its solver half set up and the vectors locked.
-            for vector in (self.right, self.left):
-                vector.destroy()
-            self.right, self.left = self._make_vectors()
-            self._renew()
-            return int(PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED)
-        return int(self.solver.getConvergedReason())
+            return False
+        return (self._find_mumps_code() or 0) >= 0
 
-    def _recover(self) -> bool:
-        """Whether another try makes sense: more room for MUMPS, or fresh factors in place of reused ones."""
-        code = self._find_mumps_code()
-        if code is not None:
-            if code in MORE_ROOM_HELPS and self.workspace < MOST_WORKSPACE:
-                self.workspace = 2 * self.workspace + 50
-                self._renew()
-                return True
-            if code < 0:
-                return False
-        if self.reuse and self.factored:
-            self._renew()
-            return True
-        return False
+    def solve(self, rhs: Real, most: int | None = None) -> Real:
+        """This rank's part of the solution for this rank's part of the right-hand side.
+
+        most: iterations, instead of the Krylov solver's own limit.
+        Raises ConvergenceError ("linear solver") on all ranks alike.
+        """
+        assert self.solver is not None
+        begin = time.perf_counter()
+        limits = self.solver.getTolerances()
+        if most is not None:
+            self.solver.setTolerances(max_it=most)
+            self.solver.setGMRESRestart(max(most, 1))
+        self.right.setArray(self._share(rhs, self.outer, self.inner))
+        self.solver.solve(self.right, self.left)
+        self.solver.setTolerances(*limits)
+        self.iterations = max(1, int(self.solver.getIterationNumber()))
+        self.iteration_seconds = self._slowest(time.perf_counter() - begin) / self.iterations
+        reason = int(self.solver.getConvergedReason())
+        if reason <= 0:
+            names = {value: name for name, value in vars(PETSc.KSP.ConvergedReason).items() if isinstance(value, int)}
+            raise ConvergenceError("linear solver", f"PETSc's solver ended with {names.get(reason, reason)}")
+        return self._share(np.array(self.left.getArray()), self.inner, self.outer)
+
+    def solve_columns(self, rhs: Real) -> Real:
+        """This rank's rows (local_rows, k) of the solutions for many right-hand sides, by the factors alone."""
+        assert self.solver is not None
+        factor = self.solver.getPC().getFactorMatrix()
+        if rhs.shape[1] == 1:
+            self.right.setArray(self._share(rhs[:, 0], self.outer, self.inner))
+            factor.solve(self.right, self.left)
+            return self._share(np.array(self.left.getArray()), self.inner, self.outer)[:, None]
+        given = self._make_columns(self._share(rhs, self.outer, self.inner))
+        found = given.duplicate(copy=False)
+        if self.factor_type == "scalapack":
+            scattered, solution = self._scatter(given), self._scatter(found)
+            factor.matSolve(scattered, solution)
+            solution.convert("dense", out=found)
+            scattered.destroy()
+            solution.destroy()
+        else:
+            factor.matSolve(given, found)
+        result = self._share(np.array(found.getDenseArray()[:, : rhs.shape[1]], order="C"), self.inner, self.outer)
+        given.destroy()
+        found.destroy()
+        return result
+
+    def _make_columns(self, values: Real) -> PETSc.Mat:
+        share = -(-values.shape[1] // self.comm.size)  # ScaLAPACK wants equal shares of the columns, too
+        shape = (self.inner_shape[0], (share, share * self.comm.size))
+        matrix = PETSc.Mat().createDense(shape, comm=self.comm)
+        matrix.setUp()
+        matrix.getDenseArray()[:, : values.shape[1]] = values
+        matrix.assemble()
+        return matrix
+
+    def _scatter(self, dense: PETSc.Mat) -> PETSc.Mat:
+        """A dense matrix as ScaLAPACK's, with the same shares."""
+        scattered = PETSc.Mat().create(comm=self.comm)
+        scattered.setSizes(dense.getSizes())
+        scattered.setType("scalapack")
+        scattered.setUp()
+        dense.convert("scalapack", out=scattered)
+        return scattered
+
+    def _share(self, part: Real, old: Integer, new: Integer) -> Real:
+        """Rows (old[rank], ...) in other shares (new[rank], ...) of the ranks."""
+        if np.array_equal(old, new):
+            return part
+        width = part[:1].size if part.ndim > 1 else 1
+        ends = [np.concatenate([[0], np.cumsum(counts)]) for counts in (old, new)]
+        rank = self.comm.rank
+
+        def overlap(mine: Integer, others: Integer) -> Integer:
+            begin, end = mine[rank], mine[rank + 1]
+            return np.maximum(np.minimum(others[1:], end) - np.maximum(others[:-1], begin), 0) * width
+
+        result = np.empty((int(new[rank]), *part.shape[1:]))
+        given, taken = overlap(ends[0], ends[1]), overlap(ends[1], ends[0])
+        self.comm.Alltoallv([np.ascontiguousarray(part), given], [result, taken])
+        return result
+
+    def _multiply(self, part: Real) -> Real:
+        return self._share(self.multiply(self._share(part, self.inner, self.outer)), self.outer, self.inner)
+
+    def _slowest(self, seconds: float) -> float:
+        """The longest time of all ranks, so that all decide alike."""
+        return float(self.comm.allreduce(seconds, op=MPI.MAX))
 
     def _find_mumps_code(self) -> int | None:
         """INFOG(1) of MUMPS: 0 or more if all is well; None where MUMPS is not used."""
@@ -200,25 +286,58 @@ class LinearSolver:
             return None
         return int(preconditioner.getFactorMatrix().getMumpsInfog(1))
 
-    def _renew(self) -> None:
-        self._destroy_solver()
-        self._make_solver()
+    def _destroy_solver(self) -> None:
+        if self.solver is not None:
+            self.solver.destroy()
+        self.solver = None
 
-    def _explain(self, reason: int) -> ConvergenceError:
-        code = self._find_mumps_code()
-        if code in MORE_ROOM_HELPS or code in NO_MEMORY:
-            detail = f"MUMPS has no room for the LU factors (INFOG(1) = {code}); try more memory or fewer elements"
-            return ConvergenceError("linear solver", detail)
-        if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED:
-            detail = "the tangent operator has no LU factors; a body is probably free to move"
-            return ConvergenceError("singular tangent", detail)
-        names = {value: name for name, value in vars(PETSc.KSP.ConvergedReason).items() if isinstance(value, int)}
-        return ConvergenceError("linear solver", f"PETSc's solver ended with {names.get(reason, reason)}")
+    def _release(self) -> None:
+        self._destroy_solver()
+        if self.matrix is not None:
+            self.matrix.destroy()
+        self.matrix = None
 
     def destroy(self) -> None:
         """Free PETSc's storage (older versions of petsc4py never do it by themselves)."""
-        self._destroy_solver()
-        for item in (self.matrix, self.right, self.left):
-            if item is not None:
-                item.destroy()
-        self.matrix = None
+        self._release()
+        for item in (self.operator, self.right, self.left):
+            item.destroy()
+
+
+class _Product:
+    """What PETSc asks of a matrix that is given by its product only."""
+
+    def __init__(self, multiply: Callable[[Real], Real]) -> None:
+        self.multiply = multiply
+
+    def mult(self, _: Any, given: PETSc.Vec, result: PETSc.Vec) -> None:
+        result.setArray(self.multiply(np.array(given.getArray(readonly=True))))
+
+
+@contextmanager
+def _factors_in_place(wanted: bool) -> Iterator[None]:
+    """Let the factors take the matrix's storage; petsc4py knows this by an option only."""
+    database, name = PETSc.Options(), PREFIX + "pc_factor_in_place"
+    if not wanted or database.hasName(name):
+        yield
+        return
+    database.setValue(name, "1")
+    try:
+        yield
+    finally:
+        database.delValue(name)
+
+
+def _explain_factors(code: int | None) -> ConvergenceError:
+    if code in MORE_ROOM_HELPS or code in NO_MEMORY:
+        detail = f"MUMPS has no room for the LU factors (INFOG(1) = {code}); try more memory or fewer elements"
+        return ConvergenceError("linear solver", detail)
+    return ConvergenceError(
+        "singular tangent", "the tangent operator has no LU factors; a body is probably free to move"
+    )
+
+
+def share_equally(count: int, ranks: int) -> list[int]:
+    """Shares as ScaLAPACK wants them: all the same, but for the last, which may be smaller, and empty ones after it."""
+    share = -(-count // ranks)
+    return [max(0, min(share, count - share * rank)) for rank in range(ranks)]

@@ -90,26 +90,51 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         law = linearise(
             laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale, search.caution.frozen
         )
-        solved = _solve_linearised(problem, tangent, modes, law, load)
-        unknowns = solved.unknowns
-        pairs = evaluate_pairs(problem.mesh, law, unknowns)
-        floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(unknowns).max())
-        proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening, floor)
-        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
-        settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-        failing = find_failures(laws, pairs, memory, load.pressure, floor)
-        if settled and failing.any():
+        constraints = problem.constrain(law, load)
+        try:
+            solved = tangent.solve(constraints, load, law)
+            outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
+            if outcome.settled and not solved.checked:
+                solved = tangent.check(solved, constraints, load, law)
+                outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
+        except ConvergenceError:
+            _refuse_free_motion(problem, modes)
+            raise
+        pairs, proposal, failing = outcome.pairs, outcome.proposal, outcome.failing
+        if outcome.settled and failing.any():
             memory = replace(memory, broken=memory.broken | failing)
-            proposal = propose_modes(laws, modes, pairs, memory, load.pressure, search.caution.softening, floor)
+            proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart(modes)
         iterations.append(_record(len(iterations) + 1, solved.residual, modes, proposal, begin))
         reporter.iterate(iterations[-1])
-        if settled and not failing.any():
+        if outcome.settled and not failing.any():
             _refuse_free_motion(problem, modes)
-            return Solution(unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
+            return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         modes = _hold_free_bodies(problem, limit_changes(modes, proposal, search.caution.share), pairs.g_n)
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
         search.note(problem, modes, proposal)
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a solution says of the modes that led to it; settled: none changes, and the laws of slipping pairs hold."""
+
+    pairs: PairState
+    proposal: Proposal
+    settled: bool
+    failing: NDArray[np.bool_]
+
+
+def _judge(
+    problem: Problem, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved, caution: Caution
+) -> _Outcome:
+    laws = problem.laws
+    pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+    floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
+    proposal = propose_modes(laws, modes, pairs, memory, load.pressure, caution.softening, floor)
+    law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
+    settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
+    return _Outcome(pairs, proposal, settled, find_failures(laws, pairs, memory, load.pressure, floor))
 
 
 def _hold_free_bodies(problem: Problem, modes: ModeState, opening: Real) -> ModeState:
@@ -149,18 +174,6 @@ class _Search:
         if self.count == self.most:
             _refuse_free_motion(problem, proposal.modes)
             raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
-
-
-def _solve_linearised(
-    problem: Problem, tangent: AnyTangent, modes: ModeState, law: Linearisation, load: Load
-) -> Solved:
-    """The solution for linearised laws; a failure names a free body if there is one."""
-    try:
-        constraints = problem.constrain(law, load)
-        return tangent.solve(constraints, load)
-    except ConvergenceError:
-        _refuse_free_motion(problem, modes)
-        raise
 
 
 def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:

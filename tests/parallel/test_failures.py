@@ -71,7 +71,7 @@ PLACES = {
     "meshing": ("pbem.driver", "generate_mesh", 1, 0),
     "assembly": ("pbem.solve.assembly", "assemble_rows", 1, 0),
     "a step": ("pbem.solve.march", "solve_step", 3, 2),
-    "the linear solver": ("pbem.solve.linear", "LinearSolver.solve", 4, None),
+    "the linear solver": ("pbem.solve.linear", "LinearSolver.solve_columns", 2, None),
 }
 
 
@@ -142,7 +142,7 @@ def test_all_ranks_return_3_alike(folder: Path, mpirun_snippet: Launch) -> None:
 def test_a_linear_solver_that_fails_ends_with_its_reason(
     error: str, reason: str, folder: Path, mpirun_snippet: Launch
 ) -> None:
-    arguments = ("-1", "pbem.solve.linear", "LinearSolver.solve", "4", error, "run", "blocks.toml", "--quiet")
+    arguments = ("-1", "pbem.solve.linear", "LinearSolver.solve_columns", "2", error, "run", "blocks.toml", "--quiet")
     done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
     assert done.returncode == 3, done.stderr
     assert done.stderr.count(f"pbem: not converged: {reason}") == 1

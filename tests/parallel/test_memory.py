@@ -19,7 +19,10 @@ from pbem.mesh.generate import generate_mesh
 from pbem.model.build import read_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.tangent import Tangent
+from pbem.contact.laws import start_memory
+from pbem.contact.modes import linearise
+from pbem.solve.linear import LinearSolver
+from pbem.solve.reference import Reference
 
 def list_arrays(item, seen):
     if id(item) in seen:
@@ -38,10 +41,17 @@ def list_arrays(item, seen):
 
 model = read_model(sys.argv[1])[1]
 problem = assemble_problem(model, generate_mesh(model), world)
-tangent = Tangent(problem)
+modes = start_memory(problem.laws).modes
+zeros, load = np.zeros(problem.laws.count), problem.evaluate_load(0, 0.0)
+law = linearise(problem.laws, modes, zeros, zeros, start_memory(problem.laws), load.pressure, problem.traction_scale)
+method = "lu" if len(problem.mesh.region_names) == 1 else "mumps"
+reference = Reference(problem, method)
+sizes = []
+LinearSolver.factorise = lambda self: sizes.append(self.matrix.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"] * 8)
+reference.form(problem.constrain(law, load).matrix)
 blocks = [*problem.operator.blocks, *problem.crack_rows]
 dense = sum(block.matrix.nbytes for block in blocks)
-matrix = tangent.solver.matrix.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"] * 8
+(matrix,) = sizes
 rest = sum(array.nbytes for array in list_arrays(problem, set())) - dense
 found = world.gather({"dense": dense, "matrix": matrix, "rest": rest, "unknowns": problem.unknowns})
 if world.rank == 0:

@@ -1,0 +1,125 @@
+"""The unknowns of contact pairs apart from all others: a change of modes is a small system of equations.
+
+A pair's state q (p_n, p_s, g_n, g_s) is q = T x_c + o in its mode, and only this part of the constraint map changes
+with the modes: v = M_0' x_f + E q + m, with B E the operator's columns of the pairs' states. Split every state along
+the pair's two columns T_0 in a reference operator K_0 and two more columns C, q = T_0 a + C b. Then
+
+    K_0 (x_f, a) + B E C b + B m = 0,    that is    (x_f, a) = y - W b,   W = K_0^-1 B E C,   y = -K_0^-1 B m
+
+(the Woodbury identity), and the rows of a are the equations for x_c. With Q = [T_0 C]^-1, Q_1 and Q_2 its upper and
+lower halves, a = Q_1 (T x_c + o) and b = Q_2 (T x_c + o):
+
+    (Q_1 T + W_cc Q_2 T) x_c = y_c - Q_1 o - W_cc Q_2 o
+
+where only pairs count whose b is not identically zero: those in other modes than in the reference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Split:
+    """a = a_tangent @ x + a_offset, b = b_tangent @ x + b_offset for k pairs: (k, 2, 2) and (k, 2)."""
+
+    a_tangent: Real
+    a_offset: Real
+    b_tangent: Real
+    b_offset: Real
+
+    def drop_offsets(self) -> Split:
+        """The split of a correction, to which constants add nothing."""
+        none = np.zeros_like(self.a_offset)
+        return Split(self.a_tangent, none, self.b_tangent, none)
+
+    def find_b(self, unknowns: Real) -> Real:
+        """b (k, 2) from the pairs' unknowns (k, 2)."""
+        result: Real = np.einsum("mij,mj->mi", self.b_tangent, unknowns) + self.b_offset
+        return result
+
+
+class PairBases:
+    """T_0 and C of k pairs: reference (k, 4, 2) and complement (k, 4, 2), orthogonal to it, in the units of states.
+
+    traction_scale: unit of tractions, in which states are numbers of one size.
+    """
+
+    def __init__(self, reference: Real, traction_scale: float) -> None:
+        self.units = np.array([traction_scale, traction_scale, 1.0, 1.0])
+        span = reference / self.units[:, None]
+        complement = np.linalg.svd(span)[0][:, :, 2:]
+        self.reference = reference
+        self.complement = complement * self.units[:, None]
+        self.inverse = np.linalg.inv(np.concatenate([span, complement], axis=2))
+
+    def split(self, tangent: Real, offset: Real) -> Split:
+        """The laws' tangents (k, 4, 2) and offsets (k, 4) along both."""
+        along = self.inverse @ (tangent / self.units[:, None])
+        # What is the same as in the reference must be so but for no rounding: it then costs nothing.
+        same = (tangent == self.reference).all(axis=(1, 2))
+        along[same] = np.eye(4, 2)
+        constant = np.einsum("mij,mj->mi", self.inverse, offset / self.units)
+        return Split(along[:, :2], constant[:, :2], along[:, 2:], constant[:, 2:])
+
+
+@dataclass(frozen=True)
+class PairSolution:
+    """Unknowns x_c (k, 2) of the pairs.
+
+    rcond: reciprocal condition of their system, 0 if it is singular; residual: of the system, relative to its right.
+    """
+
+    unknowns: Real
+    rcond: float
+    residual: float
+
+
+def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
+    """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k,)."""
+    count = len(split.a_offset)
+    varied = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)) | (split.b_offset != 0).any(axis=1))
+    active = (2 * varied[:, None] + np.arange(2)).ravel()
+    rhs = given - split.a_offset.ravel() - coupling[:, active] @ split.b_offset[varied].ravel()
+    unknowns, rcond, residual = np.zeros(2 * count), 1.0, 0.0
+    rest = np.ones(2 * count, dtype=bool)
+    if len(active):
+        changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
+        own = (2 * changed[:, None] + np.arange(2)).ravel()
+        first, second = coupling[:, own[::2]], coupling[:, own[1::2]]
+        effect = np.empty((2 * count, len(own)))
+        for j in range(2):
+            along = split.b_tangent[changed, :, j]
+            effect[:, j::2] = first * along[:, 0] + second * along[:, 1]
+        matrix = effect[own]
+        for i in range(2):
+            for j in range(2):
+                matrix[np.arange(i, len(own), 2), np.arange(j, len(own), 2)] += split.a_tangent[changed, i, j]
+        unknowns[own], rcond = _solve_dense(matrix, rhs[own])
+        size = float(np.linalg.norm(rhs[own]))
+        residual = float(np.linalg.norm(matrix @ unknowns[own] - rhs[own])) / size if size > 0 else 0.0
+        rest[own] = False
+        rhs = rhs - effect @ unknowns[own]
+    others = np.flatnonzero(rest[::2])
+    unknowns[rest] = np.linalg.solve(split.a_tangent[others], rhs[rest].reshape(-1, 2, 1)).ravel()
+    return PairSolution(unknowns.reshape(-1, 2), rcond, residual)
+
+
+def _solve_dense(matrix: Real, rhs: Real) -> tuple[Real, float]:
+    """Solution and reciprocal condition in the 1-norm; zeros if there is none."""
+    if not len(rhs):
+        return rhs, 1.0
+    if not np.isfinite(matrix).all():
+        return np.zeros_like(rhs), 0.0
+    norm = float(np.abs(matrix).sum(axis=0).max())
+    factors, pivots, failed = lapack.dgetrf(matrix)
+    if failed:
+        return np.zeros_like(rhs), 0.0
+    rcond = float(lapack.dgecon(factors, norm)[0])
+    return lapack.dgetrs(factors, pivots, rhs)[0], rcond

@@ -1,0 +1,198 @@
+"""The tangent operator with few contact unknowns: one factorisation, and a small system for every change of modes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.loads import Load
+from pbem.contact.modes import G_N, P_N, P_S, Linearisation
+from pbem.parallel import broadcast, gather_parts
+from pbem.solve.condensation import PairBases, PairSolution, Split, solve_pairs
+from pbem.solve.linear import choose_method
+from pbem.solve.load_basis import LoadBasis
+from pbem.solve.problem import Problem
+from pbem.solve.reference import Reference, apply_narrow, form_columns
+from pbem.solve.tangent import Solved, describe_residual
+
+Real = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+# Right-hand sides that are solved together; they and their solutions are held beside the factors.
+COLUMNS_AT_ONCE = 1024
+# A condensed system of a worse reciprocal condition is not trusted: the factors are made anew in the present modes.
+LEAST_RCOND = 1e-11
+# Checked solutions are corrected until they are as good as this, though the tolerance may be weaker.
+GOOD_RESIDUAL = 1e-12
+MOST_CORRECTIONS = 2
+
+
+class CondensedTangent:
+    """Factors of one reference operator; the contact pairs' unknowns are condensed (see pbem.solve.condensation).
+
+    varying (m,): pairs whose mode can change. Crack pairs among them are eliminated from the reference operator, the
+    others have the modes there that they had when it was factorised.
+    """
+
+    def __init__(self, problem: Problem, varying: Bool) -> None:
+        self.problem = problem
+        self.varying = np.flatnonzero(varying)
+        self.fixed = np.flatnonzero(~varying)
+        pairs = problem.mesh.pairs
+        self.eliminated = pairs.crack & varying
+        method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
+        self.reference = Reference(problem, method, np.flatnonzero(self.eliminated))
+        self.columns = (2 * pairs.slot[self.varying][:, None] + np.arange(2)).ravel()
+        self.laws: Real | None = None  # the laws' tangents in the reference (m, 4, 2)
+        self.loads = LoadBasis(problem.unknowns, self.reference.rows)
+        self.load: Load | None = None
+
+    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+        """See AnyTangent. The first solution after a factorisation is checked, others are not."""
+        fresh = self.laws is None or not np.array_equal(self.laws[self.fixed], law.tangent[self.fixed])
+        if fresh:
+            self._refer(load, law)
+        unknowns, pairs = self._condense(self._find_load_solution(load, law), self._split(law))
+        if pairs.rcond < LEAST_RCOND and self._can_refer_better(law):
+            fresh = True
+            self._refer(load, law)
+            unknowns, pairs = self._condense(self._find_load_solution(load, law), self._split(law))
+        solved = Solved(unknowns, constraints.evaluate(unknowns), pairs.residual, checked=False)
+        return self.check(solved, constraints, load, law) if fresh or pairs.rcond < LEAST_RCOND else solved
+
+    def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+        """See AnyTangent."""
+        if solved.checked:
+            return solved
+        tolerance = self.problem.model.solver.newton_tolerance
+        best = self._mend(solved.unknowns, constraints, load, law)
+        if best.residual <= tolerance:
+            return best
+        if self._can_refer_better(law):
+            self._refer(load, law)
+            return self.check(self.solve(constraints, load, law), constraints, load, law)
+        if not self.eliminated[self.varying].all():
+            self.laws = None  # modes like these are no reference for others
+        raise describe_residual(best.residual, tolerance)
+
+    def _mend(self, unknowns: Real, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+        """The solution with its true residual, corrected for as long as that makes it smaller."""
+        problem = self.problem
+        scale = self._measure_forces(constraints) or 1.0
+        split = self._split(law).drop_offsets()
+        best: Solved | None = None
+        for _ in range(1 + MOST_CORRECTIONS):
+            v = constraints.evaluate(unknowns)
+            left = problem.apply(v, load)
+            residual = problem.measure(left) / scale
+            if best is not None and not residual < best.residual:
+                break
+            best = Solved(unknowns, v, residual)
+            if residual <= GOOD_RESIDUAL or not np.isfinite(residual):
+                break
+            unknowns = unknowns + self._condense(self._solve_system(-left), split)[0]
+        assert best is not None
+        return best
+
+    def _refer(self, load: Load, law: Linearisation) -> None:
+        """Factorise the operator with the laws of the present modes, and find what the pairs add to it."""
+        problem = self.problem
+        self.laws, self.load = None, None
+        tangent = self._reference_tangent(law)
+        self.reference.form(problem.constrain(Linearisation(tangent, np.zeros(tangent.shape[:2])), load).matrix)
+        self.bases = PairBases(tangent[self.varying], problem.traction_scale)
+        self._find_columns(tangent, load)
+        self.loads.renew(self._solve_load)
+        self.laws = tangent
+
+    def _reference_tangent(self, law: Linearisation) -> Real:
+        """The pairs' tangents (m, 4, 2) for a reference operator: the law's, but sticking ones where eliminated."""
+        tangent = law.tangent.copy()
+        tangent[self.eliminated] = 0.0
+        tangent[self.eliminated, P_N, 0] = tangent[self.eliminated, P_S, 1] = self.problem.traction_scale
+        return tangent
+
+    def _can_refer_better(self, law: Linearisation) -> bool:
+        """Whether another reference operator would be nearer to the present laws."""
+        return self.laws is None or not np.array_equal(self.laws, self._reference_tangent(law))
+
+    def _find_columns(self, tangent: Real, load: Load) -> None:
+        """W: this rank's rows, and on the first rank the rows of the pairs' own unknowns."""
+        problem, operator = self.problem, self.reference.operator
+        complement = np.zeros_like(tangent)
+        complement[self.varying] = self.bases.complement
+        states = problem.constrain(Linearisation(complement, np.zeros(tangent.shape[:2])), load).matrix
+        self.effect = np.empty((self.reference.rows, len(self.columns)), order="F")
+        for begin in range(0, len(self.columns), COLUMNS_AT_ONCE):
+            at = slice(begin, begin + COLUMNS_AT_ONCE)
+            forces = np.zeros((self.reference.rows, len(self.columns[at])))
+            for block in operator.blocks:
+                every = np.arange(len(block.rows))
+                forces[block.rows] = form_columns(operator, block, states, self.columns[at], every)
+            self.effect[:, at] = self.reference.solve_columns(forces)
+        own = self.reference.own
+        here = self.columns[(self.columns >= own.start) & (self.columns < own.stop)] - own.start
+        order = np.argsort(self.columns[(self.columns >= own.start) & (self.columns < own.stop)])
+        parts = problem.comm.gather(np.ascontiguousarray(self.effect[here[order]]))
+        self.coupling = np.zeros((0, 0))
+        if parts is not None:
+            rank = np.argsort(np.argsort(self.columns))
+            self.coupling = np.concatenate(parts)[rank]
+
+    def _split(self, law: Linearisation) -> Split:
+        offset = law.offset[self.varying].copy()
+        offset[:, G_N] -= self.problem.laws.gap[self.varying]
+        return self.bases.split(law.tangent[self.varying], offset)
+
+    def _find_load_solution(self, load: Load, law: Linearisation) -> Real:
+        """y (2 nodes,), without the offsets of varying pairs."""
+        if load is not self.load:
+            problem = self.problem
+            assert self.laws is not None
+            offset = law.offset.copy()
+            offset[self.varying] = 0.0
+            offset[self.varying, G_N] = problem.laws.gap[self.varying]
+            constant = self.load_offset = problem.constrain(Linearisation(self.laws, offset), load).offset
+            self.load_solution, self.load_forces = self.loads.combine(
+                join_load(constant, load, problem.traction_scale),
+                lambda: problem.apply(constant, load), self._solve_load,
+            )  # fmt: skip
+            self.load = load
+        return self.load_solution
+
+    def _measure_forces(self, constraints: ConstraintMap) -> float:
+        """Norm of B m, of which the load's part is known."""
+        own = apply_narrow(self.reference.operator, constraints.offset - self.load_offset)
+        return self.problem.measure(self.load_forces + own)
+
+    def _solve_load(self, forces: Real) -> Real:
+        return self._solve_system(-forces)
+
+    def _solve_system(self, rhs: Real) -> Real:
+        """K0^-1 of this rank's part of a right-hand side, (2 nodes,) on every rank."""
+        return gather_parts(self.problem.comm, self.reference.solve_columns(rhs[:, None])[:, 0])
+
+    def _condense(self, given: Real, split: Split) -> tuple[Real, PairSolution]:
+        """x (2 nodes,) for y, and the solution of the pairs' system, by the first rank."""
+        problem = self.problem
+        found: PairSolution | None = None
+        if problem.comm.rank == 0:
+            found = solve_pairs(self.coupling, given[self.columns], split)
+        found = broadcast(problem.comm, found)
+        assert found is not None
+        b = split.find_b(found.unknowns).ravel()
+        unknowns = given - gather_parts(problem.comm, self.effect @ b)
+        unknowns[self.columns] = found.unknowns.ravel()
+        return unknowns, found
+
+    def destroy(self) -> None:
+        """See AnyTangent."""
+        self.reference.destroy()
+
+
+def join_load(constant: Real, load: Load, traction_scale: float) -> Real:
+    """All that forces depend on, in one vector of numbers of one size: the map's offset, and the known fields."""
+    scale = np.repeat([1.0, 1.0 / traction_scale], len(constant) // 2)
+    far = load.far * np.array([[1.0], [1.0 / traction_scale]])
+    return np.concatenate([constant * scale, load.known * scale, far.real.ravel(), far.imag.ravel()])

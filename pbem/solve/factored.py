@@ -1,0 +1,126 @@
+"""The tangent operator by GMRES, with the LU factors of the present modes or of earlier ones as preconditioner."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.loads import Load
+from pbem.contact.modes import Linearisation
+from pbem.errors import ConvergenceError
+from pbem.parallel import gather_parts
+from pbem.solve.linear import choose_method
+from pbem.solve.problem import Problem
+from pbem.solve.reference import Reference
+from pbem.solve.tangent import Solved, describe_residual
+
+Real = NDArray[np.float64]
+
+# Of GMRES with old factors: fewer are not worth a try, more take too much storage.
+LEAST_ITERATIONS, MOST_ITERATIONS = 4, 100
+
+
+class FactoredTangent:
+    """The operator of the present modes, solved by GMRES with the factors of the same or of earlier modes.
+
+    Old factors are kept until the further iterations with them have taken as long as new factors would.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
+        self.reference = Reference(problem, method)
+        self.factored: sparse.csr_matrix | None = None  # the constraint map of the factors
+        self.spent = 0.0  # seconds by which old factors were slower than new ones
+        self.iteration_seconds = 0.0  # of one iteration of GMRES
+
+    def update(self, constraints: ConstraintMap) -> None:
+        """Factorise the operator of a constraint map, unless the present factors are its own."""
+        self.reference.present = constraints.matrix
+        if self.factored is None or not are_equal(self.factored, constraints.matrix):
+            self._factorise(constraints)
+
+    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+        """See AnyTangent."""
+        problem = self.problem
+        self.reference.present = constraints.matrix
+        forced = problem.apply(constraints.offset, load)
+        scale = problem.measure(forced)
+        if scale == 0.0:
+            unknowns = np.zeros(problem.unknowns)
+            return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
+        tolerance = problem.model.solver.newton_tolerance
+        unknowns = self._solve_by_any(constraints, -forced)
+        for attempt in range(2):
+            v = constraints.evaluate(unknowns)
+            left = problem.apply(v, load)
+            residual = problem.measure(left) / scale
+            if residual <= tolerance:
+                return Solved(unknowns, v, residual)
+            if attempt == 0 and np.isfinite(residual):
+                unknowns = unknowns - self._solve_by_any(constraints, left)
+        self.factored = None  # whatever comes next is solved with factors of its own
+        raise describe_residual(residual, tolerance)
+
+    def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+        """See AnyTangent; every solution is checked."""
+        return solved
+
+    def solve_system(self, rhs: Real) -> Real:
+        """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side, by the factors."""
+        return gather_parts(self.problem.comm, self.reference.solve_columns(rhs[:, None])[:, 0])
+
+    def _solve_by_any(self, constraints: ConstraintMap, rhs: Real) -> Real:
+        """Solve with the factors there are if that is expected to pay, else with new ones."""
+        if self.factored is not None and not are_equal(self.factored, constraints.matrix):
+            try:
+                return self._solve_by_old(rhs)
+            except ConvergenceError:
+                self.factored = None
+        self.update(constraints)
+        try:
+            result = gather_parts(self.problem.comm, self.reference.solve(rhs))
+        except ConvergenceError:
+            self._refuse_singular(rhs)
+            raise
+        self.iteration_seconds = self.reference.solver.iteration_seconds
+        return result
+
+    def _refuse_singular(self, rhs: Real) -> None:
+        """Raise ConvergenceError ("singular tangent") if the factors are none of a regular operator."""
+        solver = self.reference.solver
+        if not solver.factored:
+            return
+        part = self.reference.solve_columns(rhs[:, None])[:, 0]
+        residual = self.problem.measure(solver.multiply(part) - rhs) / self.problem.measure(rhs)
+        tolerance = self.problem.model.solver.newton_tolerance
+        if not residual <= tolerance:
+            self.factored = None
+            raise describe_residual(residual, tolerance)
+
+    def _solve_by_old(self, rhs: Real) -> Real:
+        solver = self.reference.solver
+        most = int((solver.seconds - self.spent) / max(self.iteration_seconds, 1e-9))
+        if most < LEAST_ITERATIONS:
+            raise ConvergenceError("linear solver", "new factors are due")
+        try:
+            return gather_parts(self.problem.comm, self.reference.solve(rhs, min(most, MOST_ITERATIONS)))
+        finally:
+            self.spent += (solver.iterations - 1) * solver.iteration_seconds
+
+    def _factorise(self, constraints: ConstraintMap) -> None:
+        self.factored, self.spent = None, 0.0
+        self.reference.form(constraints.matrix)
+        self.factored = constraints.matrix
+
+    def destroy(self) -> None:
+        """See AnyTangent."""
+        self.reference.destroy()
+
+
+def are_equal(one: sparse.csr_matrix, other: sparse.csr_matrix) -> bool:
+    """Whether two constraint maps are the same numbers in the same places."""
+    parts = ((one.indptr, other.indptr), (one.indices, other.indices), (one.data, other.data))
+    return all(np.array_equal(mine, yours) for mine, yours in parts)

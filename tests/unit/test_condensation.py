@@ -1,0 +1,254 @@
+"""Condensed contact unknowns give what the factors of the present modes' own operator give."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pbem.solve.condensed as condensed
+from pbem.contact.laws import OPEN, STICK, ModeState
+from pbem.contact.loads import Load
+from pbem.contact.modes import Linearisation
+from pbem.errors import ConvergenceError
+from pbem.mesh.generate import generate_mesh
+from pbem.model.build import parse_model
+from pbem.parallel import world
+from pbem.solve.assembly import assemble_problem
+from pbem.solve.condensation import PairBases, Split, solve_pairs
+from pbem.solve.condensed import CondensedTangent
+from pbem.solve.factored import FactoredTangent
+from pbem.solve.linear import LinearSolver
+from pbem.solve.load_basis import LoadBasis
+from pbem.solve.problem import Problem
+from pbem.solve.tangent import Solved
+from tests.identities.solving import assemble_tangent, linearise_pairs
+from tests.unit.test_constraints import make_body
+
+Real = NDArray[np.float64]
+
+# The upper block is held by its seat alone.
+SEAT = """
+[materials.rock]
+young = 1.0e3
+poisson = 0.2
+[curves]
+lower_sides = { points = [[0, 1], [0, 0], [1, 0], [1, 1]], elements = 4 }
+seat = { points = [[0, 1], [1, 1]], elements = 4 }
+upper_sides = { points = [[1, 1], [1, 2], [0, 2], [0, 1]], elements = 4 }
+[regions.lower]
+material = "rock"
+boundary = ["lower_sides", "seat"]
+[regions.upper]
+material = "rock"
+boundary = ["seat", "upper_sides"]
+[interfaces.seat]
+law = "coulomb"
+friction = 0.5
+[boundary.lower_sides]
+ux = 0.0
+uy = 0.0
+[boundary.upper_sides]
+pressure = 1.0
+"""
+
+
+def make_problem(text: str) -> Problem:
+    model = parse_model(text)[1]
+    return assemble_problem(model, generate_mesh(model), world)
+
+
+def make_blocks(linear: str) -> Problem:
+    """Two blocks with a gap between them and a crack, with all kinds of conditions."""
+    return make_problem(make_body().write() + f'\n[solver]\nlinear = "{linear}"\n')
+
+
+def condense(problem: Problem) -> CondensedTangent:
+    return CondensedTangent(problem, ~(problem.laws.bonded | problem.laws.parted))
+
+
+def draw_law(problem: Problem, seed: int) -> Linearisation:
+    """Random modes after random slips."""
+    random, count = np.random.default_rng(seed), problem.mesh.pairs.count
+    modes = ModeState(random.integers(0, 3, count).astype(np.int8), random.choice([-1.0, 1.0], count))
+    return linearise_pairs(problem, modes, -random.random(count), 0.01 * random.normal(size=count), 1.0)
+
+
+def solve_directly(problem: Problem, law: Linearisation, load: Load) -> tuple[Real, Real]:
+    """Unknowns and v by a factorisation of K of the law itself."""
+    constraints = problem.constrain(law, load)
+    tangent = np.zeros((problem.unknowns, problem.unknowns))
+    for block, columns in zip(problem.operator.blocks, problem.block_columns, strict=True):
+        product = problem.operator.multiply_block(block, constraints.matrix, columns)
+        tangent[np.ix_(block.rows, columns)] = product
+    unknowns = np.linalg.solve(tangent, -problem.apply(constraints.offset, load))
+    return unknowns, constraints.evaluate(unknowns)
+
+
+def compare(found: Solved, expected: tuple[Real, Real], problem: Problem) -> None:
+    scale = np.repeat([1.0, problem.traction_scale], problem.unknowns)
+    np.testing.assert_allclose(found.unknowns, expected[0], rtol=0, atol=1e-10 * np.abs(expected[0]).max())
+    v = expected[1] / scale
+    np.testing.assert_allclose(found.v / scale, v, rtol=0, atol=1e-10 * np.abs(v).max())
+
+
+@pytest.fixture
+def factorisations(monkeypatch: pytest.MonkeyPatch) -> list[None]:
+    """As long as the number of factorisations so far."""
+    found: list[None] = []
+    factorise = LinearSolver.factorise
+    monkeypatch.setattr(LinearSolver, "factorise", lambda solver: (found.append(None), factorise(solver))[1])
+    return found
+
+
+@pytest.mark.parametrize("linear", ["lu", "mumps"])
+def test_any_modes_and_loads_are_solved_with_the_same_factors(linear: str, factorisations: list[None]) -> None:
+    problem = make_blocks(linear)
+    tangent = condense(problem)
+    assert tangent.eliminated.any() and not tangent.eliminated.all()
+    for seed, factor in enumerate((1.0, 0.3, 0.7, 1.0, 0.5)):
+        law, load = draw_law(problem, seed), problem.evaluate_load(0, factor)
+        constraints = problem.constrain(law, load)
+        found = tangent.solve(constraints, load, law)
+        expected = solve_directly(problem, law, load)
+        compare(found, expected, problem)
+        assert found.checked == (seed == 0)
+        checked = tangent.check(found, constraints, load, law)
+        compare(checked, expected, problem)
+        assert checked.checked and checked.residual < 1e-12
+        left, forced = problem.apply(checked.v, load), problem.apply(constraints.offset, load)
+        assert checked.residual == pytest.approx(np.linalg.norm(left) / np.linalg.norm(forced), abs=1e-15)
+    assert len(factorisations) == 1
+    assert len(tangent.loads.vectors) == 1  # all loads are parts of one
+    tangent.destroy()
+
+
+def test_a_solution_that_is_not_good_enough_is_mended() -> None:
+    problem = make_blocks("lu")
+    tangent = condense(problem)
+    load = problem.evaluate_load(0, 1.0)
+    tangent.solve(problem.constrain(draw_law(problem, 1), load), load, draw_law(problem, 1))
+    law = draw_law(problem, 2)
+    constraints = problem.constrain(law, load)
+    found = tangent.solve(constraints, load, law)
+    error = 1e-6 * np.random.default_rng(1).normal(size=problem.unknowns)
+    spoilt = replace(found, unknowns=found.unknowns * (1 + error))
+    mended = tangent.check(spoilt, constraints, load, law)
+    assert mended.residual < 1e-12
+    compare(mended, solve_directly(problem, law, load), problem)
+
+
+def test_an_ill_conditioned_system_is_replaced_by_factors_of_the_present_modes(
+    monkeypatch: pytest.MonkeyPatch, factorisations: list[None]
+) -> None:
+    problem = make_blocks("lu")
+    tangent = condense(problem)
+    load = problem.evaluate_load(0, 1.0)
+    laws = [draw_law(problem, seed) for seed in (1, 2)]
+    tangent.solve(problem.constrain(laws[0], load), load, laws[0])
+    monkeypatch.setattr(condensed, "LEAST_RCOND", 2.0)
+    found = tangent.solve(problem.constrain(laws[1], load), load, laws[1])
+    assert len(factorisations) == 2 and found.checked
+    compare(found, solve_directly(problem, laws[1], load), problem)
+
+
+@pytest.mark.parametrize("make", [condense, FactoredTangent])
+def test_a_body_without_hold_is_a_singular_tangent_until_it_is_held_again(make: type) -> None:
+    problem = make_problem(SEAT)
+    tangent = make(problem)
+    count = problem.mesh.pairs.count
+    load = problem.evaluate_load(0, 1.0)
+
+    def solve(mode: np.int8) -> Solved:
+        law = linearise_pairs(problem, ModeState(np.full(count, mode), np.ones(count)), factor=1.0)
+        constraints = problem.constrain(law, load)
+        return tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
+
+    for _ in range(2):
+        held = solve(STICK)
+        assert held.checked and held.residual < 1e-9
+        with pytest.raises(ConvergenceError, match="singular tangent"):
+            solve(OPEN)
+
+
+def test_factors_of_other_modes_serve_as_preconditioner() -> None:
+    problem = make_blocks("gmres")
+    tangent = FactoredTangent(problem)
+    load = problem.evaluate_load(0, 1.0)
+    for seed in (1, 2, 2, 3):
+        law = draw_law(problem, seed)
+        found = tangent.solve(problem.constrain(law, load), load, law)
+        assert found.checked and found.residual < 1e-9
+        compare(found, solve_directly(problem, law, load), problem)
+
+
+def test_the_small_system_is_that_of_its_definition() -> None:
+    random = np.random.default_rng(1)
+    count = 7
+    coupling, given = random.normal(size=(2 * count, 2 * count)), random.normal(size=2 * count)
+    parts = [random.normal(size=(count, *shape)) for shape in ((2, 2), (2,), (2, 2), (2,))]
+    parts[2][:3] = 0.0  # three pairs as in the reference, of which one has no offset
+    parts[3][0] = 0.0
+    split = Split(*parts)
+    solution = solve_pairs(coupling, given, split)
+    x = solution.unknowns
+    a = np.einsum("mij,mj->mi", split.a_tangent, x) + split.a_offset
+    np.testing.assert_allclose(a.ravel() + coupling @ split.find_b(x).ravel(), given, atol=1e-12)
+    assert 0 < solution.rcond < 1 and solution.residual < 1e-13
+
+
+def test_a_singular_small_system_is_known_by_its_condition() -> None:
+    none = np.zeros((1, 2))
+    split = Split(np.zeros((1, 2, 2)), none, np.eye(2)[None], none)
+    assert solve_pairs(np.ones((2, 2)), np.ones(2), split).rcond < 1e-15
+    assert solve_pairs(np.full((2, 2), np.nan), np.ones(2), split).rcond == 0.0
+
+
+def test_states_are_split_and_put_together() -> None:
+    random = np.random.default_rng(2)
+    scale = 300.0
+    units = np.array([scale, scale, 1.0, 1.0])[:, None]
+    bases = PairBases(random.normal(size=(5, 4, 2)) * units, scale)
+    tangent, offset, x = random.normal(size=(5, 4, 2)) * units, random.normal(size=(5, 4)), random.normal(size=(5, 2))
+    split = bases.split(tangent, offset)
+    state = np.einsum("mij,mj->mi", tangent, x) + offset
+    a = np.einsum("mij,mj->mi", split.a_tangent, x) + split.a_offset
+    along = np.einsum("mij,mj->mi", bases.reference, a) + np.einsum("mij,mj->mi", bases.complement, split.find_b(x))
+    np.testing.assert_allclose(along / units[:, 0], state / units[:, 0], atol=1e-11)
+    same = bases.split(bases.reference, np.zeros((5, 4)))
+    assert not same.b_tangent.any() and np.array_equal(same.a_tangent, np.tile(np.eye(2), (5, 1, 1)))
+
+
+def test_loads_in_the_span_of_others_are_not_solved_for() -> None:
+    random = np.random.default_rng(3)
+    matrix, operator = random.normal(size=(6, 9)), random.normal(size=(6, 6))
+    solved: list[None] = []
+
+    def solve(forces: Real) -> Real:
+        solved.append(None)
+        return -np.linalg.solve(operator, forces)
+
+    basis = LoadBasis(6, 6)
+    first, second = random.normal(size=(2, 9))
+    for vector in (first, 0.3 * first, second, 0.1 * first + 0.9 * second, 0 * first):
+        solution, forces = basis.combine(vector, lambda v=vector: matrix @ v, solve)  # type: ignore[misc]
+        np.testing.assert_allclose(forces, matrix @ vector, atol=1e-13)
+        np.testing.assert_allclose(operator @ solution, -matrix @ vector, atol=1e-12)
+    assert len(solved) == 2
+
+
+def test_the_reference_operator_has_the_modes_of_the_first_law() -> None:
+    problem = make_blocks("lu")
+    modes = ModeState(np.full(problem.mesh.pairs.count, STICK), np.ones(problem.mesh.pairs.count))
+    law = linearise_pairs(problem, modes)
+    tangent = condense(problem)
+    load = problem.evaluate_load(0, 1.0)
+    tangent.solve(problem.constrain(law, load), load, law)
+    rhs = np.random.default_rng(1).normal(size=problem.unknowns)
+    expected = np.linalg.solve(assemble_tangent(problem, modes), rhs)
+    found = tangent.reference.solve_columns(np.stack([rhs, 2 * rhs], axis=1))
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(found[:, 1], 2 * expected, atol=2e-10 * np.abs(expected).max())
+    np.testing.assert_allclose(tangent.reference.solve(rhs), expected, atol=1e-10 * np.abs(expected).max())

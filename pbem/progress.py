@@ -127,9 +127,10 @@ def make_reporter(quiet: bool = False, stream: TextIO | None = None) -> Reporter
 
 
 def describe_iteration(iteration: Iteration) -> str:
-    """Residual, changes and counts of modes of one Newton iteration."""
+    """Residual, changes and counts of modes of one Newton iteration, and the work of its linear system."""
+    linear = f", {iteration.linear_iterations} of GMRES" if iteration.linear_iterations else ""
     return (f"residual {iteration.residual:.1e}, {iteration.changed} changed, "
-            f"stick/slip/open {iteration.stick}/{iteration.slip}/{iteration.open}")
+            f"stick/slip/open {iteration.stick}/{iteration.slip}/{iteration.open}{linear}")
 
 
 def describe_modes(step: Step) -> str:

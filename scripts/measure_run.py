@@ -2,8 +2,8 @@
 
 usage: mpirun -n 2 .venv/bin/python scripts/measure_run.py CASE.toml [--operator-only]
 
-Prints one line of JSON: seconds of the pieces (slowest rank), peak memory of every rank (MB), unknowns, Newton and GMRES
-iterations, seconds of a product and of copying the bytes that it reads.
+Prints one line of JSON: seconds of the pieces (slowest rank), peak memory of every rank (MB), unknowns, iterations of
+GMRES, seconds of a product and of copying the bytes that it reads.
 """
 
 from __future__ import annotations

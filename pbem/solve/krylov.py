@@ -72,17 +72,18 @@ class KrylovTangent:
             return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
         self._left.setArray(self._guess(-forced))
         self._right.setArray(-forced)
-        tolerance, residual = problem.model.solver.newton_tolerance, np.inf
+        tolerance, residual, count = problem.model.solver.newton_tolerance, np.inf, 0
         for _ in range(MOST_ATTEMPTS):
             before = residual
             self._solver.solve(self._right, self._left)
             self.iterations.append(int(self._solver.getIterationNumber()))
+            count += self.iterations[-1]
             unknowns = self.gather(np.array(self._left.getArray()))
             v = constraints.evaluate(unknowns)
             residual = problem.measure(problem.apply(v, load)) / scale
             if residual <= tolerance:
                 self.solution = unknowns
-                return Solved(unknowns, v, residual)
+                return Solved(unknowns, v, residual, linear_iterations=count)
             # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
             if self.iterations[-1] == MOST_ITERATIONS or not residual < 0.1 * before:
                 break

@@ -105,7 +105,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             memory = replace(memory, broken=memory.broken | failing)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart(modes)
-        iterations.append(_record(len(iterations) + 1, solved.residual, modes, proposal, begin))
+        iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
         reporter.iterate(iterations[-1])
         if outcome.settled and not failing.any():
             _refuse_free_motion(problem, modes)
@@ -185,10 +185,11 @@ def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:
         raise ConvergenceError("free motion", detail)
 
 
-def _record(number: int, residual: float, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:
+def _record(number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:
     stick, slip, is_open = (int((modes.mode == kind).sum()) for kind in (STICK, SLIP, OPEN))
     seconds = time.perf_counter() - begin
-    return Iteration(number, residual, int(proposal.changed.sum()), stick, slip, is_open, seconds)
+    changed = int(proposal.changed.sum())
+    return Iteration(number, solved.residual, changed, stick, slip, is_open, seconds, solved.linear_iterations)
 
 
 def _describe_changes(problem: Problem, proposal: Proposal) -> str:

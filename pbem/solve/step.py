@@ -15,7 +15,10 @@ STICK, SLIP, OPEN = 0, 1, 2
 
 @dataclass(frozen=True)
 class Iteration:
-    """One Newton iteration: relative residual of its linear system, pairs that changed mode, counts, seconds."""
+    """One Newton iteration: relative residual of its linear system, pairs that changed mode, counts, seconds.
+
+    linear_iterations: of GMRES with the hierarchical operator, else 0.
+    """
 
     number: int
     residual: float
@@ -24,6 +27,7 @@ class Iteration:
     slip: int
     open: int
     seconds: float
+    linear_iterations: int = 0
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,14 @@ class Solved:
     """Unknowns x (2 nodes,), v = M x + m (4 nodes,), and the relative residual of B v = 0.
 
     checked: the residual is that of v itself. Else it is that of the condensed system, and `check` has to confirm it.
+    linear_iterations: of GMRES with the hierarchical operator.
     """
 
     unknowns: Real
     v: Real
     residual: float
     checked: bool = True
+    linear_iterations: int = 0
 
 
 class AnyTangent(Protocol):

@@ -1,6 +1,6 @@
 """What one run of a case takes, by pieces and ranks; used by the benchmarks of large models.
 
-usage: mpirun -n 2 .venv/bin/python scripts/measure_run.py CASE.toml [--operator-only]
+usage: mpirun -n 2 .venv/bin/python scripts/measure_run.py CASE.toml [--operator-only] [--output FILE.h5]
 
 Prints one line of JSON: seconds of the pieces (slowest rank), peak memory of every rank (MB), unknowns, iterations of
 GMRES, seconds of a product and of copying the bytes that it reads.
@@ -8,6 +8,7 @@ GMRES, seconds of a product and of copying the bytes that it reads.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import resource
@@ -65,7 +66,7 @@ class Clock:
         return timed
 
 
-def measure(case: Path, operator_only: bool) -> dict[str, Any]:
+def measure(case: Path, operator_only: bool, output: str | None = None) -> dict[str, Any]:
     """Run a case on the ranks of this MPI world and gather what it took."""
     begin = time.perf_counter()
     from pbem import driver
@@ -87,7 +88,7 @@ def measure(case: Path, operator_only: bool) -> dict[str, Any]:
     if operator_only:
         driver.march = lambda problem, listener, start: iter(())
     with tempfile.TemporaryDirectory() as folder:
-        target = world.bcast(str(Path(folder) / "run.h5"), root=0)
+        target = output or world.bcast(str(Path(folder) / "run.h5"), root=0)
         driver.run(case, target)
         clock.seconds["whole"] = time.perf_counter() - begin
         world.Barrier()
@@ -136,6 +137,11 @@ def measure_product(problem: Any, world: Any) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    outcome = measure(Path(sys.argv[1]), "--operator-only" in sys.argv[2:])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("case", type=Path)
+    parser.add_argument("--operator-only", action="store_true", help="stop when the operator is there")
+    parser.add_argument("--output", help="result file to keep")
+    options = parser.parse_args()
+    outcome = measure(options.case, options.operator_only, options.output)
     if outcome:
         print(json.dumps(outcome))

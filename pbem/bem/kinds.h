@@ -144,21 +144,23 @@ INLINE void fill_tile(int order, int tractions, int stress, const Rows *r, const
         }
         for (int g = 0; g < count; g++) {
             const int64_t *element = kind->element[first + g];
-            const double nearest = find_least(x[g] * x[g] + y[g] * y[g]);
-            LaneMoments m;
-            double *H[LANES], *G[LANES];
-            for (int lane = 0; lane < LANES; lane++) {
-                H[lane] = H0 + 2 * (order + 1) * element[lane];
-                G[lane] = tractions ? G0 + 2 * (order + 1) * element[lane] : NULL;
-            }
-            const int terms = choose_terms(term_limit, nearest < FAR_SQUARED ? FAR_SQUARED : nearest);
-            evaluate_far(order, stress, terms, x[g], y[g], ends[g], &m);
-            if (tractions && !stress) find_logarithmic(order, 0.5 * logs[g], &m);
-            store_pairs(order, tractions, stress, &kind->factor, &kind->frame[first + g], Nx, Ny, &m, width, H, G);
-            if (nearest < FAR_SQUARED) /* done once more, in its own way */
+            const Lanes r2 = x[g] * x[g] + y[g] * y[g];
+            const int has_near = find_least(r2) < FAR_SQUARED;
+            const double nearest = has_near ? find_least_beyond(r2, FAR_SQUARED) : find_least(r2);
+            if (!has_near || nearest != INFINITY) {
+                LaneMoments m;
+                double *H[LANES], *G[LANES];
                 for (int lane = 0; lane < LANES; lane++) {
-                    const double r2 = x[g][lane] * x[g][lane] + y[g][lane] * y[g][lane];
-                    if (r2 >= FAR_SQUARED || is_repeated(element, lane)) continue;
+                    H[lane] = H0 + 2 * (order + 1) * element[lane];
+                    G[lane] = tractions ? G0 + 2 * (order + 1) * element[lane] : NULL;
+                }
+                evaluate_far(order, stress, choose_terms(term_limit, nearest), x[g], y[g], ends[g], &m);
+                if (tractions && !stress) find_logarithmic(order, 0.5 * logs[g], &m);
+                store_pairs(order, tractions, stress, &kind->factor, &kind->frame[first + g], Nx, Ny, &m, width, H, G);
+            }
+            if (has_near) /* done once more, in their own way */
+                for (int lane = 0; lane < LANES; lane++) {
+                    if (r2[lane] >= FAR_SQUARED || is_repeated(element, lane)) continue;
                     near->point[near->count] = i;
                     near->group[near->count] = first + g;
                     near->lane[near->count++] = lane;
@@ -181,12 +183,14 @@ INLINE void fill_tip_group(int order, int stress, const Rows *r, const Kind *kin
         locate(&kind->frame[group], spread(creal(r->point[i])), spread(cimag(r->point[i])), &x, &y);
         locate_from_tip(kind->family, &x, &y);
         const Lanes r2 = x * x + y * y;
-        const double nearest = find_least(r2);
-        const int terms = choose_terms(tip_term_limit, sqrt(nearest < FAR_TIP_SQUARED ? FAR_TIP_SQUARED : nearest));
-        evaluate_far_tip(order, stress, terms, kind->family, x, y, &m);
-        store_pairs(order, 0, stress, &kind->factor, &kind->frame[group], spread(stress ? creal(r->normal[i]) : 0),
-                    spread(stress ? cimag(r->normal[i]) : 0), &m, width, H, H);
-        if (nearest < FAR_TIP_SQUARED)
+        const int has_near = find_least(r2) < FAR_TIP_SQUARED;
+        const double nearest = has_near ? find_least_beyond(r2, FAR_TIP_SQUARED) : find_least(r2);
+        if (!has_near || nearest != INFINITY) {
+            evaluate_far_tip(order, stress, choose_terms(tip_term_limit, sqrt(nearest)), kind->family, x, y, &m);
+            store_pairs(order, 0, stress, &kind->factor, &kind->frame[group], spread(stress ? creal(r->normal[i]) : 0),
+                        spread(stress ? cimag(r->normal[i]) : 0), &m, width, H, H);
+        }
+        if (has_near)
             for (int lane = 0; lane < LANES; lane++)
                 if (r2[lane] < FAR_TIP_SQUARED && !is_repeated(element, lane)) fill_near(r, i, element[lane]);
     }

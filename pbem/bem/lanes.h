@@ -98,6 +98,15 @@ INLINE void store_joined(double *const *out, int64_t at, Lanes a, Lanes b)
 }
 #endif
 
+/* The least of the values that are not below the limit; infinity if there are none. */
+INLINE double find_least_beyond(Lanes a, double limit)
+{
+    double least = INFINITY;
+    for (int lane = 0; lane < LANES; lane++)
+        if (a[lane] >= limit && a[lane] < least) least = a[lane];
+    return least;
+}
+
 /* One row of the blocks of every lane's element: x[node], y[node] side by side at the lane's own place. */
 INLINE void store_row(int shapes, const Lanes *x, const Lanes *y, double *const *out, int64_t offset)
 {

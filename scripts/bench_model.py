@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Seconds of everything before and after the solution, piece by piece, for growing numbers of cracks or inclusions.
+"""Processor seconds of all before and after the solution, piece by piece, for growing numbers of cracks or inclusions.
 
     .venv/bin/python scripts/bench_model.py [cracks|inclusions] [--count 250 1000 2000] [--profile PIECE]
 
@@ -52,14 +52,14 @@ class Clock:
     def measure(self, piece: str) -> Iterator[None]:
         """Add the time of the block to the piece."""
         profile = cProfile.Profile() if piece == self._profiled else None
-        begin = time.perf_counter()
+        begin = time.process_time()
         if profile:
             profile.enable()
         yield
         if profile:
             profile.disable()
             pstats.Stats(profile, stream=sys.stderr).sort_stats("cumulative").print_stats(35)
-        self.seconds[piece] = self.seconds.get(piece, 0.0) + time.perf_counter() - begin
+        self.seconds[piece] = self.seconds.get(piece, 0.0) + time.process_time() - begin
 
 
 def make_step(mesh, laws, number: int):

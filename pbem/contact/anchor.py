@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,33 +32,71 @@ class Anchor:
 
 def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, ...]:
     """One anchor for each free motion, on regions chosen so that the anchors tell all motions apart."""
+    numbers = {name: number for number, name in enumerate(mesh.region_names)}
+    bounds = np.searchsorted(mesh.region, np.arange(len(numbers) + 1)) * (mesh.order + 1)
+    nodes = _Nodes(mesh, numbers, bounds, mesh.node_crack)
+    return tuple(anchor for group in _group_motions(motions) for anchor in _anchor_group(nodes, group))
+
+
+def _group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
+    """Motions that have regions in common, directly or by way of others."""
+    members: dict[int, list[int]] = {}
+    group_of: dict[str, int] = {}
+    for number, motion in enumerate(motions):
+        joined = {group_of[region] for region in motion.regions if region in group_of}
+        members[number] = [number]
+        for group in joined:
+            members[number] += members.pop(group)
+        for region in {region for at in members[number] for region in motions[at].regions}:
+            group_of[region] = number
+    groups = sorted(sorted(group) for group in members.values())
+    return [[motions[at] for at in group] for group in groups]
+
+
+def _anchor_group(nodes: _Nodes, motions: Sequence[FreeMotion]) -> list[Anchor]:
     anchors: list[Anchor] = []
     remaining = np.eye(len(motions))  # combinations of motions that the anchors so far do not see
     for _ in motions:
         best, strength = None, -1.0
         for motion, name in [(each, region) for each in motions for region in each.regions]:
-            anchor = _anchor_region(mesh, motion, mesh.region_names.index(name))
-            seen = np.array([_apply(mesh, anchor, other) for other in motions]) @ remaining
+            anchor = _anchor_region(nodes, motion, name)
+            seen = np.array([_apply(nodes, anchor, name, other) for other in motions]) @ remaining
             if np.linalg.norm(seen) > strength * (1 + 1e-9):
                 best, strength, direction = anchor, float(np.linalg.norm(seen)), seen / np.linalg.norm(seen)
         assert best is not None
         anchors.append(best)
         remaining = remaining @ (np.eye(remaining.shape[1]) - np.outer(direction, direction))
-    return tuple(anchors)
+    return anchors
 
 
-def _anchor_region(mesh: Mesh, motion: FreeMotion, region: int) -> Anchor:
-    nodes = np.flatnonzero((mesh.node_region == region) & ~mesh.node_crack)
-    velocity = _move(mesh, motion, nodes, region)
+@dataclass(frozen=True)
+class _Nodes:
+    """Nodes of the regions, which follow each other: those of number r go from bounds[r] to bounds[r + 1]."""
+
+    mesh: Mesh
+    numbers: Mapping[str, int]
+    bounds: Integer
+    crack: NDArray[np.bool_]
+
+    def find(self, region: int) -> Integer:
+        """The nodes of a region, cracks left out."""
+        first, last = self.bounds[region], self.bounds[region + 1]
+        return first + np.flatnonzero(~self.crack[first:last])
+
+
+def _anchor_region(nodes: _Nodes, motion: FreeMotion, name: str) -> Anchor:
+    region = nodes.numbers[name]
+    own = nodes.find(region)
+    velocity = _move(nodes, motion, own, name)
     pattern = velocity / np.abs(velocity).max()
-    weighted = mesh.weight[nodes] * velocity
-    return Anchor(region, nodes, pattern, weighted / float((np.conj(weighted) * pattern).real.sum()))
+    weighted = nodes.mesh.weight[own] * velocity
+    return Anchor(region, own, pattern, weighted / float((np.conj(weighted) * pattern).real.sum()))
 
 
-def _apply(mesh: Mesh, anchor: Anchor, motion: FreeMotion) -> float:
-    return float((np.conj(anchor.functional) * _move(mesh, motion, anchor.nodes, anchor.region)).real.sum())
+def _apply(nodes: _Nodes, anchor: Anchor, name: str, motion: FreeMotion) -> float:
+    return float((np.conj(anchor.functional) * _move(nodes, motion, anchor.nodes, name)).real.sum())
 
 
-def _move(mesh: Mesh, motion: FreeMotion, nodes: Integer, region: int) -> Complex:
-    shift, spin = motion.velocities.get(mesh.region_names[region], (0j, 0.0))
-    return shift + 1j * spin * mesh.position[nodes]
+def _move(nodes: _Nodes, motion: FreeMotion, own: Integer, name: str) -> Complex:
+    shift, spin = motion.velocities.get(name, (0j, 0.0))
+    return shift + 1j * spin * nodes.mesh.position[own]

@@ -132,11 +132,19 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
 
 
 def _group_strengths(laws: list[Law], interface: Integer) -> tuple[StrengthGroup, ...]:
-    chosen = [choose_strength(law) for law in laws]
+    functions: dict[str | None, StrengthLaw] = {}  # of each file, which is run once
+    chosen = []
+    for law in laws:
+        if law.kind == "custom" and law.file in functions:
+            chosen.append((functions[law.file], dict(law.parameters)))
+            continue
+        chosen.append(choose_strength(law))
+        if law.kind == "custom":
+            functions[law.file] = chosen[-1][0]
     groups = []
     for function, names in {(function, tuple(parameters)): None for function, parameters in chosen}:
-        members = [k for k, (law, parameters) in enumerate(chosen) if (law, tuple(parameters)) == (function, names)]
-        pairs = np.flatnonzero(np.isin(interface, members))
+        members = np.array([(law, tuple(parameters)) == (function, names) for law, parameters in chosen])
+        pairs = np.flatnonzero(members[interface])
         values = {
             name: np.array([parameters.get(name, 0.0) for _, parameters in chosen])[interface[pairs]] for name in names
         }
@@ -146,14 +154,12 @@ def _group_strengths(laws: list[Law], interface: Integer) -> tuple[StrengthGroup
 
 def _evaluate_gaps(laws: list[Law], mesh: Mesh) -> Real:
     pairs = mesh.pairs
-    gap = pairs.distance.copy()
-    for number, law in enumerate(laws):
-        own = pairs.interface == number
-        if isinstance(law.gap, str):
-            place = pairs.position[own]
-            gap[own] += evaluate_expression(law.gap, x=place.real, y=place.imag)
-        elif law.kind != "bonded":
-            gap[own] += law.gap
+    given = [0.0 if isinstance(law.gap, str) or law.kind == "bonded" else law.gap for law in laws]
+    gap = pairs.distance + np.array([*given, 0.0])[pairs.interface]
+    for text in dict.fromkeys(law.gap for law in laws if isinstance(law.gap, str)):
+        own = np.array([law.gap == text for law in laws])[pairs.interface]
+        place = pairs.position[own]
+        gap[own] += evaluate_expression(text, x=place.real, y=place.imag)
     return gap
 
 

@@ -52,10 +52,11 @@ class Load:
 def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     """All nodes of outer curves, in mesh order."""
     conditions = list(model.conditions.values())
-    number = {mesh.curve_names.index(condition.curve): k for k, condition in enumerate(conditions)}
-    curve = mesh.node_curve
-    node = np.flatnonzero(np.isin(curve, list(number)))
-    which = np.array([number[c] for c in curve[node]], dtype=np.int64)
+    number = {condition.curve: k for k, condition in enumerate(conditions)}
+    condition_of_curve = np.array([number.get(name, -1) for name in mesh.curve_names], dtype=np.int64)
+    which = condition_of_curve[mesh.node_curve]
+    node = np.flatnonzero(which >= 0)
+    which = which[node]
     local = np.array([condition.frame == "local" for condition in conditions], dtype=bool)[which]
     first = np.where(local, mesh.normal[node], 1.0)
     known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
@@ -69,22 +70,23 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     after = model.stages[stage]
     before = model.stages[stage - 1] if stage > 0 else Stage("rest", 1, {}, {})
 
-    def interpolate(old: Sequence[float], new: Sequence[float]) -> Real:
-        return np.array(old) + factor * (np.array(new) - np.array(old))
+    def interpolate(old: Sequence[object], new: Sequence[object]) -> Real:
+        start, end = np.array(old, dtype=float), np.array(new, dtype=float)
+        return start + factor * (end - start)
 
     none = (0.0, 0.0)
-    values = [interpolate(before.boundary.get(name, none), after.boundary.get(name, none)) for name in model.conditions]
-    pressure = [
-        interpolate([before.pressure.get(name, 0.0)], [after.pressure.get(name, 0.0)]) for name in mesh.interface_names
-    ]
+    values = interpolate(*([stage.boundary.get(name, none) for name in model.conditions] for stage in (before, after)))
+    pressure = interpolate(
+        *([stage.pressure.get(name, 0.0) for name in mesh.interface_names] for stage in (before, after))
+    )
     gravity = complex(*interpolate(before.gravity, after.gravity))
     remote = interpolate(before.remote, after.remote)
     balanced = _sample(mesh, [balanced_background(model, region, gravity) for region in model.regions])
     far = _sample(mesh, [far_background(region, remote) for region in model.regions])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
-        values=np.reshape(values, (-1, 2))[outer.condition],
-        pressure=np.reshape(pressure, -1)[mesh.pairs.interface],
+        values=values.reshape(-1, 2)[outer.condition],
+        pressure=pressure[mesh.pairs.interface],
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
@@ -94,9 +96,10 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
 def _sample(mesh: Mesh, backgrounds: Sequence[Background]) -> Complex:
     """Displacement and traction (2, nodes) of the regions' background fields at all nodes."""
     fields = np.zeros((2, mesh.nodes), dtype=complex)
+    ends = np.searchsorted(mesh.node_region, np.arange(len(backgrounds) + 1))
     for region, background in enumerate(backgrounds):
         if not background.is_zero:
-            own = mesh.node_region == region
+            own = slice(ends[region], ends[region + 1])
             fields[0, own] = background.displacement(mesh.position[own])
             fields[1, own] = background.traction(mesh.position[own], mesh.normal[own])
     return fields

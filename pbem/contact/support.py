@@ -13,12 +13,13 @@ from pbem.model.support import Tie, find_free_motions
 
 def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie]:
     """What every interface of two regions holds: sticking pairs both components of the jump, slipping ones one."""
+    count = len(mesh.interface_names)
+    sticks = np.bincount(mesh.pairs.interface[modes.mode == STICK], minlength=count) > 0
+    closed = np.bincount(mesh.pairs.interface[modes.mode != OPEN], minlength=count) > 0
     ties: dict[str, Tie] = {}
     for number, name in enumerate(mesh.interface_names):
-        if name in model.interfaces and model.interfaces[name].second is None:
-            continue
-        mode = modes.mode[mesh.pairs.interface == number]
-        ties[name] = "both" if np.any(mode == STICK) else "none" if np.all(mode == OPEN) else "normal"
+        if name not in model.interfaces or model.interfaces[name].second is not None:
+            ties[name] = "both" if sticks[number] else "normal" if closed[number] else "none"
     return ties
 
 
@@ -40,9 +41,13 @@ def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: N
     """
     mode = modes.mode.copy()
     closed = np.where(resists_slip(laws), STICK, SLIP)
-    for number in range(len(mesh.interface_names)):
-        own = np.flatnonzero((mesh.pairs.interface == number) & ~laws.parted & ~mesh.pairs.crack)
-        if len(own) and np.all(mode[own] == OPEN):
-            nearest = own[np.argsort(opening[own], kind="stable")[:CLOSED_AT_LEAST]]
-            mode[nearest] = closed[nearest]
+    may_close = np.flatnonzero(~laws.parted & ~mesh.pairs.crack)
+    of = mesh.pairs.interface[may_close]
+    partly_closed = np.bincount(of[mode[may_close] != OPEN], minlength=len(mesh.interface_names)) > 0
+    own = may_close[~partly_closed[of]]
+    # By interface, then by opening: the first few of each interface are its nearest pairs.
+    own = own[np.lexsort((opening[own], mesh.pairs.interface[own]))]
+    of = mesh.pairs.interface[own]
+    nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < CLOSED_AT_LEAST]
+    mode[nearest] = closed[nearest]
     return ModeState(mode, modes.sign)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import divide_curve
-from pbem.mesh.equations import explain_exceptions, uses_traction_equation
+from pbem.mesh.equations import explain_exceptions, find_inner_curves, uses_traction_equation
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.pairing import pair_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
@@ -21,6 +21,7 @@ def generate_mesh(model: Model) -> Mesh:
     chains = _list_chains(model)
     counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
+    number = {name: at for at, name in enumerate(curve_names)}
     pairs, links = pair_nodes(model, chains)
 
     def repeat(values: list, dtype: type) -> np.ndarray:
@@ -38,7 +39,7 @@ def generate_mesh(model: Model) -> Mesh:
         center=join(lambda chain: chain.elements.center),
         sweep=join(lambda chain: chain.elements.sweep),
         region=repeat([chain.region for chain in chains], np.int64),
-        curve=repeat([curve_names.index(chain.curve) for chain in chains], np.int64),
+        curve=repeat([number[chain.curve] for chain in chains], np.int64),
         crack=repeat([chain.crack for chain in chains], np.bool_),
         tip=np.concatenate([_mark_tips(model, chain) for chain in chains]),
         position=join(lambda chain: chain.elements.place(chain.local)),
@@ -58,8 +59,9 @@ def _list_chains(model: Model) -> list[Chain]:
     order = model.analysis.order
     chains: list[Chain] = []
     first_node = 0
+    inner = find_inner_curves(model)
     for number, region in enumerate(model.regions):
-        for curve, forward, crack, traction in _list_sides(model, region):
+        for curve, forward, crack, traction in _list_sides(model, region, inner):
             elements = divide_curve(model.curves[curve])
             elements = elements if forward else elements.reverse()
             chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order))
@@ -67,10 +69,12 @@ def _list_chains(model: Model) -> list[Chain]:
     return chains
 
 
-def _list_sides(model: Model, region: Region) -> list[tuple[str, bool, bool, bool]]:
+def _list_sides(
+    model: Model, region: Region, inner: Mapping[str, frozenset[str]]
+) -> list[tuple[str, bool, bool, bool]]:
     """Curve, forward, crack, traction equation of every side of a region; a crack always has the traction equation."""
     sides = [
-        (side.curve, side.forward, False, uses_traction_equation(model, region, loop, side.curve))
+        (side.curve, side.forward, False, uses_traction_equation(model, region, loop, side.curve, inner))
         for loop in region.loops
         for side in loop.sides
     ]

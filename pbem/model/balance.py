@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pbem.model.junction import format_point
@@ -15,10 +17,13 @@ BALANCED = 1e-9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
-def describe_unbalance(model: Model, motion: FreeMotion) -> str | None:
-    """What drives a free motion: the first stage whose loads do work on it, with their resultant; None if none."""
+def describe_unbalance(model: Model, motion: FreeMotion, moving: Sequence[Region]) -> str | None:
+    """What drives a free motion: the first stage whose loads do work on it, with their resultant; None if none.
+
+    moving: the motion's regions.
+    """
     for stage in model.stages:
-        force, moment, power, scale = _sum_tractions(model, motion, stage)
+        force, moment, power, scale = _sum_tractions(model, motion, moving, stage)
         if abs(power) > BALANCED * scale:
             about = format_point(0j)
             loads = "tractions and weight" if any(stage.gravity) else "tractions"
@@ -29,15 +34,15 @@ def describe_unbalance(model: Model, motion: FreeMotion) -> str | None:
     return None
 
 
-def _sum_tractions(model: Model, motion: FreeMotion, stage: Stage) -> tuple[complex, float, float, float]:
+def _sum_tractions(
+    model: Model, motion: FreeMotion, moving: Sequence[Region], stage: Stage
+) -> tuple[complex, float, float, float]:
     """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs.
 
     Fluid between two regions presses on both; where they are tied along the normal its power cancels.
     """
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
-    for region in model.regions:
-        if region.name not in motion.velocities:
-            continue
+    for region in moving:
         a, spin = motion.velocities[region.name]
         weight, lever = _weigh(model, region, stage)
         force += weight

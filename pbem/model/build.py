@@ -183,9 +183,10 @@ def _note_choices(case: Case) -> list[str]:
 def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults, balanced = [], []
+    regions = {region.name: region for region in model.regions}
     for motion in find_free_motions(model):
         found = f"a free rigid motion ({motion.text})"
-        unbalance = describe_unbalance(model, motion)
+        unbalance = describe_unbalance(model, motion, [regions[name] for name in motion.regions])
         if unbalance is None:
             balanced.append(motion.text)
             continue

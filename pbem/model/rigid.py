@@ -19,7 +19,19 @@ RELATIVE_RANK = 1e-8
 
 
 def find_null_motions(bodies: int, links: Iterable[Link]) -> list[Real]:
-    """A basis of the motions (3 bodies,) that no link prevents, with many zeros: rotations are eliminated first.
+    """A basis of the motions (3 bodies,) that no link prevents; see `find_moving_bodies`."""
+    motions = []
+    for members, vector in find_moving_bodies(bodies, links):
+        whole = np.zeros((bodies, 3))
+        whole[members] = vector.reshape(-1, 3)
+        motions.append(whole.ravel())
+    return motions
+
+
+def find_moving_bodies(bodies: int, links: Iterable[Link]) -> list[tuple[list[int], Real]]:
+    """A basis of the motions that no link prevents, with many zeros: rotations are eliminated first.
+
+    Each with the bodies (k,), in rising order, that hang together there, and their motions (3 k,); others are at rest.
 
     Bodies that links tie to each other in all three motions are made one before anything is solved, so that the work is
     about proportional to the number of links.
@@ -29,13 +41,10 @@ def find_null_motions(bodies: int, links: Iterable[Link]) -> list[Real]:
         groups.link(first, second, rows)
     motions = []
     for members, basis in groups.find_motions():
-        columns = (3 * np.array(members)[:, None] + np.arange(3)).ravel()
         for pivot, vector in _make_sparse(basis):
-            whole = np.zeros(3 * bodies)
-            whole[columns] = vector
-            at = int(columns[pivot])
-            motions.append(((at % 3 != 2, at), whole))
-    return [whole for _, whole in sorted(motions, key=lambda motion: motion[0])]
+            at = 3 * members[pivot // 3] + pivot % 3
+            motions.append(((at % 3 != 2, at), (members, vector)))
+    return [motion for _, motion in sorted(motions, key=lambda entry: entry[0])]
 
 
 class _Groups:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbem.case.finding import list_names
 from pbem.model.junction import format_point
 from pbem.model.model import Contact, Interface, Law, Model, Side
-from pbem.model.rigid import GROUND, Link, find_null_motions
+from pbem.model.rigid import GROUND, Link, find_moving_bodies
 from pbem.model.sampling import sample_side
 from pbem.model.touching import measure_opening
 
@@ -53,7 +53,10 @@ def find_free_motions(model: Model, ties: Mapping[str, Tie] | None = None) -> tu
     names = [region.name for region in model.regions]
     center, scale = _frame(model)
     links = [*_link_to_ground(model, center, scale), *_link_regions(model, names, dict(ties or {}), center, scale)]
-    return tuple(_describe(motion, names, center, scale) for motion in find_null_motions(len(names), links))
+    return tuple(
+        _describe(vector, [names[body] for body in bodies], center, scale)
+        for bodies, vector in find_moving_bodies(len(names), links)
+    )
 
 
 def _frame(model: Model) -> tuple[complex, float]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
+from pbem.case.generation import Group
 from pbem.mesh.mesh import Mesh
 from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
 from pbem.results.contents import Tips
-from pbem.results.reader import Contact, Results
+from pbem.results.reader import Results
 from pbem.solve.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
@@ -19,16 +20,19 @@ MOST_TIPS = 10
 
 def describe_model(model: Model, mesh: Mesh) -> str:
     """What `pbem check` prints: regions, curves with their grading, conditions, interfaces, size, notes."""
+    made = {name for group in model.groups for name in group.members}
     parts = [
         model.title,
-        _section("regions", [_describe_region(region) for region in model.regions]),
+        _section("regions", [_describe_region(region, made) for region in model.regions if region.name not in made]),
+        _section("generated", _table(["group", "curves", "inside", "sizes", "elements", "refined towards", "law"],
+                                     [_group_row(model, group) for group in model.groups])),
         _section("curves", _table(["curve", "legs", "elements", "length", "refined towards"],
-                                  [_curve_row(curve) for curve in model.curves.values()])),
+                                  [_curve_row(curve) for name, curve in model.curves.items() if name not in made])),
         _section("conditions", _table(["curve", *_direction_titles(model)],
                                       [[each.curve, *describe_condition(model, each)]
                                        for each in model.conditions.values()])),
         _section("interfaces", _table(["interface", "first side", "second side", "pairs", "law"],
-                                      _interface_rows(model, mesh))),
+                                      _interface_rows(model, mesh, made))),
         _section("load", _describe_loads(model)),
         _section("size", _describe_size(model, mesh)),
         _section("notes", _shorten([*model.notes, *mesh.notes])),
@@ -56,7 +60,7 @@ def describe_results(results: Results) -> str:
     if k:
         parts.append(_section("contact at the last step", _table(
             ["interface", "pairs", "stick", "slip", "open", "max opening", "max |slip|"],
-            [_contact_row(each) for each in _first(results.contact.values())]) + _left_out(len(results.contact))))
+            _contact_rows(results))))
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("reactions at the last step", _table(
@@ -82,14 +86,16 @@ def estimate_memory(model: Model, mesh: Mesh) -> tuple[float, float]:
     return operator, 8.0 * entries if len(model.regions) == 1 else 12.0 * entries
 
 
-def _describe_region(region: Region) -> str:
+def _describe_region(region: Region, made: Collection[str]) -> str:
+    """made: names of generated curves, which are told with their groups."""
     material = region.material
     loops = [
         ("outer loop: " if loop.outer else "inner loop: ")
         + ", ".join(side.curve if side.forward else f"{side.curve} (reversed)" for side in loop.sides)
-        for loop in region.loops
+        for loop in region.loops if loop.sides[0].curve not in made
     ]
-    cracks = [f"cracks: {', '.join(_shorten(region.cracks, 12))}"] if region.cracks else []
+    written = [name for name in region.cracks if name not in made]
+    cracks = [f"cracks: {', '.join(_shorten(written, 12))}"] if written else []
     kind = "infinite region" if region.infinite else "region"
     head = (f"{kind} {region.name}: {material.name}, Young's modulus {material.young:g}, "
             f"Poisson's ratio {material.poisson:g}, plane {material.plane}")
@@ -103,6 +109,27 @@ def _curve_row(curve: Curve) -> list[str]:
     text = refined[0] if len(set(refined)) == 1 else ", ".join(_shorten(refined, 8))
     return [curve.name, str(len(curve.legs)), str(sum(leg.elements for leg in curve.legs)), f"{curve.length:.4g}",
             text + (f" (power {'/'.join(power)})" if power else "")]
+
+
+def _group_row(model: Model, group: Group) -> list[str]:
+    """What a group has in common; sizes: lengths of cracks, diameters of inclusions."""
+    members = group.members
+    curves = [model.curves[name] for name in members]
+    lengths = [curve.length if group.kind == "cracks" else curve.length / np.pi for curve in curves]
+    low, high = min(lengths), max(lengths)
+    sizes = f"{'length' if group.kind == 'cracks' else 'diameter'} {low:.4g}"
+    sizes += f" to {high:.4g}" if high > low * (1 + 1e-6) else ""
+    refined = {_curve_row(curve)[-1] for curve in curves}
+    laws = list({id(law): describe_law(law) for law in (model.interfaces[name].law for name in members)}.values())
+    own = "" if len(laws) == 1 else f", {_count(len(laws) - 1, 'other law')}"
+    material = "" if group.kind == "cracks" else f" of {_find_material(model, members[0])}"
+    return [group.name, f"{group.count} {group.kind}{material}, {members[0]} to {members[-1]}", group.region, sizes,
+            str(sum(leg.elements for leg in curves[0].legs)), " or ".join(sorted(refined)), laws[-1] + own]
+
+
+def _find_material(model: Model, region: str) -> str:
+    material = next(each.material for each in model.regions if each.name == region)
+    return f"{material.name} (E {material.young:g}, nu {material.poisson:g})"
 
 
 def _direction_titles(model: Model) -> list[str]:
@@ -125,10 +152,11 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     return texts[0], texts[1]
 
 
-def _interface_rows(model: Model, mesh: Mesh) -> list[list[str]]:
-    pairs = np.bincount(mesh.pairs.interface, minlength=len(mesh.interface_names))
-    return [[each.name, each.first, each.second or "(crack)", str(pairs[mesh.interface_names.index(each.name)]),
-             describe_law(each.law)] for each in model.interfaces.values()]
+def _interface_rows(model: Model, mesh: Mesh, made: Collection[str]) -> list[list[str]]:
+    counts = np.bincount(mesh.pairs.interface, minlength=len(mesh.interface_names))
+    pairs = dict(zip(mesh.interface_names, counts, strict=True))
+    return [[each.name, each.first, each.second or "(crack)", str(pairs[each.name]), describe_law(each.law)]
+            for each in model.interfaces.values() if each.name not in made]
 
 
 def describe_law(law: Law) -> str:
@@ -186,11 +214,24 @@ def _describe_iterations(results: Results) -> str:
             f"{table['seconds'].sum():.3g} s")
 
 
-def _contact_row(contact: Contact) -> list[str]:
-    mode = contact.mode[-1]
-    counts = [str(int((mode == which).sum())) for which in (STICK, SLIP, OPEN)]
-    return [contact.name, str(contact.pairs), *counts, _number(contact.opening[-1].max()),
-            _number(np.abs(contact.slip[-1]).max())]
+def _contact_rows(results: Results) -> list[list[str]]:
+    """A row for each group that was generated, and for each other interface."""
+    pairs = results.pairs
+    group_of = {member: group for group in results.groups for member in group.members}
+    titles: dict[str, int] = {}
+    row_of = np.zeros(len(pairs.names), dtype=np.int64)
+    for number, name in enumerate(pairs.names):
+        group = group_of.get(name)
+        title = name if group is None else f"{group.name} ({group.count} {group.kind})"
+        row_of[number] = titles.setdefault(title, len(titles))
+    row = row_of[pairs.interface]
+    mode, opening, slip = (pairs.at(quantity, -1) for quantity in ("mode", "opening", "slip"))
+    counts = [np.bincount(row[mode == which], minlength=len(titles)) for which in (STICK, SLIP, OPEN)]
+    largest = [np.full(len(titles), -np.inf) for _ in range(2)]
+    np.maximum.at(largest[0], row, opening)
+    np.maximum.at(largest[1], row, np.abs(slip))
+    numbers = zip(titles, np.bincount(row, minlength=len(titles)), *counts, *largest, strict=True)
+    return [[title, *map(str, each[:4]), *map(_number, each[4:])] for title, *each in numbers]
 
 
 def _describe_energy(results: Results) -> list[str]:
@@ -238,10 +279,6 @@ def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 def _left_out(count: int) -> list[str]:
     return [f"... and {count - MOST_ROWS} more"] if count > MOST_ROWS else []
-
-
-def _first(items: Iterable[Contact]) -> list[Contact]:
-    return [item for item, _ in zip(items, range(MOST_ROWS), strict=False)]
 
 
 def _shorten(texts: Sequence[str], most: int = MOST_ROWS) -> list[str]:

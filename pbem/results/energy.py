@@ -99,6 +99,8 @@ class EnergyBalance:
         self._outer = collect_outer_nodes(model, mesh)
         self._weight = weigh_faces(mesh)
         self._faces = list_faces(mesh)
+        self._by_region = np.argsort(self._faces.region, kind="stable")
+        self._bounds = np.searchsorted(self._faces.region[self._by_region], np.arange(len(model.regions) + 1))
         self._forces = [
             self._refer(number, [Background(each.material, force=force) for force in (1, 1j)])
             for number, each in enumerate(model.regions) if each.material.density and not each.infinite
@@ -179,13 +181,18 @@ class EnergyBalance:
         """Traction of the in-situ stress on all faces (f,)."""
         traction = np.zeros(len(self._weight), dtype=complex)
         for number, (balanced, _) in enumerate(evaluate_backgrounds(self._model, 0, 0.0)):
-            own = self._faces.region == number
             at_rest = Background(balanced.material, initial=balanced.initial)
+            if at_rest.is_zero:
+                continue
+            own = self._find_faces(number)
             traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
         return traction
 
+    def _find_faces(self, region: int) -> Integer:
+        return self._by_region[self._bounds[region]:self._bounds[region + 1]]
+
     def _refer(self, region: int, fields: Sequence[Background]) -> _Reference:
-        faces = np.flatnonzero(self._faces.region == region)
+        faces = self._find_faces(region)
         z, n = self._faces.position[faces], self._faces.normal[faces]
         # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
         second_moment = 0.5 * (self._weight[faces] * n * z**2 * np.conj(z)).sum()

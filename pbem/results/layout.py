@@ -149,6 +149,7 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
     interfaces = sort_pairs(mesh)
     group.attrs["names"] = _text(list(interfaces))
     group.attrs["groups"] = json.dumps([dataclasses.asdict(each) for each in model.groups])
+    group.attrs["laws"] = _text([find_joint(model, name).law.kind for name in interfaces])
     counts = [len(pairs) for pairs in interfaces.values()]
     order = join_pairs(interfaces)
     together["interface"] = np.repeat(np.arange(len(counts)), counts).astype("i4")

@@ -7,7 +7,7 @@ import os
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
@@ -15,10 +15,10 @@ from matplotlib.path import Path as OutlinePath
 from numpy.typing import NDArray
 
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Condition, Model, Region
+from pbem.model.model import Condition, Model
 from pbem.results.describe import describe_condition
-from pbem.results.outline import POINTS_PER_ELEMENT, to_columns, trace_elements
-from pbem.results.plot_style import FORCE, MOTION, SHADES, SUPPORT, label, style
+from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns, trace_elements
+from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
 
 Complex = NDArray[np.complex128]
 MOST_NAMES = 30
@@ -37,9 +37,10 @@ def draw_model(model: Model, mesh: Mesh) -> Figure:
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
-    used = {name: np.flatnonzero(mesh.curve == i) for i, name in enumerate(mesh.curve_names)}
-    for number, region in enumerate(model.regions):
-        _draw_region(axes, number, region, mesh)
+    order = np.argsort(mesh.curve, kind="stable")
+    ends = np.searchsorted(mesh.curve[order], np.arange(len(mesh.curve_names) + 1))
+    used = {name: order[ends[i]:ends[i + 1]] for i, name in enumerate(mesh.curve_names)}
+    _draw_regions(axes, model, mesh)
     _draw_elements(axes, model, mesh)
     for condition in model.conditions.values():
         _draw_condition(axes, model, mesh, condition, used[condition.curve])
@@ -47,8 +48,10 @@ def draw_model(model: Model, mesh: Mesh) -> Figure:
     for name, elements in used.items():
         if few and len(elements):
             _name_curve(axes, model, mesh, name, elements)
-    for name in model.interfaces:
-        _draw_sides(axes, model, mesh, name)
+    _draw_tips(axes, model)
+    if len(model.interfaces) <= MOST_NAMES:
+        for name in model.interfaces:
+            _draw_sides(axes, model, mesh, name)
     axes.autoscale_view()
     axes.margins(0.06)
     axes.set_xlabel(label("$x$", model.units_length))
@@ -59,29 +62,40 @@ def draw_model(model: Model, mesh: Mesh) -> Figure:
     return figure
 
 
-def _draw_region(axes: Axes, number: int, region: Region, mesh: Mesh) -> None:
-    """Shade a region and name it where there is most room; an infinite one is the shaded plane."""
-    loops = _list_loops(mesh, number)
-    shade = SHADES[number % len(SHADES)]
-    if region.infinite:
-        axes.set_facecolor(shade)
-        for loop in loops:
-            axes.add_patch(PathPatch(OutlinePath(to_columns(loop)), facecolor="white", edgecolor="none", zorder=0))
-        text = f"{region.name} (infinite)"
-        axes.text(0.02, 0.02, text, transform=axes.transAxes, style="italic", color="0.3", zorder=6)
-        return
-    path = OutlinePath.make_compound_path(*(OutlinePath(to_columns(loop), closed=True) for loop in loops))
-    axes.add_patch(PathPatch(path, facecolor=shade, edgecolor="none", zorder=0.5))
-    place = _find_room(path, np.concatenate([mesh.start, mesh.end]))
-    axes.text(place.real, place.imag, region.name, ha="center", va="center", style="italic", color="0.3", zorder=6)
-
-
-def _list_loops(mesh: Mesh, region: int) -> list[Complex]:
-    """Closed loops (first point repeated) of a region, cracks not among them."""
+def _draw_regions(axes: Axes, model: Model, mesh: Mesh) -> None:
+    """Shade the regions and name those that were written one by one where there is most room; an infinite one is the
+    shaded plane."""
+    made = {name for group in model.groups for name in group.members}
+    shades = choose_shades(mesh.region_names, model.groups)
     lines = _trace_lines(mesh)
+    ends = np.searchsorted(mesh.region, np.arange(len(model.regions) + 1))
+    cavities: list[OutlinePath] = []
+    bodies: list[OutlinePath] = []
+    for number, region in enumerate(model.regions):
+        own = slice(ends[number], ends[number + 1])
+        loops = [OutlinePath(to_columns(loop)) for loop in _list_loops(mesh, lines, own)]
+        if region.infinite:
+            axes.set_facecolor(shades[number])
+            cavities += loops
+            text = f"{region.name} (infinite)"
+            axes.text(0.02, 0.02, text, transform=axes.transAxes, style="italic", color="0.3", zorder=6)
+            continue
+        bodies.append(OutlinePath.make_compound_path(*(OutlinePath(loop.vertices, closed=True) for loop in loops)))
+        if region.name not in made:
+            place = _find_room(bodies[-1], np.concatenate([mesh.start, mesh.end]))
+            axes.text(
+                place.real, place.imag, region.name, ha="center", va="center", style="italic", color="0.3", zorder=6
+            )
+    shown = [shade for shade, region in zip(shades, model.regions, strict=True) if not region.infinite]
+    axes.add_collection(PathCollection(cavities, facecolors="white", edgecolors="none", zorder=0))
+    axes.add_collection(PathCollection(bodies, facecolors=shown, edgecolors="none", zorder=0.5))
+
+
+def _list_loops(mesh: Mesh, lines: Complex, elements: slice) -> list[Complex]:
+    """Closed loops (first point repeated) of a region's elements, cracks left out; lines: points on all elements."""
     loops: list[Complex] = []
     points: list[complex] = []
-    for e in np.flatnonzero((mesh.region == region) & ~mesh.crack):
+    for e in elements.start + np.flatnonzero(~mesh.crack[elements]):
         points = points or [complex(mesh.start[e])]
         points += [*lines[e, 1:-1], complex(mesh.end[e])]
         if points[-1] == points[0]:
@@ -92,7 +106,7 @@ def _list_loops(mesh: Mesh, region: int) -> list[Complex]:
 
 def _trace_lines(mesh: Mesh) -> Complex:
     """Points along every element (e, points)."""
-    return trace_elements(mesh.start, mesh.end, mesh.sweep, np.linspace(-1.0, 1.0, POINTS_PER_ELEMENT))
+    return trace_elements(mesh.start, mesh.end, mesh.sweep, choose_points(mesh.elements))
 
 
 def _find_room(path: OutlinePath, boundary: Complex) -> complex:
@@ -108,15 +122,20 @@ def _find_room(path: OutlinePath, boundary: Complex) -> complex:
 
 
 def _draw_elements(axes: Axes, model: Model, mesh: Mesh) -> None:
-    """Every element with ticks across its ends; cracks heavier."""
+    """Every element, of few with ticks across their ends; cracks heavier."""
     lines = to_columns(_trace_lines(mesh))
+    if mesh.elements <= MANY_ELEMENTS:
+        _draw_ticks(axes, model, mesh)
+    for crack, color, width in ((False, "0.15", 0.9), (True, CRACK, 1.3)):
+        axes.add_collection(LineCollection(lines[mesh.crack == crack], colors=color, linewidths=width, zorder=3))
+
+
+def _draw_ticks(axes: Axes, model: Model, mesh: Mesh) -> None:
     across = 0.006 * model.size * 1j * (mesh.end - mesh.start) / np.abs(mesh.end - mesh.start)
     ends = np.concatenate([mesh.start, mesh.end])
     offset = np.concatenate([across, across])
     ticks = np.stack([to_columns(ends - offset), to_columns(ends + offset)], axis=1)
     axes.add_collection(LineCollection(ticks, colors="0.35", linewidths=0.5, zorder=3))
-    for crack, color, width in ((False, "0.15", 0.9), (True, CRACK, 1.3)):
-        axes.add_collection(LineCollection(lines[mesh.crack == crack], colors=color, linewidths=width, zorder=3))
 
 
 def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, elements: NDArray[np.int64]) -> None:
@@ -223,15 +242,21 @@ def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: NDArr
     axes.update_datalim(to_columns(np.array([room])))
 
 
-def _draw_sides(axes: Axes, model: Model, mesh: Mesh, name: str) -> None:
-    """The normal of the first side, and the numbers of both sides; tips of cracks as dots."""
-    pairs = np.flatnonzero(mesh.pairs.interface == mesh.interface_names.index(name))
-    if name in model.crack_tips:
-        curve = model.curves[name]
-        tips = [end for end, tip in zip((curve.start, curve.end), model.crack_tips[name], strict=True) if tip]
-        size = 4.0 if len(model.crack_tips) < 10 else 2.5
+def _draw_tips(axes: Axes, model: Model) -> None:
+    """Tips of cracks as dots."""
+    tips = [
+        end for name, ends in model.crack_tips.items()
+        for end, is_tip in zip((model.curves[name].start, model.curves[name].end), ends, strict=True) if is_tip
+    ]
+    if tips:
+        size = 4.0 if len(model.crack_tips) < 10 else 2.5 if len(model.crack_tips) < 300 else 1.0
         axes.plot(np.real(tips), np.imag(tips), ".", color=CRACK, markersize=size, zorder=4)
-    if len(model.interfaces) > MOST_NAMES or not len(pairs):
+
+
+def _draw_sides(axes: Axes, model: Model, mesh: Mesh, name: str) -> None:
+    """The normal of the first side, and the numbers of both sides."""
+    pairs = np.flatnonzero(mesh.pairs.interface == mesh.interface_names.index(name))
+    if not len(pairs):
         return
     along = mesh.pairs.arc_length[pairs]
     pair = pairs[np.argmin(np.abs(along - (along.min() + 0.25 * np.ptp(along))))]

@@ -14,6 +14,8 @@ from pbem.results.contents import Elements, Nodes, Tips
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 POINTS_PER_ELEMENT = 9
+# In pictures of more elements than this their shapes cannot be seen: they are drawn with fewer points, without ticks.
+MANY_ELEMENTS = 4000
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
     The displacement is continuous along a loop, while each element has its own polynomial: where two elements meet,
     and where the faces of a crack meet at its tip, the outline goes through the mean.
     """
-    t = np.linspace(-1.0, 1.0, POINTS_PER_ELEMENT)
+    t = choose_points(len(elements.vertices))
     values = interpolate_elements(nodes, elements, displacement, t)
     start, end = elements.vertices[:, 0], elements.vertices[:, 1]
     places = to_columns(trace_elements(to_complex(start), to_complex(end), elements.sweep, t))
@@ -50,6 +52,11 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
             position=_join(places[chain], closed), displacement=_join(values[chain], closed),
         ))
     return outlines
+
+
+def choose_points(elements: int) -> Real:
+    """Coordinates in [-1, 1] of the points by which each of so many elements is drawn."""
+    return np.linspace(-1.0, 1.0, POINTS_PER_ELEMENT if elements <= MANY_ELEMENTS else 3)
 
 
 def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t: Real) -> Real:
@@ -99,10 +106,13 @@ def find_tips(elements: Elements, curve_names: Sequence[str], tips: Mapping[str,
     """The points (x, y) of all ends of cracks that are tips: those that have stress-intensity factors."""
     count = int(elements.crack.sum()) // 2
     first = np.flatnonzero(elements.crack)[:count]
+    # The elements of a crack follow each other.
+    begins = np.flatnonzero(np.diff(elements.curve[first], prepend=-1))
+    ends = np.append(begins[1:], count) - 1
     points = set()
-    for name, factors in tips.items():
-        own = first[elements.curve[first] == curve_names.index(name)]
-        for end, vertex in ((0, elements.vertices[own[0], 0]), (1, elements.vertices[own[-1], 1])):
+    for begin, last in zip(first[begins], first[ends], strict=True) if count else ():
+        factors = tips[curve_names[elements.curve[begin]]]
+        for end, vertex in ((0, elements.vertices[begin, 0]), (1, elements.vertices[last, 1])):
             if len(factors.KI) and not np.isnan(factors.KI[-1, end]):
                 points.add(tuple(vertex))
     return points
@@ -114,29 +124,33 @@ def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
     # Second faces are stored in the order of the first ones; their travel goes the other way.
     second = len(start) - int(elements.crack.sum()) // 2
     order = np.concatenate([np.arange(second), np.arange(len(start) - 1, second - 1, -1)])
-    chains: list[list[int]] = []
-    for e in order:
-        last = chains[-1] if chains else []
-        follows = bool(last) and (
-            bool((start[e] == end[last[-1]]).all())
-            and elements.region[e] == elements.region[last[-1]]
-            and bool(elements.crack[e]) == bool(elements.crack[last[-1]])
-            and (not elements.crack[e] or elements.curve[e] == elements.curve[last[-1]])
-            and (e < second) == (last[-1] < second)
-            and (bool(elements.crack[e]) or bool((end[last[-1]] != start[last[0]]).any()))
-        )
-        if follows:
-            last.append(int(e))
-        else:
-            chains.append([int(e)])
+    before, after = order[:-1], order[1:]
+    follows = (start[after] == end[before]).all(axis=1)
+    follows &= elements.region[after] == elements.region[before]
+    follows &= elements.crack[after] == elements.crack[before]
+    follows &= ~elements.crack[after] | (elements.curve[after] == elements.curve[before])
+    follows &= (after < second) == (before < second)
+    chains = [chain for run in np.split(order, np.flatnonzero(~follows) + 1) for chain in _part_loops(elements, run)]
     chains.sort(key=lambda chain: bool(elements.crack[chain[0]]))
-    return [np.array(chain) for chain in chains]
+    return chains
+
+
+def _part_loops(elements: Elements, run: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Loops that touch where one ends and the next begins; a crack is left as it is."""
+    start, end = elements.vertices[:, 0], elements.vertices[:, 1]
+    parts = []
+    while len(run) and not elements.crack[run[0]]:
+        closes = np.flatnonzero((end[run] == start[run[0]]).all(axis=1))
+        length = closes[0] + 1 if len(closes) else len(run)
+        parts.append(run[:length])
+        run = run[length:]
+    return [*parts, *([run] if len(run) else [])]
 
 
 def join_tips(elements: Elements, chains: list[NDArray[np.int64]], values: Real) -> None:
     """Let both faces of a crack have their mean displacement at the ends where nothing else meets it; in place."""
     vertices = elements.vertices.reshape(-1, 2)
-    _, which, counts = np.unique(vertices, axis=0, return_inverse=True, return_counts=True)
+    _, which, counts = np.unique(to_complex(vertices), return_inverse=True, return_counts=True)
     meeting = counts[which.ravel()].reshape(-1, 2)
     faces: dict[tuple[float, ...], list[tuple[int, int]]] = {}
     for chain in chains:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 
+from pbem.case.generation import Group
 from pbem.results.reader import Results
 from pbem.solve.step import OPEN, SLIP, STICK
 
@@ -42,6 +43,14 @@ MODES = {
     SLIP: ModeStyle("slip", "^", "#E69F00", "#B87D00", "#E69F00"),
     OPEN: ModeStyle("open", "s", "white", "#333333", "black"),
 }
+def choose_shades(names: Sequence[str], groups: Sequence[Group]) -> list[str]:
+    """A shade for every region, by its name: the same for those that were generated together."""
+    group_of = {member: group.name for group in groups for member in group.members}
+    numbers: dict[str, int] = {}
+    chosen = (numbers.setdefault(f"[{group_of[name]}]" if name in group_of else name, len(numbers)) for name in names)
+    return [SHADES[number % len(SHADES)] for number in chosen]
+
+
 SHADES = ("#DCE6EE", "#EFE6D5", "#DFEBDC", "#EADFEA", "#E4E4E4", "#F2DEDA")
 POWER, SUPERSCRIPT = r"\^(-?[0-9.]+)", r"$^{\1}$"
 TIP = "#A51C30"

@@ -8,18 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import PathPatch
 from matplotlib.path import Path as OutlinePath
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
 from pbem.results.outline import Outline, find_tips, trace_outlines
-from pbem.results.plot_style import MODES, SHADES, TIP, describe_step, label, scale_axis, style
-from pbem.results.reader import Contact, Results
+from pbem.results.plot_style import MODES, TIP, choose_shades, describe_step, label, scale_axis, style
+from pbem.results.reader import Results
 
 __all__ = ["draw_results", "plot_model", "plot_results"]
 
@@ -67,10 +67,13 @@ def draw_results(results: Results, step: int = -1, magnify: float | None = None)
 
 def choose_interfaces(results: Results) -> list[Contact]:
     """The longest interfaces, bonded ones last, in the order of the file."""
-    lengths = {name: (contact.law.get("law") != "bonded", float(np.ptp(contact.arc_length)))
-               for name, contact in results.contact.items()}
-    longest = sorted(lengths, key=lambda name: lengths[name], reverse=True)[:MOST_PANELS]
-    return [contact for name, contact in results.contact.items() if name in longest]
+    pairs = results.pairs
+    if not pairs.names:
+        return []
+    begins = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
+    lengths = pairs.arc_length[begins[1:] - 1] - pairs.arc_length[begins[:-1]]
+    order = sorted(range(len(lengths)), key=lambda i: (pairs.laws[i] != "bonded", lengths[i]), reverse=True)
+    return [results.contact[pairs.names[number]] for number in sorted(order[:MOST_PANELS])]
 
 
 def choose_magnification(displacement: Real, size: float) -> float:
@@ -90,8 +93,7 @@ def _draw_body(axes: Axes, results: Results, step: int | None, magnify: float | 
     if magnify is None:
         magnify = choose_magnification(displacement, size)
     outlines = trace_outlines(results.nodes, results.elements, displacement)
-    for region in range(len(results.nodes.region_names)):
-        _fill_region(axes, region, [each for each in outlines if each.region == region and not each.crack], magnify)
+    _fill_regions(axes, choose_shades(results.nodes.region_names, results.groups), outlines, magnify)
     axes.add_collection(LineCollection([each.position for each in outlines], colors="0.7", linewidths=0.6, zorder=1))
     lines = [each.position + magnify * each.displacement for each in outlines]
     axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.8, zorder=3))
@@ -114,18 +116,23 @@ def _draw_body(axes: Axes, results: Results, step: int | None, magnify: float | 
     axes.legend(handles=handles + marks, loc="center left", bbox_to_anchor=(1.01, 0.5))
 
 
-def _fill_region(axes: Axes, region: int, loops: Sequence[Outline], magnify: float) -> None:
-    """Shade a region; the holes stay free since its inner loops run the other way round. Cavities of infinite
-    regions are left white in a shaded plane."""
-    shapes = [each.position + magnify * each.displacement for each in loops]
-    areas = [_area(shape) for shape in shapes]
-    if not any(area > 0 for area in areas):
-        axes.set_facecolor(SHADES[region % len(SHADES)])
-        for shape in shapes:
-            axes.add_patch(PathPatch(OutlinePath(shape), facecolor="white", edgecolor="none", zorder=0))
-        return
-    path = OutlinePath.make_compound_path(*(OutlinePath(shape, closed=True) for shape in shapes))
-    axes.add_patch(PathPatch(path, facecolor=SHADES[region % len(SHADES)], edgecolor="none", zorder=0.5))
+def _fill_regions(axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float) -> None:
+    """Shade the regions; the holes stay free since inner loops run the other way round. Cavities of infinite regions
+    are left white in a shaded plane."""
+    loops: list[list[Real]] = [[] for _ in shade]
+    for each in outlines:
+        if not each.crack:
+            loops[each.region].append(each.position + magnify * each.displacement)
+    bodies, shades, cavities = [], [], []
+    for region, shapes in enumerate(loops):
+        if any(_area(shape) > 0 for shape in shapes):
+            bodies.append(OutlinePath.make_compound_path(*(OutlinePath(shape, closed=True) for shape in shapes)))
+            shades.append(shade[region])
+        else:
+            axes.set_facecolor(shade[region])
+            cavities += [OutlinePath(shape) for shape in shapes]
+    axes.add_collection(PathCollection(cavities, facecolors="white", edgecolors="none", zorder=0))
+    axes.add_collection(PathCollection(bodies, facecolors=shades, edgecolors="none", zorder=0.5))
 
 
 def _area(shape: Real) -> float:
@@ -135,12 +142,10 @@ def _area(shape: Real) -> float:
 
 def _mark_modes(axes: Axes, results: Results, step: int, displacement: Real, magnify: float) -> list[Line2D]:
     """Mark every contact pair on its displaced first side, by lines where there are many; returns legend handles."""
-    contacts = list(results.contact.values())
-    if not contacts:
+    pairs = results.pairs
+    if not pairs.names:
         return []
-    position = np.concatenate([contact.position for contact in contacts])
-    normal = np.concatenate([contact.normal for contact in contacts])
-    mode = np.concatenate([contact.mode[step] for contact in contacts])
+    position, normal, mode = pairs.position, pairs.normal, pairs.at("mode", step)
     # Nodes of both sides lie at the same place; their normals tell which one is on the first side.
     size = float(np.ptp(results.nodes.position, axis=0).max())
     tree = cKDTree(np.hstack([results.nodes.position, size * results.nodes.normal]))
@@ -151,8 +156,7 @@ def _mark_modes(axes: Axes, results: Results, step: int, displacement: Real, mag
         for which in used:
             axes.scatter(*places[mode == which].T, s=14.0, zorder=4, **MODES[which].marks)
         return [Line2D([], [], linestyle="none", label=MODES[which].name, **MODES[which].line) for which in used]
-    last = np.cumsum([contact.pairs for contact in contacts]) - 1
-    begins = np.setdiff1d(np.arange(len(mode)), last)
+    begins = np.flatnonzero(pairs.interface[1:] == pairs.interface[:-1])
     segments = np.stack([places[begins], places[begins + 1]], axis=1)
     for which in used:
         there = segments[mode[begins] == which]

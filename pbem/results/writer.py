@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -164,10 +164,7 @@ class ResultWriter:
     def _store(self, step: Step) -> None:
         self._pending = None
         file = self._file
-        backgrounds = evaluate_backgrounds(self._model, step.stage, step.factor)
-        initial = [balanced for balanced, _ in backgrounds]
-        hoop_stress = evaluate_hoop_stress(self._mesh, initial, step.displacement, step.traction)
-        append_row(file["fields/hoop_stress"], hoop_stress)
+        append_row(file["fields/hoop_stress"], self._evaluate_hoop_stress(step))
         if "interior" in file:
             count = len(self._model.interior_points)
             none = Interior(np.full(count, np.nan + 0j), np.full((count, 3), np.nan))
@@ -190,6 +187,17 @@ class ResultWriter:
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
             append_row(file["steps"][quantity], np.array(value))
+
+    def _evaluate_hoop_stress(self, step: Step) -> NDArray[np.float64]:
+        """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
+        initial = [balanced for balanced, _ in evaluate_backgrounds(self._model, step.stage, step.factor)]
+        kinds: dict[Hashable, int] = {}
+        kind_of = [kinds.setdefault((each.material, each.initial), len(kinds)) for each in initial]
+        mesh = self._mesh
+        if mesh.order > 0:  # else the stretch is told by neighbours of the same region
+            mesh = replace(mesh, region=np.array(kind_of)[mesh.region])
+            initial = [initial[kind_of.index(number)] for number in range(len(kinds))]
+        return evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
 
     def _sum_reactions(self, traction: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Integral (c,) of the traction over every outer curve."""

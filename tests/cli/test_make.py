@@ -80,11 +80,10 @@ def test_many_are_one_table() -> None:
 
 
 def test_options_arrive_in_the_case() -> None:
-    case = make(
-        "cracks", "--count", "60", "--half-length", "2", "--density", "0.01", "--distance", "0.7", "--seed", "5",
-        "--elements", "6", "--order", "1", "--friction", "0.3", "--cohesion", "0.2", "--sxx", "0.5", "--syy", "-2",
-        "--sxy", "0.25", "--young", "7", "--poisson", "0.1", "--plane", "stress", "--name", "joint",
-    )
+    case = make("cracks", "--count", "60", "--half-length", "2", "--density", "0.01", "--distance", "0.7",
+                "--seed", "5", "--elements", "6", "--order", "1", "--friction", "0.3", "--cohesion", "0.2",
+                "--sxx", "0.5", "--syy", "-2", "--sxy", "0.25",
+                "--young", "7", "--poisson", "0.1", "--plane", "stress", "--name", "joint")
     points = np.array([curve.points for curve in case.curves.values()])
     np.testing.assert_allclose(np.linalg.norm(points[:, 1] - points[:, 0], axis=1), 4, rtol=1e-7)
     host, table = case.materials["host"], case.generate[0]

@@ -1,0 +1,200 @@
+"""The parts of a result file that are loaded when they are first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One interface or crack with its m pairs over the k stored steps.
+
+    position, normal (m, 2), arc_length (m,); mode (k, m): 0 stick, 1 slip, 2 open; opening, slip (k, m): lengths;
+    traction_n, traction_s (k, m): traction on the first side, compression negative. Loaded at first use.
+    first, second: names of the regions (second is None for a crack). law: its attributes in the file.
+    """
+
+    path: Path
+    name: str
+    first: str
+    second: str | None
+    law: Mapping[str, Any]
+    steps: int
+    pairs: int
+
+    @cached_property
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        with open_quietly(self.path) as file:
+            group = file["contact"][self.name]
+            fixed = ("position", "normal", "arc_length")
+            return {name: freeze(data[...] if name in fixed else data[: self.steps]) for name, data in group.items()}
+
+    @property
+    def position(self) -> Real:
+        return self._arrays["position"]
+
+    @property
+    def normal(self) -> Real:
+        return self._arrays["normal"]
+
+    @property
+    def arc_length(self) -> Real:
+        return self._arrays["arc_length"]
+
+    @property
+    def mode(self) -> NDArray[np.int8]:
+        return self._arrays["mode"]
+
+    @property
+    def opening(self) -> Real:
+        return self._arrays["opening"]
+
+    @property
+    def slip(self) -> Real:
+        return self._arrays["slip"]
+
+    @property
+    def traction_n(self) -> Real:
+        return self._arrays["traction_n"]
+
+    @property
+    def traction_s(self) -> Real:
+        return self._arrays["traction_s"]
+
+
+@dataclass(frozen=True)
+class Interior:
+    """The q interior points: position (q, 2); region (q,), index into `Nodes.region_names`, -1 outside of all.
+
+    displacement (k, q, 2), stress (k, q, 3): sxx, syy, sxy, NaN outside of all regions; loaded at first use.
+    """
+
+    path: Path
+    position: Real
+    region: Integer
+    steps: int
+
+    @cached_property
+    def displacement(self) -> Real:
+        return self._load("displacement")
+
+    @cached_property
+    def stress(self) -> Real:
+        return self._load("stress")
+
+    def _load(self, name: str) -> Real:
+        with open_quietly(self.path) as file:
+            return freeze(file["interior"][name][: self.steps])
+
+
+@dataclass(frozen=True)
+class AllPairs:
+    """The m pairs of all interfaces, one interface of `names` after the other; `steps` are stored.
+
+    For what looks at all of them: to open thousands of interfaces one by one takes long.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    steps: int
+
+    @property
+    def count(self) -> int:
+        return len(self.interface)
+
+    @cached_property
+    def interface(self) -> Integer:
+        """(m,): place in `names`, rising."""
+        return freeze(self._load("interface").astype(np.int64))
+
+    @cached_property
+    def position(self) -> Real:
+        """(m, 2)."""
+        return self._load("position")
+
+    @cached_property
+    def normal(self) -> Real:
+        """(m, 2)."""
+        return self._load("normal")
+
+    @cached_property
+    def arc_length(self) -> Real:
+        """(m,)."""
+        return self._load("arc_length")
+
+    @cached_property
+    def laws(self) -> tuple[str, ...]:
+        """The kind of law of every interface."""
+        with open_quietly(self.path) as file:
+            return tuple(str(law) for law in file["contact"].attrs["laws"])
+
+    def at(self, quantity: str, step: int) -> NDArray[Any]:
+        """(m,): mode, opening, slip, traction_n or traction_s at one stored step (its place in the file)."""
+        if not self.names:
+            return np.zeros(0)
+        with open_quietly(self.path) as file:
+            return freeze(file["all/contact"][quantity][range(self.steps)[step]])
+
+    def _load(self, name: str) -> NDArray[Any]:
+        with open_quietly(self.path) as file:
+            return freeze(file["all/contact"][name][...])
+
+
+class Interfaces(Mapping[str, Contact]):
+    """The interfaces by name; each is looked up in the file when it is first asked for."""
+
+    def __init__(self, path: Path, names: tuple[str, ...], steps: int) -> None:
+        self._path = path
+        self._names = dict.fromkeys(names)
+        self._steps = steps
+        self._found: dict[str, Contact] = {}
+
+    def __getitem__(self, name: str) -> Contact:
+        if name not in self._names:
+            raise KeyError(name)
+        if name not in self._found:
+            with open_quietly(self._path) as file:
+                self._found[name] = _read_contact(self._path, file, name, self._steps)
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
+def _read_contact(path: Path, file: h5py.File, name: str, steps: int) -> Contact:
+    group = file["contact"][name]
+    law = {key: value for key, value in group.attrs.items() if key not in ("first", "second")}
+    return Contact(
+        path=path, name=name, first=str(group.attrs["first"]), second=str(group.attrs["second"]) or None, law=law,
+        steps=steps, pairs=len(group["arc_length"]),
+    )
+
+
+def open_quietly(path: Path) -> h5py.File:
+    """A file to be read, without locks: a run that is going on may be looked at, and goes on writing."""
+    return h5py.File(path, "r", locking=False)
+
+
+def read_names(item: h5py.HLObject) -> tuple[str, ...]:
+    """Its attribute `names`."""
+    return tuple(str(name) for name in item.attrs["names"])
+
+
+def freeze(array: NDArray[Any]) -> NDArray[Any]:
+    """The same array, read-only."""
+    array.setflags(write=False)
+    return array

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,10 @@ class Split:
     a_offset: Real
     b_tangent: Real
     b_offset: Real
+
+    def take(self, pairs: Integer) -> Split:
+        """The split of some of the pairs."""
+        return Split(self.a_tangent[pairs], self.a_offset[pairs], self.b_tangent[pairs], self.b_offset[pairs])
 
     def drop_offsets(self) -> Split:
         """The split of a correction, to which constants add nothing."""

@@ -10,17 +10,17 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import G_N, P_N, P_S, Linearisation
 from pbem.parallel import broadcast, gather_parts
 from pbem.solve.condensation import PairBases, PairSolution, Split, solve_pairs
+from pbem.solve.effort import Effort
 from pbem.solve.linear import choose_method
 from pbem.solve.load_basis import LoadBasis
+from pbem.solve.pair_columns import PairColumns
 from pbem.solve.problem import Problem
-from pbem.solve.reference import Reference, apply_narrow, form_columns
+from pbem.solve.reference import Reference, apply_narrow
 from pbem.solve.tangent import Solved, describe_residual
 
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
-# Right-hand sides that are solved together; they and their solutions are held beside the factors.
-COLUMNS_AT_ONCE = 1024
 # A condensed system of a worse reciprocal condition is not trusted: the factors are made anew in the present modes.
 LEAST_RCOND = 1e-11
 # Checked solutions are corrected until they are as good as this, though the tolerance may be weaker.
@@ -31,27 +31,31 @@ MOST_CORRECTIONS = 2
 class CondensedTangent:
     """Factors of one reference operator; the contact pairs' unknowns are condensed (see pbem.solve.condensation).
 
-    varying (m,): pairs whose mode can change. Crack pairs among them are eliminated from the reference operator, the
-    others have the modes there that they had when it was factorised.
+    varying (m,): pairs whose mode can change. If they are few, their columns are computed at once; crack pairs are
+    eliminated from the reference operator, the others have the modes there that they had when it was factorised, and it
+    serves for good. If they are many, the reference operator is that of the modes at one time, columns are computed of
+    pairs that change, and it is factorised anew when that costs less.
     """
 
-    def __init__(self, problem: Problem, varying: Bool) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, varying: Bool, few: bool) -> None:
+        self.problem, self.few = problem, few
         self.varying = np.flatnonzero(varying)
         self.fixed = np.flatnonzero(~varying)
         pairs = problem.mesh.pairs
-        self.eliminated = pairs.crack & varying
+        self.eliminated = pairs.crack & varying & few
         method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
         self.reference = Reference(problem, method, np.flatnonzero(self.eliminated))
-        self.columns = (2 * pairs.slot[self.varying][:, None] + np.arange(2)).ravel()
+        self.unknowns = (2 * pairs.slot[self.varying][:, None] + np.arange(2)).ravel()
         self.laws: Real | None = None  # the laws' tangents in the reference (m, 4, 2)
         self.loads = LoadBasis(problem.unknowns, self.reference.rows)
         self.load: Load | None = None
+        self.effort = Effort(problem.comm)
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """See AnyTangent. The first solution after a factorisation is checked, others are not."""
         fresh = self.laws is None or not np.array_equal(self.laws[self.fixed], law.tangent[self.fixed])
-        if fresh:
+        if fresh or not self._reach(law):
+            fresh = True
             self._refer(load, law)
         unknowns, pairs = self._condense(self._find_load_solution(load, law), self._split(law))
         if pairs.rcond < LEAST_RCOND and self._can_refer_better(law):
@@ -60,6 +64,16 @@ class CondensedTangent:
             unknowns, pairs = self._condense(self._find_load_solution(load, law), self._split(law))
         solved = Solved(unknowns, constraints.evaluate(unknowns), pairs.residual, checked=False)
         return self.check(solved, constraints, load, law) if fresh or pairs.rcond < LEAST_RCOND else solved
+
+    def _reach(self, law: Linearisation) -> bool:
+        """Compute the columns of the pairs that have changed, unless new factors cost less."""
+        changed = np.flatnonzero((self._split(law).b_tangent != 0).any(axis=(1, 2)))
+        missing = np.setdiff1d(changed, self.columns.known)
+        if not self.effort.allows(2 * len(missing), 2 * len(changed)) and self._can_refer_better(law):
+            return False
+        if len(missing):
+            self.effort.measure(2 * len(missing), lambda: self.columns.add(missing))
+        return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """See AnyTangent."""
@@ -102,7 +116,13 @@ class CondensedTangent:
         tangent = self._reference_tangent(law)
         self.reference.form(problem.constrain(Linearisation(tangent, np.zeros(tangent.shape[:2])), load).matrix)
         self.bases = PairBases(tangent[self.varying], problem.traction_scale)
-        self._find_columns(tangent, load)
+        complement = np.zeros_like(tangent)
+        complement[self.varying] = self.bases.complement
+        states = problem.constrain(Linearisation(complement, np.zeros(tangent.shape[:2])), load).matrix
+        self.columns = PairColumns(self.reference, states[:, self.unknowns], self.unknowns)
+        self.effort.restart(self.reference.solver.seconds, problem.unknowns, limited=not self.few)
+        if self.few:
+            self.columns.add(np.arange(len(self.varying)))
         self.loads.renew(self._solve_load)
         self.laws = tangent
 
@@ -116,29 +136,6 @@ class CondensedTangent:
     def _can_refer_better(self, law: Linearisation) -> bool:
         """Whether another reference operator would be nearer to the present laws."""
         return self.laws is None or not np.array_equal(self.laws, self._reference_tangent(law))
-
-    def _find_columns(self, tangent: Real, load: Load) -> None:
-        """W: this rank's rows, and on the first rank the rows of the pairs' own unknowns."""
-        problem, operator = self.problem, self.reference.operator
-        complement = np.zeros_like(tangent)
-        complement[self.varying] = self.bases.complement
-        states = problem.constrain(Linearisation(complement, np.zeros(tangent.shape[:2])), load).matrix
-        self.effect = np.empty((self.reference.rows, len(self.columns)), order="F")
-        for begin in range(0, len(self.columns), COLUMNS_AT_ONCE):
-            at = slice(begin, begin + COLUMNS_AT_ONCE)
-            forces = np.zeros((self.reference.rows, len(self.columns[at])))
-            for block in operator.blocks:
-                every = np.arange(len(block.rows))
-                forces[block.rows] = form_columns(operator, block, states, self.columns[at], every)
-            self.effect[:, at] = self.reference.solve_columns(forces)
-        own = self.reference.own
-        here = self.columns[(self.columns >= own.start) & (self.columns < own.stop)] - own.start
-        order = np.argsort(self.columns[(self.columns >= own.start) & (self.columns < own.stop)])
-        parts = problem.comm.gather(np.ascontiguousarray(self.effect[here[order]]))
-        self.coupling = np.zeros((0, 0))
-        if parts is not None:
-            rank = np.argsort(np.argsort(self.columns))
-            self.coupling = np.concatenate(parts)[rank]
 
     def _split(self, law: Linearisation) -> Split:
         offset = law.offset[self.varying].copy()
@@ -174,16 +171,23 @@ class CondensedTangent:
         return gather_parts(self.problem.comm, self.reference.solve_columns(rhs[:, None])[:, 0])
 
     def _condense(self, given: Real, split: Split) -> tuple[Real, PairSolution]:
-        """x (2 nodes,) for y, and the solution of the pairs' system, by the first rank."""
-        problem = self.problem
+        """x (2 nodes,) for y, and the solution of the known pairs' system, by the first rank."""
+        problem, known = self.problem, self.columns.known
+        rest = np.setdiff1d(np.arange(len(self.varying)), known)
+        if split.b_offset[rest].any():
+            constant = np.zeros_like(split.b_offset)
+            constant[rest] = split.b_offset[rest]
+            given = given - self._solve_system(self.columns.find_forces(constant))
         found: PairSolution | None = None
+        of_pairs = self.unknowns.reshape(-1, 2)
         if problem.comm.rank == 0:
-            found = solve_pairs(self.coupling, given[self.columns], split)
+            found = solve_pairs(self.columns.coupling, given[of_pairs[known]].ravel(), split.take(known))
         found = broadcast(problem.comm, found)
         assert found is not None
-        b = split.find_b(found.unknowns).ravel()
-        unknowns = given - gather_parts(problem.comm, self.effect @ b)
-        unknowns[self.columns] = found.unknowns.ravel()
+        unknowns = given - self.columns.combine(split.take(known).find_b(found.unknowns))
+        unknowns[of_pairs[known]] = found.unknowns
+        others = (unknowns[of_pairs[rest]] - split.a_offset[rest])[:, :, None]
+        unknowns[of_pairs[rest]] = np.linalg.solve(split.a_tangent[rest], others)[:, :, 0]
         return unknowns, found
 
     def destroy(self) -> None:

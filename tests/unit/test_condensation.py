@@ -19,6 +19,7 @@ from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.condensation import PairBases, Split, solve_pairs
 from pbem.solve.condensed import CondensedTangent
+from pbem.solve.effort import Effort
 from pbem.solve.factored import FactoredTangent
 from pbem.solve.linear import LinearSolver
 from pbem.solve.load_basis import LoadBasis
@@ -65,8 +66,8 @@ def make_blocks(linear: str) -> Problem:
     return make_problem(make_body().write() + f'\n[solver]\nlinear = "{linear}"\n')
 
 
-def condense(problem: Problem) -> CondensedTangent:
-    return CondensedTangent(problem, ~(problem.laws.bonded | problem.laws.parted))
+def condense(problem: Problem, few: bool = True) -> CondensedTangent:
+    return CondensedTangent(problem, ~(problem.laws.bonded | problem.laws.parted), few)
 
 
 def draw_law(problem: Problem, seed: int) -> Linearisation:
@@ -123,6 +124,44 @@ def test_any_modes_and_loads_are_solved_with_the_same_factors(linear: str, facto
     assert len(factorisations) == 1
     assert len(tangent.loads.vectors) == 1  # all loads are parts of one
     tangent.destroy()
+
+
+@pytest.mark.parametrize("linear", ["lu", "mumps"])
+@pytest.mark.parametrize("allowed", [True, False])
+def test_many_pairs_are_solved_by_columns_of_those_that_change_or_by_new_factors(
+    linear: str, allowed: bool, factorisations: list[None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Effort, "allows", lambda effort, columns, size: allowed or columns == size == 0)
+    problem = make_blocks(linear)
+    tangent = condense(problem, few=False)
+    assert not tangent.eliminated.any()
+    count = problem.mesh.pairs.count
+    seeds = (1, 2, 2, 3)
+    for seed in seeds:
+        # Only some pairs change from one law to the next; the others have other slips, too.
+        law, base, load = draw_law(problem, seed), draw_law(problem, 0), problem.evaluate_load(0, 0.2 * seed)
+        kept = np.arange(count) % 3 > 0
+        law = Linearisation(np.where(kept[:, None, None], base.tangent, law.tangent), 1.5 * base.offset)
+        constraints = problem.constrain(law, load)
+        found = tangent.solve(constraints, load, law)
+        compare(tangent.check(found, constraints, load, law), solve_directly(problem, law, load), problem)
+    assert len(factorisations) == (1 if allowed else len(set(seeds)))
+    assert len(tangent.columns.known) == (len(np.unique(tangent.columns.known)) if allowed else 0)
+    assert not allowed or 0 < len(tangent.columns.known) < count
+    tangent.destroy()
+
+
+def test_old_factors_are_given_up_when_they_have_cost_as_much_as_new_ones() -> None:
+    effort = Effort(world)
+    effort.restart(10.0, 3000, limited=True)
+    assert effort.column_seconds == 0.01
+    assert [effort.allows(400, 0) for _ in range(3)] == [True, True, False]
+    effort.restart(10.0, 3000, limited=True)
+    assert not effort.allows(0, 10_000) and effort.allows(0, 1000)
+    effort.restart(10.0, 3000, limited=False)
+    assert effort.allows(10_000, 10_000)
+    effort.measure(64, lambda: None)
+    assert effort.column_seconds < 1e-3  # as measured
 
 
 def test_a_solution_that_is_not_good_enough_is_mended() -> None:

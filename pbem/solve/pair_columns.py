@@ -1,0 +1,70 @@
+"""What the states of contact pairs add to the solutions with a reference operator: columns W = K0^-1 B E C."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.parallel import gather_parts
+from pbem.solve.reference import Reference, apply_narrow, form_columns
+
+Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
+
+# Right-hand sides that are solved together; they and their solutions are held beside the factors.
+COLUMNS_AT_ONCE = 1024
+
+
+class PairColumns:
+    """The columns of those pairs for which they were asked; two for each pair.
+
+    states: sparse (4 nodes, 2 k), the columns E C of all k pairs; unknowns (2 k,): the pairs' own unknowns.
+    known (j,): pairs in the order of their columns. coupling (2 j, 2 j), on the first rank only: the rows of
+    the columns that belong to the unknowns of the same pairs.
+    """
+
+    def __init__(self, reference: Reference, states: sparse.csr_matrix, unknowns: Integer) -> None:
+        self.reference = reference
+        self.states = states.tocsc()
+        self.unknowns = unknowns
+        self.known = np.zeros(0, dtype=np.int64)
+        self.effect = np.zeros((reference.rows, 0), order="F")  # this rank's rows of W
+        self.coupling = np.zeros((0, 0))
+
+    def add(self, pairs: Integer) -> None:
+        """Compute the columns of further pairs; all ranks together."""
+        columns = _pair_up(pairs)
+        effect = np.empty((self.reference.rows, self.effect.shape[1] + len(columns)), order="F")
+        effect[:, : self.effect.shape[1]] = self.effect
+        first, self.effect = self.effect.shape[1], effect
+        for begin in range(0, len(columns), COLUMNS_AT_ONCE):
+            some = columns[begin : begin + COLUMNS_AT_ONCE]
+            forces = np.zeros((self.reference.rows, len(some)))
+            for block in self.reference.operator.blocks:
+                every = np.arange(len(block.rows))
+                forces[block.rows] = form_columns(self.reference.operator, block, self.states, some, every)
+            effect[:, first + begin : first + begin + len(some)] = self.reference.solve_columns(forces)
+        self.known = np.concatenate([self.known, pairs])
+        self._collect_coupling()
+
+    def _collect_coupling(self) -> None:
+        """Gather the rows of the known pairs' unknowns on the first rank."""
+        wanted, own = self.unknowns[_pair_up(self.known)], self.reference.own
+        here = np.sort(wanted[(wanted >= own.start) & (wanted < own.stop)])
+        parts = self.reference.problem.comm.gather(np.ascontiguousarray(self.effect[here - own.start]))
+        if parts is not None:
+            self.coupling = np.concatenate(parts)[np.argsort(np.argsort(wanted))]
+
+    def combine(self, b: Real) -> Real:
+        """W b (2 nodes,) on every rank, for b (j, 2) of the known pairs."""
+        return gather_parts(self.reference.problem.comm, self.effect @ b.ravel())
+
+    def find_forces(self, b: Real) -> Real:
+        """This rank's rows of B E C b, for b (k, 2) of all pairs."""
+        return apply_narrow(self.reference.operator, self.states @ b.ravel())
+
+
+def _pair_up(pairs: Integer) -> Integer:
+    result: Integer = (2 * pairs[:, None] + np.arange(2)).ravel()
+    return result

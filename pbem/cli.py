@@ -29,6 +29,8 @@ UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 COMMANDS = ("make", "check", "run", "info", "plot")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
 FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
+# Of `pbem run --operator`; defined in pbem.model.model.
+OPERATORS = ("auto", "dense", "hierarchical")
 
 DESCRIPTION = """\
 Boundary elements for frictional contact in two-dimensional elasticity.
@@ -207,6 +209,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("case", metavar="CASE")
     run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
     run.add_argument("--resume", action="store_true", help="go on after the last step that the result file holds")
+    run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
     info = add("info", _info, "tell what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
@@ -289,7 +292,9 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     try:
         with abort_if_unexpected(world, PbemError):
             reporter = make_reporter(options.quiet) if world.rank == 0 else None
-        results = run(case, target, resume=options.resume, petsc=petsc, reporter=reporter)
+        results = run(
+            case, target, resume=options.resume, petsc=petsc, operator=options.operator, reporter=reporter
+        )
     except ConvergenceError as error:
         _close(reporter)
         _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)

@@ -6,12 +6,13 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 from pbem.contact.strength import read_checked_model
 from pbem.errors import ConvergenceError, PbemError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model
+from pbem.model.model import Model, Operator
 from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.output import check_output_path
 from pbem.results.reader import Results, open_results
@@ -29,22 +30,28 @@ def run(
     *,
     resume: bool = False,
     petsc: Mapping[str, str] | None = None,
+    operator: Operator | None = None,
     reporter: Reporter | None = None,
 ) -> Results:
     """Read a case file, solve it, and return its results.
 
     case: path of the TOML file. output: path of the result file; by default the case's name with .h5, in the working
     directory. resume: go on after the last step that the file holds. petsc: PETSc options without prefix, which win
-    over the case's [petsc] table. reporter: told of the progress, on the first rank only.
+    over the case's [petsc] table. operator: "auto", "dense" or "hierarchical", in place of the case's solver.operator;
+    the configuration in the result file tells it. reporter: told of the progress, on the first rank only.
     Every rank of an MPI run calls this and gets the results.
 
     Raises CaseError (all faults of the case), ResultFileError (the output cannot be written, or does not belong to the
     case), ConvergenceError (the file then holds every step reached), StorageError (the disk has no room for a step; the
-    file holds those before it). Any other exception on one rank ends all ranks.
+    file holds those before it). Any other exception on one rank ends all ranks. ValueError: there is no such operator.
     """
+    if operator is not None and operator not in get_args(Operator):
+        raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
     with abort_if_unexpected(world, PbemError):
         path = Path(case)
         model = do_on_first(world, PbemError, lambda: read_checked_model(path))
+        if operator is not None:
+            model = replace(model, solver=replace(model.solver, operator=operator))
         target = Path(output) if output is not None else Path(path.stem + ".h5")
         do_on_first(world, PbemError, lambda: check_output_path(target))
         mesh = generate_mesh(model)

@@ -137,6 +137,10 @@ class Analysis:
     tips: bool = True
 
 
+# How the operator of the integral equations is stored.
+Operator = Literal["auto", "dense", "hierarchical"]
+
+
 @dataclass(frozen=True)
 class SolverOptions:
     """How Newton's method and its linear systems are run; petsc: options without the leading dash.
@@ -145,7 +149,7 @@ class SolverOptions:
     """
 
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
-    operator: Literal["auto", "dense", "hierarchical"] = "auto"
+    operator: Operator = "auto"
     tolerance: float = 1e-8
     newton_tolerance: float = 1e-9
     newton_max_iterations: int = 50

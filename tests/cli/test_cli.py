@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
+import h5py
 import numpy as np
 import pytest
 
+import pbem
 from pbem import cli
-from pbem.cli import find_case, list_bundled_cases, main, split_petsc_options
+from pbem.case.schema import SolverTable
+from pbem.cli import OPERATORS, find_case, list_bundled_cases, main, split_petsc_options
 from pbem.errors import CaseError, ConvergenceError
+from pbem.model.model import Operator
 from pbem.results.reader import open_results
 from tests.cli.cli_sample import BLOCKS
 
@@ -60,6 +66,31 @@ def test_quiet_runs_say_nothing(folder: Path, capsys: Capture) -> None:
     assert main(["run", "blocks.toml", "-o", "other.h5", "--quiet"]) == 0
     assert (folder / "other.h5").is_file() and not (folder / "blocks.h5").exists()
     assert capsys.readouterr() == ("", "")
+
+
+def test_the_operator_can_be_chosen_on_the_command_line(folder: Path, capsys: Capture) -> None:
+    for name in ("dense", "hierarchical"):
+        assert main(["run", "blocks.toml", "--operator", name, "-o", f"{name}.h5"]) == 0
+        assert ("hierarchical operator:" in capsys.readouterr().out) == (name == "hierarchical")
+        with h5py.File(f"{name}.h5", "r") as file:
+            assert json.loads(file.attrs["configuration"])["solver"]["operator"] == name
+        assert open_results(f"{name}.h5").case == BLOCKS
+    dense, hierarchical = open_results("dense.h5"), open_results("hierarchical.h5")
+    scale = np.abs(dense.traction).max()
+    np.testing.assert_allclose(hierarchical.traction, dense.traction, rtol=0, atol=1e-7 * scale)
+    np.testing.assert_array_equal(hierarchical.contact["joint"].mode, dense.contact["joint"].mode)
+    # Going on with another operator is the user's choice as well.
+    assert main(["run", "blocks.toml", "--operator", "dense", "-o", "hierarchical.h5", "--resume", "--quiet"]) == 0
+
+
+def test_operators_are_those_of_case_files(folder: Path, capsys: Capture) -> None:
+    annotation = SolverTable.model_fields["operator"].annotation
+    assert OPERATORS == get_args(annotation) == get_args(Operator)
+    assert main(["run", "blocks.toml", "--operator", "sparse"]) == 2
+    assert "invalid choice: 'sparse'" in capsys.readouterr().err
+    with pytest.raises(ValueError, match="'sparse'; expected one of auto, dense, hierarchical"):
+        pbem.run("blocks.toml", operator="sparse")  # type: ignore[arg-type]
+    assert [path.name for path in folder.iterdir()] == ["blocks.toml"]
 
 
 def test_resuming_a_cut_run_gives_what_a_whole_run_gives(computed: Path, capsys: Capture) -> None:

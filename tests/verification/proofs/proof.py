@@ -14,7 +14,7 @@ from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.build import parse_model
-from pbem.model.model import Model
+from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.tips import collect_tip_rules
@@ -103,8 +103,14 @@ class Solved:
         return [balance.add(step) for step in self.steps]
 
 
+# The operator that all proofs are solved with; None: what each model says. Set before the first proof.
+operator: Operator | None = None
+
+
 def solve_model(model: Model) -> Solved:
     """All converged steps of a model."""
+    if operator is not None:
+        model = replace(model, solver=replace(model.solver, operator=operator))
     mesh = generate_mesh(model)
     return Solved(model, mesh, tuple(march(assemble_problem(model, mesh, world), SilentReporter())))
 

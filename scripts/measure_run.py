@@ -133,7 +133,11 @@ def measure_product(problem: Any, world: Any) -> dict[str, Any]:
         np.copyto(target, sample)
         copy = min(copy, max(world.allgather(time.perf_counter() - begin)))
     bytes_copied = max(world.allgather(stored))
-    return {"product": best, "stored": world.allreduce(stored) / 1e6, "copy": copy * bytes_copied / sample.nbytes}
+    sources = getattr(problem.operator, "sources", None)
+    return {
+        "product": best, "stored": world.allreduce(stored) / 1e6, "copy": copy * bytes_copied / sample.nbytes,
+        "leaves": len(sources.forest.leaves) if sources else 0, "terms": sources.terms if sources else 0,
+    }  # fmt: skip
 
 
 if __name__ == "__main__":

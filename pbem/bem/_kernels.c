@@ -1,4 +1,4 @@
-/* Integrals of the elastic kernels over straight elements, in closed form.
+/* Integrals of the elastic kernels over straight elements and arcs, in closed form.
  *
  * A point or vector of the plane is one complex number. An element has mid-point m, half-length h and unit direction e
  * (region on the left, outward normal -i e). Its coordinate is s in [-1, 1], in units of h, and a collocation point z
@@ -10,6 +10,10 @@
  * |w|^k; there the highest moment is summed as a series in 1/w and the others follow by the downward recursion,
  * which is stable. A tip element carries the densities t^(k + 1/2), t in [0, 1] the distance from the tip in units
  * of the element's length; its moments obey recursions of the same kind.
+ *
+ * moments.h has the moments of one pair, straight.h those of several pairs in the lanes of vectors (lanes.h), combine.h
+ * makes rows of them and kinds.h goes over all pairs of straight elements; arcs.h has the closed form of circular arcs,
+ * arc_rules.h and far_arcs.h Gauss points away from them; fill.h joins all.
  *
  * The potentials (Kolosov-Muskhelishvili) turn the moments into complex factors P, Q: a density a s^k contributes
  * P a + Q conj(a). Rows give the value at the point as  A u + B t, with u, t the nodal displacements and tractions.

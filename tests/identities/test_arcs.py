@@ -85,6 +85,38 @@ def test_rows_of_displacements_are_integrals_along_the_arc(order: int, tip: int,
         expect_rows(rows, -place_shapes(powers, order, tip), name, 1e-10)
 
 
+def list_distances(sweep: float) -> dict[str, complex]:
+    """Points at which every number of Gauss points is used, beyond and before each change of it."""
+    apex = (START - CENTER) * np.exp(0.5j * sweep)
+    half = abs(apex) * abs(2 * np.sin(sweep / 4))
+    distances = [r * (1 + e) for r in (2.5, 3.5, 6.0, 8.0, 15.0, 20.0, 30.0, 70.0) for e in (-0.01, 0.01)]
+    return {f"{r:.3f}": CENTER + apex + r * half * np.exp(2.4j * i) for i, r in enumerate(distances)}
+
+
+@pytest.mark.parametrize("sweep", [0.05, -0.15, 0.3, 0.6])
+@tips
+@orders
+def test_far_rows_reach_rounding_with_every_number_of_gauss_points(order: int, tip: int, sweep: float) -> None:
+    arc, off, normal = make_arc(order, tip, sweep), np.array([-1]), np.array([NORMAL])
+    scale = 1 / (1 + np.tan(sweep / 4) ** 2 * place_nodes(order) ** 2)
+    for name, point in list_distances(sweep).items():
+        at = np.array([point])
+        displacement, of_tractions = evaluate_rows(arc, at, off)
+        powers = integrate_arc(KELVIN.traction, point, CENTER, START, sweep, order + 1, tip)
+        expect_rows(displacement, -place_shapes(powers, order, tip), name, 1e-12)
+        traction, _ = evaluate_rows(arc, at, off, normal)
+        stress = integrate_arc(KELVIN.stress_of_displacement, point, CENTER, START, sweep, order + 1, tip)
+        powers = np.einsum("ijkp,j->ikp", stress, [NORMAL.real, NORMAL.imag])
+        expect_rows(traction, -place_shapes(powers, order, tip), name, 1e-12)
+        if tip:
+            continue
+        powers = integrate_arc(
+            lambda r, n: KELVIN.displacement(r, n) + SHIFT * np.eye(2),
+            point, CENTER, START, sweep, order + 1, of_tractions=True,
+        )  # fmt: skip
+        expect_rows(of_tractions, place_shapes(powers, order, 0, scale), name, 1e-12)
+
+
 @sweeps
 @orders
 def test_rows_of_tractions_are_integrals_along_the_arc(order: int, sweep: float) -> None:

@@ -19,7 +19,9 @@ ON_LINE = [1 + 1e-6, -1 - 1e-6, 1.2, -1.3, 2.45, -2.45, 2.6, -7.9, 1e3, -1e6]
 ANGLES = (0.1, 0.8, 1.57, 2.5, -0.4, -3.0)
 SWITCH = [r * np.exp(1j * a) for r in (1.9, 1.999, 2.001, 2.1, 2.5, 2.99, 3.01) for a in ANGLES]
 TIP_SWITCH = [1 + 4 * r * np.exp(1j * a) for r in (0.9, 0.999, 1.001, 1.1) for a in ANGLES]
-DISTANT = [5 + 5j, 1e3 - 3e2j, -1e3j, 1e6j, 1e6 + 1e5j, -3e6 - 1e-3j]
+# The number of terms of the series falls with the distance.
+MIDDLE = [r * np.exp(1j * a) for r in (4.0, 8.0, 13.0, 27.0, 52.0, 134.0, 700.0) for a in (0.3, 1.57, -2.2)]
+DISTANT = [*MIDDLE, 5 + 5j, 1e3 - 3e2j, -1e3j, 1e6j, 1e6 + 1e5j, -3e6 - 1e-3j]
 ON_ELEMENT = [0.05, 0.3, -0.861, 0.999, -0.999]
 
 orders = pytest.mark.parametrize("order", [0, 1, 2, 3])

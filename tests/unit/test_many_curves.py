@@ -72,7 +72,7 @@ def make_step(mesh: Mesh, number: int, steps: int) -> Step:
     """A step with invented numbers."""
     faces, pairs = len(list_faces(mesh).position), np.arange(mesh.pairs.count)
     wave = 1e-3 * np.sin(np.arange(faces) + number)
-    values = np.cos(pairs + number)
+    values = np.cos(pairs + number) - 0.5
     contact = ContactState((pairs % 3).astype(np.int8), np.abs(values), values, -np.abs(values), values,
                            np.abs(values), np.zeros(len(pairs), dtype=bool))
     iteration = Iteration(1, 1e-12, 0, 0, 0, 0, 0.1)
@@ -138,6 +138,9 @@ def test_pictures_of_many_curves_have_few_parts(computed: tuple[Model, Mesh, Res
         axes = figure.axes[0]
         assert len(axes.collections) + len(axes.patches) + len(axes.lines) + len(axes.texts) < 20
         assert len(axes.get_legend().get_texts()) < 8
+    # Lines between neighbouring pairs, none from one interface to the next.
+    marks = [each for each in axes.collections if each.get_linewidths()[:1] == [1.6]]
+    assert sum(len(each.get_segments()) for each in marks) == mesh.pairs.count - len(model.interfaces)
 
 
 def test_ties_and_nearest_pairs_of_many_interfaces() -> None:
@@ -168,6 +171,7 @@ def test_each_free_body_has_an_anchor_of_its_own() -> None:
     anchors = anchor_motions(mesh, motions)
     assert sorted(anchor.region for anchor in anchors) == list(range(1, 51))
     for anchor, motion in zip(anchors, motions, strict=True):
+        np.testing.assert_array_equal(anchor.nodes, np.flatnonzero(mesh.node_region == anchor.region))
         shift, spin = motion.velocities[mesh.region_names[anchor.region]]
         velocity = shift + 1j * spin * mesh.position[anchor.nodes]
         assert abs((np.conj(anchor.functional) * velocity).real.sum()) > 1e-3 * np.abs(velocity).max()

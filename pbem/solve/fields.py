@@ -58,14 +58,22 @@ class InteriorField:
         displacement = np.where(mesh.node_crack, first - opposite, first)
         traction = step.traction[: mesh.nodes].copy()
         moved, stress = np.zeros_like(self._points), np.zeros((len(self._points), 3))
+        # There can be thousands of regions: each finds its nodes and its points without looking at all of them.
+        ends = np.searchsorted(mesh.region, np.arange(len(backgrounds) + 1)) * (mesh.order + 1)
+        crack = mesh.node_crack
+        points = np.flatnonzero(self._location.element < 0)
+        points = points[np.argsort(self._location.region[points], kind="stable")]
+        last = np.searchsorted(self._location.region[points], np.arange(len(backgrounds) + 1))
         for region, (balanced, far) in enumerate(backgrounds):
-            nodes = np.flatnonzero((mesh.node_region == region) & ~mesh.node_crack)
-            displacement[nodes] -= balanced.displacement(mesh.position[nodes])
-            traction[nodes] -= balanced.traction(mesh.position[nodes], mesh.normal[nodes])
-            inside = (self._location.region == region) & (self._location.element < 0)
+            if not balanced.is_zero:
+                nodes = ends[region] + np.flatnonzero(~crack[ends[region] : ends[region + 1]])
+                displacement[nodes] -= balanced.displacement(mesh.position[nodes])
+                traction[nodes] -= balanced.traction(mesh.position[nodes], mesh.normal[nodes])
+            inside = points[last[region] : last[region + 1]]
             for background in (balanced, far):
-                moved[inside] += background.displacement(self._points[inside])
-                stress[inside] += background.stress(self._points[inside])
+                if len(inside) and not background.is_zero:
+                    moved[inside] += background.displacement(self._points[inside])
+                    stress[inside] += background.stress(self._points[inside])
         if self._rows is None:
             materials = [region.material for region in self._model.regions]
             self._rows = InteriorRows(mesh, materials, self._points, self._location)

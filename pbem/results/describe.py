@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
+from pbem.bem.choice import estimate_dense_memory, estimate_hierarchical_memory, is_hierarchical
 from pbem.case.generation import Group
 from pbem.mesh.mesh import Mesh
 from pbem.model.curve import Curve
@@ -67,23 +68,6 @@ def describe_results(results: Results) -> str:
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
     return "\n\n".join(part for part in parts if part)
-
-
-def estimate_memory(model: Model, mesh: Mesh) -> tuple[float, float]:
-    """Bytes of the operator B = [H, -G] and of the tangent operator K, over all ranks.
-
-    B is dense per region; a crack's nodes have no columns in G. K is dense with one region, and with several it is
-    stored by rows with the unknowns of both sides where an interface meets the region (4 bytes an index more).
-    """
-    nodes = np.bincount(mesh.node_region, minlength=len(model.regions)).astype(float)
-    cracks = np.bincount(mesh.node_region[mesh.node_crack], minlength=len(model.regions))
-    shared = np.zeros(mesh.nodes, dtype=bool)
-    shared[mesh.pairs.first[~mesh.pairs.crack]] = True
-    shared[mesh.pairs.second[~mesh.pairs.crack]] = True
-    interface = np.bincount(mesh.node_region[shared], minlength=len(model.regions))
-    operator = 8.0 * float((2 * nodes * (4 * nodes - 2 * cracks)).sum())
-    entries = float((2 * nodes * (2 * nodes + 2 * interface)).sum())
-    return operator, 8.0 * entries if len(model.regions) == 1 else 12.0 * entries
 
 
 def _describe_region(region: Region, made: Collection[str]) -> str:
@@ -186,11 +170,18 @@ def _describe_loads(model: Model) -> list[str]:
 
 
 def _describe_size(model: Model, mesh: Mesh) -> list[str]:
-    operator, tangent = estimate_memory(model, mesh)
+    size = (
+        f"{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, {2 * mesh.nodes} unknowns, "
+        f"{mesh.pairs.count} contact pairs, scheme {model.analysis.scheme}"
+    )
+    if is_hierarchical(model, mesh):
+        stored = _bytes(estimate_hierarchical_memory(model, mesh))
+        note = "its preconditioner and GMRES less than that"
+        return [size, f"memory over all ranks: hierarchical operator {stored}, {note}"]
+    operator, tangent = estimate_dense_memory(model, mesh)
     dense = "dense" if len(model.regions) == 1 else "sparse, by regions"
     return [
-        f"{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, {2 * mesh.nodes} unknowns, "
-        f"{mesh.pairs.count} contact pairs, scheme {model.analysis.scheme}",
+        size,
         f"memory over all ranks: operator {_bytes(operator)}, tangent operator ({dense}) {_bytes(tangent)}, "
         "and its factors once more or a few times that",
     ]

@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from pbem.bem.choice import is_hierarchical
 from pbem.bem.hierarchical import (
     HierarchicalOperator,
     anchor_rows,
@@ -32,8 +33,6 @@ from pbem.solve.problem import Problem
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
-# With more unknowns in one region than this the hierarchical operator is the faster one.
-DENSE_UNKNOWNS = 10_000
 # Beyond this rounding in the expansions outweighs what further terms bring.
 MOST_TERMS = 60
 
@@ -43,15 +42,6 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     return _assemble_hierarchical(model, mesh, comm) if is_hierarchical(model, mesh) else _assemble_dense(
         model, mesh, comm
     )
-
-
-def is_hierarchical(model: Model, mesh: Mesh) -> bool:
-    """Whether a model is computed with the hierarchical operator."""
-    if model.solver.operator != "auto":
-        return model.solver.operator == "hierarchical"
-    if model.solver.linear in ("lu", "mumps"):
-        return False
-    return 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
 
 
 def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:

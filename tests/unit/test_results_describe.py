@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pbem.bem.choice import estimate_dense_memory
 from pbem.model.model import Condition
-from pbem.results.describe import describe_model, describe_results, estimate_memory
+from pbem.results.describe import describe_model, describe_results
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
 from pbem.solve.step import OPEN, SLIP, STICK
@@ -51,7 +52,7 @@ def test_loads_that_belong_to_no_curve_are_described() -> None:
 
 
 def test_memory_is_that_of_the_dense_blocks() -> None:
-    operator, tangent = estimate_memory(MODEL, MESH)
+    operator, tangent = estimate_dense_memory(MODEL, MESH)
     lower = int((MESH.node_region == 0).sum())
     upper = MESH.nodes - lower
     cracks, shared = 18, 36

@@ -1,0 +1,57 @@
+"""Which operator a model is computed with, and what it takes to store."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements
+from pbem.bem.tree import find_interactions
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+
+# With more unknowns in one region than this the hierarchical operator is the faster one.
+DENSE_UNKNOWNS = 10_000
+
+
+def is_hierarchical(model: Model, mesh: Mesh) -> bool:
+    """Whether a model is computed with the hierarchical operator: as it asks, else by its largest region."""
+    solver = model.solver
+    if solver.operator != "auto":
+        return solver.operator == "hierarchical"
+    if solver.linear in ("lu", "mumps"):
+        return False
+    return 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
+
+
+def estimate_hierarchical_memory(model: Model, mesh: Mesh) -> float:
+    """Bytes of the hierarchical operator's matrices over all ranks: near elements, coefficients, fields at leaves."""
+    terms = choose_terms(model.solver.tolerance)
+    parts = sort_elements(mesh, [region.material for region in model.regions], terms)
+    forest = parts.forest
+    met = find_interactions(forest, forest, RATIO)
+    per_element = mesh.order + 1
+    bounding = np.array([2 - mesh.crack[forest.items(cluster)].mean() for cluster in range(forest.clusters)])
+    columns = 2.0 * per_element * (forest.last - forest.first) * bounding  # u, and t where there is no crack
+    rows = 2.0 * per_element * (forest.last - forest.first)
+    leaves = forest.leaves
+    near = float((rows[met.near_target] * columns[met.near_source]).sum())
+    ends = float((4 * (terms + 1) * (rows + columns)[leaves]).sum())
+    shifts = 2.0 * forest.clusters * (terms + 1) ** 2
+    return 8.0 * (near + ends + shifts)
+
+
+def estimate_dense_memory(model: Model, mesh: Mesh) -> tuple[float, float]:
+    """Bytes of the operator B = [H, -G] and of the tangent operator K, over all ranks.
+
+    B is dense per region; a crack's nodes have no columns in G. K is dense with one region, and with several it is
+    stored by rows with the unknowns of both sides where an interface meets the region (4 bytes an index more).
+    """
+    nodes = np.bincount(mesh.node_region, minlength=len(model.regions)).astype(float)
+    cracks = np.bincount(mesh.node_region[mesh.node_crack], minlength=len(model.regions))
+    shared = np.zeros(mesh.nodes, dtype=bool)
+    shared[mesh.pairs.first[~mesh.pairs.crack]] = True
+    shared[mesh.pairs.second[~mesh.pairs.crack]] = True
+    interface = np.bincount(mesh.node_region[shared], minlength=len(model.regions))
+    operator = 8.0 * float((2 * nodes * (4 * nodes - 2 * cracks)).sum())
+    entries = float((2 * nodes * (2 * nodes + 2 * interface)).sum())
+    return operator, 8.0 * entries if len(model.regions) == 1 else 12.0 * entries

@@ -29,7 +29,7 @@ ROUNDING = 1e-9
 SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
-    "KI": "intensity", "KII": "intensity",
+    "KI": "intensity", "KII": "intensity", "reactions": "force",
 }  # fmt: skip
 GROUPS = {"reactions": "force", "energy": "energy"}
 
@@ -73,8 +73,8 @@ def find_kind(name: str) -> str | None:
     return GROUPS.get(group) or SCALES.get(field)
 
 
-def find_differences(one: dict[str, Array], other: dict[str, Array]) -> list[str]:
-    """What two runs of a case do not have in common."""
+def find_differences(one: dict[str, Array], other: dict[str, Array], rounding: float = ROUNDING) -> list[str]:
+    """What two runs of a case do not have in common; rounding: allowed, of the largest value."""
     if one.keys() != other.keys():
         return [f"datasets {sorted(one.keys() ^ other.keys())}"]
     scales = measure_scales(one)
@@ -89,7 +89,7 @@ def find_differences(one: dict[str, Array], other: dict[str, Array]) -> list[str
         elif kind is None:
             equal = np.array_equal(values, other[name])
         else:
-            allowed = ROUNDING * scales[kind]
+            allowed = rounding * scales[kind]
             equal = np.allclose(values, other[name], rtol=0, atol=allowed, equal_nan=True)
         if not equal:
             faults.append(name)

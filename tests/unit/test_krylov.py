@@ -1,0 +1,197 @@
+"""GMRES on many groups: every kind of model as with the dense operator, on hard ones in few iterations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.mesh.generate import generate_mesh
+from pbem.model.build import parse_model
+from pbem.model.model import Model, Operator
+from pbem.parallel import world
+from pbem.results.reader import Results
+from pbem.solve import groups
+from pbem.solve.assembly import assemble_problem
+from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.step import SilentReporter, Step
+from tests.cli.cli_sample import BLOCKS
+from tests.identities.solving import linearise_pairs
+from tests.unit.far_sample import CRACKS, TEXTS, shrink_leaves
+
+# Cracks with fluid, of a load history that opens, closes and shears them.
+PRESSED = CRACKS.replace("[analysis]\nsteps = 2\n", "").replace("count = 16", "count = 9\npressure = 0.8") + """
+[[stages]]
+name = "load"
+steps = 2
+[[stages]]
+name = "unload"
+steps = 2
+[stages.boundary.top]
+ty = -0.1
+[[stages]]
+name = "shear"
+steps = 2
+[stages.boundary.top]
+tx = 0.4
+"""
+# The upper body's side carries other elements than the lower one's, and moves over it.
+DIFFERENT_MESHES = """
+[materials.rock]
+young = 50.0
+poisson = 0.2
+[curves]
+bottom = { points = [[0, 0], [4, 0]], elements = 10 }
+right  = { points = [[4, 0], [4, 1]], elements = 8 }
+left   = { points = [[0, 0], [0, 1]], elements = 8 }
+seat   = { points = [[0, 1], [4, 1]], elements = 33 }
+foot   = { points = [[1, 1], [3, 1]], elements = 14 }
+right_above = { points = [[3, 1], [3, 3]], elements = 10 }
+left_above  = { points = [[1, 1], [1, 3]], elements = 10 }
+top    = { points = [[1, 3], [3, 3]], elements = 10 }
+[regions.lower]
+material = "rock"
+boundary = ["bottom", "right", "seat", "left"]
+[regions.upper]
+material = "rock"
+boundary = ["top", "right_above", "foot", "left_above"]
+[contacts.seat_and_foot]
+between = ["seat", "foot"]
+friction = 0.3
+[boundary.bottom]
+ux = 0.0
+uy = 0.0
+[boundary.top]
+ux = 0.0
+uy = 0.0
+[[stages]]
+steps = 1
+[stages.boundary.top]
+uy = -0.05
+[[stages]]
+steps = 3
+[stages.boundary.top]
+ux = 0.03
+"""
+GRID = "\n[output.interior]\nbox = [0.5, 0.5, 9.5, 9.5]\nshape = [7, 7]\n"
+KINDS = {name: make() for name, make in TEXTS.items() if not name.startswith(("blocks", "layers", "panel"))} | {
+    "fluid and stages": PRESSED + GRID,
+    "brittle": TEXTS["inclusions"]().replace("count = 6", "count = 2\ncohesion = 0.6\ntensile_strength = 0.2\n"
+                                             "cohesion_lost = true") + GRID,
+    "different meshes": DIFFERENT_MESHES,
+}  # fmt: skip
+
+
+@pytest.fixture
+def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    shrink_leaves(monkeypatch)
+    monkeypatch.setattr(groups, "ONE_GROUP", 0)
+    monkeypatch.setattr(groups, "GROUP_ELEMENTS", 24)
+
+
+def read(text: str, operator: Operator = "hierarchical") -> Model:
+    model = parse_model(text)[1]
+    return replace(model, solver=replace(model.solver, operator=operator))
+
+
+def expect_equal(found: Results, dense: Results, limit: float) -> None:
+    """Modes are the same, all fields agree to a part of the largest value of their kind."""
+    np.testing.assert_array_equal(found.steps.factor, dense.steps.factor)
+    for name, contact in dense.contact.items():
+        np.testing.assert_array_equal(found.contact[name].mode, contact.mode, err_msg=name)
+    for field in ("displacement", "traction"):
+        values = getattr(dense, field)
+        np.testing.assert_allclose(getattr(found, field), values, rtol=0, atol=limit * np.abs(values).max())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_model_is_as_with_the_dense_operator(kind: str, many_groups: None, tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(KINDS[kind], encoding="utf-8")
+    dense, found = (pbem.run(case, tmp_path / f"{operator}.h5", operator=operator)  # type: ignore[arg-type]
+                    for operator in ("dense", "hierarchical"))  # fmt: skip
+    expect_equal(found, dense, 1e-6)
+    if "output" in KINDS[kind]:
+        one, other = found.interior, dense.interior
+        assert one is not None and other is not None
+        for field in ("displacement", "stress"):
+            values = getattr(other, field)
+            limit = 1e-6 * np.nanmax(np.abs(values))
+            np.testing.assert_allclose(getattr(one, field), values, rtol=0, atol=limit, equal_nan=True)
+
+
+def test_a_run_is_resumed_with_either_operator(many_groups: None, tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    whole, begun = (tmp_path / name for name in ("whole.h5", "begun.h5"))
+    case.write_text(BLOCKS, encoding="utf-8")
+    expected = pbem.run(case, whole, operator="hierarchical")
+
+    class InterruptedRunError(Exception):
+        pass
+
+    class Interrupting(SilentReporter):
+        def accept(self, step: Step) -> None:
+            if step.number == 2:
+                raise InterruptedRunError
+
+    with pytest.raises(InterruptedRunError):
+        pbem.run(case, begun, operator="hierarchical", reporter=Interrupting())
+    assert len(pbem.open_results(begun).steps) == 1
+    expect_equal(pbem.run(case, begun, operator="hierarchical", resume=True), expected, 1e-7)
+
+
+def solve_once(text: str) -> KrylovTangent:
+    """The tangent operator after the first linear system."""
+    model = read(text)
+    problem = assemble_problem(model, generate_mesh(model), world)
+    tangent = make_tangent(problem)
+    assert isinstance(tangent, KrylovTangent)
+    load = problem.evaluate_load(0, 1.0)
+    solved = tangent.solve(problem.constrain(linearise_pairs(problem), load), load)
+    assert solved.residual <= model.solver.newton_tolerance
+    return tangent
+
+
+@pytest.mark.parametrize("scheme", ["DBEM", "HST", "THST"])
+def test_rows_of_very_different_size_do_not_hold_gmres_up(scheme: str, many_groups: None) -> None:
+    """Traction equations of the smallest elements are 1e8 times those of the largest."""
+    tangent = solve_once(TEXTS[f"blocks {scheme}"]())
+    assert sum(tangent.iterations) < 50
+    tangent.destroy()
+
+
+SLENDER = """
+[materials.steel]
+young = 1000.0
+poisson = 0.3
+[curves]
+bottom = { points = [[0, 0], [40, 0]], elements = 160, grading = "none" }
+right  = { points = [[40, 0], [40, 1]], elements = 8, grading = "none" }
+top    = { points = [[40, 1], [0, 1]], elements = 160, grading = "none" }
+left   = { points = [[0, 1], [0, 0]], elements = 8, grading = "none" }
+[regions.beam]
+material = "steel"
+boundary = ["bottom", "right", "top", "left"]
+[boundary.left]
+ux = 0.0
+uy = 0.0
+[boundary.top]
+ty = -0.01
+[analysis]
+steps = 1
+"""
+
+
+def test_slender_bodies_are_solved_to_the_true_residual() -> None:
+    tangent = solve_once(SLENDER)
+    assert len(tangent.problem.groups) > 5
+    tangent.destroy()
+    assert tangent.solution is not None
+    # Timoshenko's beam, but for the clamped end.
+    mesh, solution = tangent.problem.mesh, tangent.solution.reshape(-1, 2)
+    tip = solution[np.argmax(mesh.position.real), 1]
+    bending = 1000.0 / (1 - 0.3**2) / 12
+    assert tip == pytest.approx(-0.01 * 40**4 / (8 * bending), rel=5e-3)

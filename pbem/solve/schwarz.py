@@ -54,6 +54,8 @@ class SchwarzPreconditioner:
         self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
         self._free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
         self._nodes = nodes
+        # The mesh makes these anew at every call, for all nodes.
+        self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
         self._formed: sparse.csr_matrix | None = None
         self.inverses = [self._place(group) for group in groups]
 
@@ -102,15 +104,21 @@ class SchwarzPreconditioner:
         """The tangent operator's rows and columns of the nodes of elements, dense."""
         mesh = self._mesh
         nodes = around[::2] // 2
-        local = free[around][:, around].toarray()
-        chosen = constraints[:, around].tocsr()
+        local = np.zeros((len(around), len(around)))
+        row, column, value = _take_entries(free, around)
+        place, known = _find_places(around, column)
+        local[row[known], place[known]] = value[known]
+        column, row, value = _take_entries(constraints, around)
         # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
-        moved = np.flatnonzero(np.diff(chosen.indptr)) // 2 % mesh.nodes
-        sources = np.union1d(elements, mesh.node_element[moved])
+        moved = np.unique(row // 2 % mesh.nodes)
+        sources = np.union1d(elements, self._node_element[moved])
         for region in np.unique(mesh.region[elements]):
-            own = np.flatnonzero(mesh.node_region[nodes] == region)
+            own = np.flatnonzero(self._node_region[nodes] == region)
             values, columns = self._evaluate(int(region), sources[mesh.region[sources] == region], nodes[own])
-            local[_both(own)] += (chosen[columns].T @ values.T).T
+            place, known = _find_places(columns, row)
+            entries = (value[known], (place[known], column[known]))
+            chosen = sparse.csr_matrix(entries, shape=(len(columns), len(around)))
+            local[_both(own)] += (chosen.T @ values.T).T
         return local
 
     def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
@@ -118,7 +126,7 @@ class SchwarzPreconditioner:
         mesh = self._mesh
         sources: Sources = self._sources[region].select(elements - self._first_element[region])
         bounded = bool((sources.family == 0).any())
-        on = np.searchsorted(elements, mesh.node_element[nodes])
+        on = np.searchsorted(elements, self._node_element[nodes])
         seen = list_nodes(mesh, elements)
         columns = _both(seen)
         if bounded:
@@ -129,7 +137,7 @@ class SchwarzPreconditioner:
             if len(at):
                 own = nodes[at]
                 normal = mesh.normal[own] if traction else None
-                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, mesh.node_local[own])
+                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
                 values[_both(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
         values *= -np.repeat(self._scale[nodes], 2)[:, None]
         for anchor in self._anchors:
@@ -149,9 +157,26 @@ def _look_up(
     known: Integer, value: NDArray[np.complex128], nodes: Integer
 ) -> tuple[Integer, NDArray[np.complex128]]:
     """Places in nodes (k,) of those that are known (sorted), and their values."""
-    place = np.minimum(np.searchsorted(known, nodes), len(known) - 1)
-    at = np.flatnonzero(known[place] == nodes)
+    place, there = _find_places(known, nodes)
+    at = np.flatnonzero(there)
     return at, value[place[at]]
+
+
+def _take_entries(matrix: sparse.csr_matrix | sparse.csc_matrix, chosen: Integer) -> tuple[Integer, Integer, Real]:
+    """Entries of chosen rows of a matrix by rows, or columns of one by columns: place in chosen, other index, value.
+
+    Slices of scipy's take time in proportion to the whole matrix.
+    """
+    first = matrix.indptr[chosen].astype(np.int64)
+    count = matrix.indptr[chosen + 1] - first
+    at = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
+    return np.repeat(np.arange(len(chosen)), count), matrix.indices[at].astype(np.int64), matrix.data[at]
+
+
+def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
+    """Where numbers are in a sorted list, and whether they are."""
+    place = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
+    return place, known[place] == numbers
 
 
 def _both(nodes: Integer) -> Integer:

@@ -17,6 +17,7 @@ petsc4py.init(["pbem", "-no_signal_handler"])
 from petsc4py import PETSc  # noqa: E402
 
 from pbem.errors import ConvergenceError  # noqa: E402
+from pbem.parallel import gather_parts  # noqa: E402
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -108,6 +109,9 @@ class LinearSolver:
         """
         self._filling = time.perf_counter()
         self._release()
+        if self.factor_type == "scalapack":
+            self.matrix = self._make_scattered(self.inner_shape)
+            return
         if self.method == "lu":
             self.matrix = PETSc.Mat().createDense(self.inner_shape, comm=self.comm)
             self.matrix.setUp()
@@ -122,7 +126,18 @@ class LinearSolver:
     def fill_columns(self, first: int, values: Real) -> None:
         """Set some columns (local_rows, k) of a dense matrix, from the first on; all ranks together."""
         assert self.matrix is not None
-        self.matrix.getDenseArray()[:, first : first + values.shape[1]] = self._share(values, self.outer, self.inner)
+        count = values.shape[1]
+        if self.factor_type != "scalapack":
+            self.matrix.getDenseArray()[:, first : first + count] = values
+            return
+        # Every rank takes from the whole columns the blocks that are its own: ScaLAPACK's redistribution of a matrix
+        # takes room for several copies of it.
+        whole = gather_parts(self.comm, values.ravel()).reshape(-1, count)
+        rows, columns = find_own_blocks(len(whole), self.comm), find_own_blocks(first + count, self.comm, across=True)
+        columns = columns[columns >= first]
+        self.matrix.setValues(
+            rows.astype(PETSc.IntType), columns.astype(PETSc.IntType), whole[np.ix_(rows, columns - first)]
+        )
 
     def fill(self, rows: Integer, columns: Integer, values: Real) -> None:
         """Set a dense block of a sparse matrix: local row numbers, global column numbers, values (rows, columns)."""
@@ -139,10 +154,6 @@ class LinearSolver:
         """
         assert self.matrix is not None
         self.matrix.assemble()
-        if self.factor_type == "scalapack":
-            dense = self.matrix
-            self.matrix = self._scatter(dense)
-            dense.destroy()
         while not self._set_up():
             code = self._find_mumps_code()
             self._destroy_solver()
@@ -245,12 +256,16 @@ class LinearSolver:
 
     def _scatter(self, dense: PETSc.Mat) -> PETSc.Mat:
         """A dense matrix as ScaLAPACK's, with the same shares."""
-        scattered = PETSc.Mat().create(comm=self.comm)
-        scattered.setSizes(dense.getSizes())
-        scattered.setType("scalapack")
-        scattered.setUp()
+        scattered = self._make_scattered(dense.getSizes())
         dense.convert("scalapack", out=scattered)
         return scattered
+
+    def _make_scattered(self, shape: Any) -> PETSc.Mat:
+        matrix = PETSc.Mat().create(comm=self.comm)
+        matrix.setSizes(shape)
+        matrix.setType("scalapack")
+        matrix.setUp()
+        return matrix
 
     def _share(self, part: Real, old: Integer, new: Integer) -> Real:
         """Rows (old[rank], ...) in other shares (new[rank], ...) of the ranks."""
@@ -341,3 +356,18 @@ def share_equally(count: int, ranks: int) -> list[int]:
     """Shares as ScaLAPACK wants them: all the same, but for the last, which may be smaller, and empty ones after it."""
     share = -(-count // ranks)
     return [max(0, min(share, count - share * rank)) for rank in range(ranks)]
+
+
+# Rows and columns of the blocks in which PETSc's ScaLAPACK matrices are dealt to the ranks.
+BLOCK = 64
+
+
+def find_own_blocks(count: int, comm: MPI.Intracomm, across: bool = False) -> Integer:
+    """The rows (across: the columns) of which this rank has blocks, on PETSc's grid of ranks.
+
+    A guess that costs time only if it is wrong: PETSc sends values to where they belong.
+    """
+    down = next(rows for rows in range(int(comm.size**0.5 + 1e-3), 0, -1) if comm.size % rows == 0)
+    wide = comm.size // down
+    ranks, own = (wide, comm.rank % wide) if across else (down, comm.rank // wide)
+    return np.flatnonzero(np.arange(count) // BLOCK % ranks == own)

@@ -70,6 +70,11 @@ def test_ranks_share_all_groups(name: str, ranks: int) -> None:
         assert min(shares) > 0 and max(shares) <= mesh.elements / ranks + 2 * 10
 
 
+def test_shares_are_equal_in_elements_not_in_groups() -> None:
+    uneven = [np.arange(40), *(np.array([40 + k]) for k in range(40))]
+    assert [share_groups(take_mesh("cracks"), uneven, rank, 2) for rank in range(2)] == [(0, 1), (1, 41)]
+
+
 @each_sample
 def test_groups_are_surrounded_by_those_next_to_them(name: str) -> None:
     mesh = take_mesh(name)

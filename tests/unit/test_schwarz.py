@@ -105,11 +105,14 @@ def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) ->
     fresh = precondition(problem)
     fresh.update(constrain(problem, changed))
     np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
-    # And back.
-    preconditioner.update(constrain(problem, modes))
-    fresh = precondition(problem)
-    fresh.update(constrain(problem, modes))
-    np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+    # And back, and to others here and there.
+    several = ModeState(modes.mode.copy(), modes.sign.copy())
+    several.mode[::5] = (several.mode[::5] + 1) % 3
+    for each in (modes, several):
+        preconditioner.update(constrain(problem, each))
+        fresh = precondition(problem)
+        fresh.update(constrain(problem, each))
+        np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
 
 
 @each_sample

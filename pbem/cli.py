@@ -13,12 +13,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StorageError
+from pbem.environment import find_launch
+from pbem.errors import CaseError, ConvergenceError, Fault, LaunchError, PbemError, StorageError
 from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
 if TYPE_CHECKING:
-    from pbem.results.reader import Steps
+    from pbem.results.reader import Results, Steps
     from pbem.solve.step import Reporter
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
@@ -48,14 +49,17 @@ RUN_NOTES = """\
 PETSc: any option of PETSc's is taken with the prefix pbem_ and wins over the case's [petsc] table, e.g.
   pbem run CASE -pbem_ksp_rtol 1e-10 -pbem_ksp_monitor
 
-exit code: 0 finished; 1 unexpected error; 2 the case or the command line is wrong, nothing was written;
+Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores
+
+exit code: 0 finished; 1 unexpected error; 2 the case, the command line or the launch is wrong, nothing was written;
 3 not converged at the smallest step, the file holds every step reached"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program with the given arguments (default: those of the process); returns the exit code."""
-    rank, ranks = find_launch_rank()
-    if ranks > 1:
+    launch = find_launch(os.environ)
+    rank = launch.rank
+    if launch.ranks > 1:
         # One thread a rank, unless the user wants otherwise: the ranks are the threads.
         os.environ.setdefault("OMP_NUM_THREADS", "1")
     if rank > 0:
@@ -94,17 +98,6 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
 def _discard_output() -> None:
     """Send the rest of standard output nowhere: flushing it into a closed pipe at the end would fail once more."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def find_launch_rank() -> tuple[int, int]:
-    """Rank and number of ranks as the launcher says, without starting MPI; (0, 1) outside of a launcher."""
-    for rank, ranks in (
-        ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"), ("PMI_RANK", "PMI_SIZE"), ("MV2_COMM_WORLD_RANK",
-        "MV2_COMM_WORLD_SIZE"), ("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"),
-    ):
-        if os.environ.get(rank, "").isdigit() and os.environ.get(ranks, "").isdigit():
-            return int(os.environ[rank]), int(os.environ[ranks])
-    return 0, 1
 
 
 def split_petsc_options(arguments: Sequence[str]) -> tuple[dict[str, str], list[str]]:
@@ -282,7 +275,7 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     case = find_case(options.case)
     target = Path(options.output or case.stem + ".h5")
 
-    from pbem.driver import run
+    run = _load_driver()
     from pbem.parallel import abort_if_unexpected, world
     from pbem.progress import make_reporter
 
@@ -295,6 +288,9 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
         results = run(
             case, target, resume=options.resume, petsc=petsc, operator=options.operator, reporter=reporter
         )
+    except LaunchError as error:
+        _close(reporter)
+        code = _say_wrong_launch(error, world.rank, world.size)
     except ConvergenceError as error:
         _close(reporter)
         _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)
@@ -324,6 +320,37 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code
+
+
+def _load_driver() -> Callable[..., Results]:
+    """Import what computes; raises LaunchError on all ranks alike if MPI, PETSc or another library cannot be loaded."""
+    advice = "; README.md (Install and run) tells how mpi4py, petsc4py and PETSc have to be built"
+    try:
+        from pbem.parallel import refuse_together, wait_for_all, world
+    except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py has not found the library of MPI
+        raise LaunchError(f"MPI cannot be loaded: {error}{advice}") from error
+    fault = None
+    try:
+        from pbem.driver import run
+    except ImportError as error:
+        fault = f"a library cannot be loaded: {error}{advice}"
+    # Loading PETSc is collective: where it fails on some ranks only, the others wait in it.
+    wait_for_all(world, fault, patience=5.0)
+    refuse_together(world, fault)
+    return run
+
+
+def _say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
+    """Say once why the processes do not fit together, also when MPI does not join them; returns the exit code."""
+    if ranks == 1:
+        # The launcher has numbered the copies; where it has not told how many there are, the first cannot know.
+        launch = find_launch(os.environ)
+        rank = launch.rank if launch.exact else launch.rank - 1
+        if rank > 0:
+            # A launcher that sees one copy end with an error ends the others: the first is given time to speak.
+            time.sleep(4.0)
+    _say(f"pbem: {error}", rank)
+    return WRONG_INPUT
 
 
 def _say_finished(steps: Steps, target: Path, seconds: float) -> None:

@@ -21,6 +21,7 @@ from pbem.solve.assembly import assemble_problem
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
+from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step
 
 
@@ -41,13 +42,15 @@ def run(
     the configuration in the result file tells it. reporter: told of the progress, on the first rank only.
     Every rank of an MPI run calls this and gets the results.
 
-    Raises CaseError (all faults of the case), ResultFileError (the output cannot be written, or does not belong to the
-    case), ConvergenceError (the file then holds every step reached), StorageError (the disk has no room for a step; the
-    file holds those before it). Any other exception on one rank ends all ranks. ValueError: there is no such operator.
+    Raises LaunchError (ranks, libraries or threads that do not fit together), CaseError (all faults of the case),
+    ResultFileError (the output cannot be written, or does not belong to the case), ConvergenceError (the file then
+    holds every step reached), StorageError (the disk has no room for a step; the file holds those before it). Any other
+    exception on one rank ends all ranks. ValueError: there is no such operator.
     """
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
     with abort_if_unexpected(world, PbemError):
+        placement = check_start(world)
         path = Path(case)
         model = do_on_first(world, PbemError, lambda: read_checked_model(path))
         if operator is not None:
@@ -55,9 +58,10 @@ def run(
         target = Path(output) if output is not None else Path(path.stem + ".h5")
         do_on_first(world, PbemError, lambda: check_output_path(target))
         mesh = generate_mesh(model)
+        check_shares(model, mesh, world.size)
         listener = reporter if reporter is not None and world.rank == 0 else SilentReporter()
         listener.begin(model)
-        for note in (*model.notes, *mesh.notes):
+        for note in (*model.notes, *mesh.notes, *placement):
             listener.note(note)
         options = {**model.solver.petsc, **(petsc or {})}
         with petsc_options(options):

@@ -75,3 +75,14 @@ class StorageError(PbemError):
         self.path = path
         self.reason = reason
         super().__init__(f"{path}: {reason}")
+
+
+class LaunchError(PbemError):
+    """The processes, their libraries or their threads do not fit together; nothing was computed or written.
+
+    reason: what was found and what to do, sentences.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)

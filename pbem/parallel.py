@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,8 @@ from typing import Any, TypeVar
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+
+from pbem.errors import LaunchError
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -54,6 +57,50 @@ def do_on_first(comm: MPI.Intracomm, expected: type[Exception], action: Callable
     if error is not None:
         raise error
     return comm.bcast(value, root=0) if share else value  # type: ignore[return-value]
+
+
+def refuse_together(comm: MPI.Intracomm, fault: str | None) -> None:
+    """Raise LaunchError on all ranks alike if a rank brings a fault; the first one is said."""
+    faults = comm.allgather(fault)
+    bad = [rank for rank, text in enumerate(faults) if text]
+    if bad:
+        where = "" if len(bad) == comm.size else f" (on {len(bad)} of {comm.size} ranks, first on rank {bad[0]})"
+        raise LaunchError(f"{faults[bad[0]]}{where}")
+
+
+def wait_for_all(comm: MPI.Intracomm, fault: str | None, patience: float) -> None:
+    """Wait until all ranks are here; a rank with a fault waits so long (s), then says it and ends all ranks, code 2.
+
+    For faults before a collective call in which the other ranks may hang: they would wait for this one for ever.
+    """
+    arrived = comm.Ibarrier()
+    if fault is None:
+        arrived.Wait()
+        return
+    # Not all at once: the first to speak ends the others.
+    end = time.monotonic() + patience + 0.2 * min(comm.rank, 50)
+    while not arrived.Test():
+        if time.monotonic() > end:
+            sys.stderr.write(f"pbem: {fault} (on rank {comm.rank} of {comm.size})\n")
+            sys.stderr.flush()
+            comm.Abort(2)
+        time.sleep(0.01)
+
+
+def gather_by_node(comm: MPI.Intracomm, value: T) -> list[list[T]]:
+    """The values of all ranks, those of a node (what shares memory) in a list of their own; the same on every rank."""
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    first = node.bcast(comm.rank, root=0)
+    node.Free()
+    nodes: dict[int, list[T]] = {}
+    for key, each in comm.allgather((first, value)):
+        nodes.setdefault(key, []).append(each)
+    return list(nodes.values())
+
+
+def describe_library() -> str:
+    """Name and version of the MPI library that mpi4py uses."""
+    return str(MPI.Get_library_version()).strip("\0 \n").splitlines()[0].split(", package")[0].strip()
 
 
 def share_nodes(costs: Real, ranks: int) -> Integer:

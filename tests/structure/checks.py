@@ -16,7 +16,7 @@ ORDER = (
     "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
-BASE = ("version", "errors", "parallel", "exact")
+BASE = ("version", "errors", "environment", "parallel", "exact")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = ("solve", "driver", "cli", "__main__", "parallel")
 

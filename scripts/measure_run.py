@@ -120,9 +120,9 @@ def measure_product(problem: Any, world: Any) -> dict[str, Any]:
         begin = time.perf_counter()
         problem.operator.apply(v)
         best = min(best, max(world.allgather(time.perf_counter() - begin)))
-    leaves = getattr(problem.operator, "leaves", ())
-    stored = sum(leaf.near.nbytes + leaf.far.nbytes for leaf in leaves)
-    if not leaves:
+    if hasattr(problem.operator, "leaves"):  # none of them on a rank without a group
+        stored = sum(leaf.near.nbytes + leaf.far.nbytes for leaf in problem.operator.leaves)
+    else:
         stored = sum(block.matrix.nbytes for block in problem.operator.blocks)
     sample = np.ones(4_000_000)
     target = np.empty_like(sample)
@@ -146,6 +146,11 @@ if __name__ == "__main__":
     parser.add_argument("--operator-only", action="store_true", help="stop when the operator is there")
     parser.add_argument("--output", help="result file to keep")
     options = parser.parse_args()
-    outcome = measure(options.case, options.operator_only, options.output)
+    from pbem.parallel import abort_if_unexpected
+    from pbem.parallel import world as ranks
+
+    # An error on one rank must not leave the others waiting for it.
+    with abort_if_unexpected(ranks, SystemExit):
+        outcome = measure(options.case, options.operator_only, options.output)
     if outcome:
         print(json.dumps(outcome))

@@ -52,13 +52,16 @@ def expect_refusal(done: subprocess.CompletedProcess[str], said: str, folder: Pa
     assert not list(folder.glob("*.h5"))
 
 
-def test_copies_under_a_foreign_launcher_are_refused_by_the_first(folder: Path) -> None:
-    """All copies end with 2; the first says why. Open MPI here does not look at MPICH's variables."""
-    first = run_alone(folder, PMI_RANK="0", PMI_SIZE="4")
-    expect_refusal(first, "4 processes were started (PMI_SIZE = 4), but MPI.COMM_WORLD has size 1", folder)
+@pytest.mark.parametrize(
+    ("number", "count"), [("PMI_RANK", "PMI_SIZE"), ("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE")]
+)
+def test_copies_under_a_foreign_launcher_are_refused_by_the_first(number: str, count: str, folder: Path) -> None:
+    """All copies end with 2; the first says why. The variables alone do not join processes."""
+    first = run_alone(folder, **{number: "0", count: "4"})
+    expect_refusal(first, f"4 processes were started ({count} = 4), but MPI.COMM_WORLD has size 1", folder)
     assert "mpi4py uses" in first.stderr
     begin = time.monotonic()
-    other = run_alone(folder, PMI_RANK="3", PMI_SIZE="4")
+    other = run_alone(folder, **{number: "3", count: "4"})
     assert (other.returncode, other.stderr, other.stdout) == (2, "", "")
     assert time.monotonic() - begin > 4.0  # the first has spoken by then
     assert not list(folder.glob("*.h5"))

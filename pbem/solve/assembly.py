@@ -109,7 +109,8 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
         block_columns=(),
         anchors=anchors,
         crack_points=points,
-        groups=tuple(surround_groups(mesh, groups, first, last)),
+        groups=surround_groups(mesh, groups, first, last),
+        widen_groups=lambda widening: surround_groups(mesh, groups, first, last, widening),
         notes=(_describe_operator(operator, len(groups), model.solver.tolerance, error),),
     )
 

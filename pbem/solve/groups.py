@@ -20,10 +20,11 @@ Complex = NDArray[np.complex128]
 ONE_GROUP = 1500
 # Elements of a group at most; both sides of an interface count.
 GROUP_ELEMENTS = 48
-# Groups around a group are taken until they have so many unknowns together, or so many times those of the group;
-# those that have an end point in common with it are always taken.
+# Groups around a group are taken until they have so many unknowns together, or so many times those of the group. One
+# that has an end point in common with others, like a piece of a longer boundary, always takes these, and more of them.
 NEIGHBOUR_UNKNOWNS = 100
 NEIGHBOUR_SHARE = 0.5
+TOUCHING_SHARE = 4.0
 MOST_NEIGHBOURS = 24
 
 
@@ -64,12 +65,15 @@ def list_nodes(mesh: Mesh, elements: Integer) -> Integer:
     return (elements[:, None] * per_element + np.arange(per_element)).ravel()
 
 
-def surround_groups(mesh: Mesh, groups: list[Integer], first: int, last: int) -> list[Group]:
-    """The groups of the numbers first .. last - 1, each with those around it."""
+def surround_groups(
+    mesh: Mesh, groups: list[Integer], first: int, last: int, widening: int = 1
+) -> tuple[Group, ...]:
+    """The groups of the numbers first .. last - 1, each with those around it: so many times as many as at first."""
     center, radius = _enclose_groups(mesh, groups)
     size = np.array([len(group) for group in groups]) * 2 * (mesh.order + 1)
     tree = cKDTree(np.column_stack([center.real, center.imag]))
-    count = min(4 * MOST_NEIGHBOURS, len(groups))
+    most = widening * MOST_NEIGHBOURS
+    count = min(4 * most, len(groups))
     ends = [set(np.concatenate([mesh.start[group], mesh.end[group]]).tolist()) for group in groups]
     result = []
     for number in range(first, last):
@@ -77,14 +81,15 @@ def surround_groups(mesh: Mesh, groups: list[Integer], first: int, last: int) ->
         near = np.atleast_1d(near)
         near = near[near != number]
         gap = np.abs(center[near] - center[number]) - radius[near] - radius[number]
-        near = near[np.lexsort((near, gap))][:MOST_NEIGHBOURS]
-        room = max(NEIGHBOUR_UNKNOWNS, NEIGHBOUR_SHARE * size[number])
+        near = near[np.lexsort((near, gap))][:most]
         touching = np.array([bool(ends[number] & ends[k]) for k in near], dtype=bool)
+        share = TOUCHING_SHARE if touching.any() else NEIGHBOUR_SHARE
+        room = widening * max(NEIGHBOUR_UNKNOWNS, share * size[number])
         near = np.concatenate([near[touching], near[~touching]])
         taken = near[(np.cumsum(size[near]) <= room) | (np.arange(len(near)) < touching.sum())]
         around = np.sort(np.concatenate([groups[number], *(groups[k] for k in taken)]))
         result.append(Group(groups[number], around))
-    return result
+    return tuple(result)
 
 
 def _enclose_groups(mesh: Mesh, groups: list[Integer]) -> tuple[Complex, Real]:

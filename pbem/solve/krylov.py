@@ -23,6 +23,10 @@ Real = NDArray[np.float64]
 MOST_ITERATIONS = 300
 # GMRES is started at most so often for one linear system.
 MOST_ATTEMPTS = 4
+# After a system of more iterations than this the groups of the preconditioner take in more around them: each time
+# WIDENING times as much, up to MOST_WIDENING times.
+SLOW = 60
+WIDENING, MOST_WIDENING = 4, 64
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
 
@@ -36,6 +40,7 @@ class KrylovTangent:
         self.constraints: ConstraintMap | None = None
         self.solution: Real | None = None
         self.iterations: list[int] = []
+        self.widening = 1
         rows = problem.operator.rows
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
         self._order = _find_order(problem)
@@ -81,17 +86,36 @@ class KrylovTangent:
             unknowns = self.gather(np.array(self._left.getArray()))
             v = constraints.evaluate(unknowns)
             residual = problem.measure(problem.apply(v, load)) / scale
-            if residual <= tolerance:
+            solved = residual <= tolerance
+            widened = self.iterations[-1] > SLOW and self._widen()
+            if solved:
                 self.solution = unknowns
                 return Solved(unknowns, v, residual, linear_iterations=count)
             # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
-            if self.iterations[-1] == MOST_ITERATIONS or not residual < 0.1 * before:
+            if not widened and (self.iterations[-1] == MOST_ITERATIONS or not residual < 0.1 * before):
                 break
+            if widened:
+                self.preconditioner.update(constraints)
+                self._solver.getPC().setUp()
         raise ConvergenceError(
             "linear solver",
-            f"GMRES reached a relative residual of {residual:.1e} in {self.iterations[-1]} iterations (asked: "
-            f"{tolerance:.1e})",
+            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}); try "
+            'operator = "dense"',
         )
+
+    def _widen(self) -> bool:
+        """Let the groups of the preconditioner take in more around them; whether there was more to take."""
+        wider = self.widening * WIDENING
+        if wider > MOST_WIDENING or self.problem.widen_groups is None:
+            return False
+        groups = self.problem.widen_groups(wider)
+        before = sum(len(inverse.around) for inverse in self.preconditioner.inverses)
+        more = 2 * (self.problem.mesh.order + 1) * sum(len(group.around) for group in groups) > before
+        if not add_up(self.problem.comm, np.array([float(more)]))[0]:
+            return False
+        self.widening = wider
+        self.preconditioner.regroup(groups)
+        return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """The same: every solution has its true residual."""

@@ -38,7 +38,8 @@ class Problem:
     crack_rows, crack_nodes: this rank's share of the rows that recover the mean displacement of crack faces; of the
     hierarchical operator crack_points take their place.
     block_columns: for every block of a dense operator, the unknowns on which its region depends.
-    groups: this rank's groups of elements, of the hierarchical operator. notes: what the user should know of it.
+    groups: this rank's groups of elements, of the hierarchical operator; widen_groups makes them with so many
+    times as many around them. notes: what the user should know of it.
     """
 
     comm: MPI.Intracomm
@@ -55,6 +56,7 @@ class Problem:
     anchors: tuple[Anchor, ...]
     crack_points: PointRows | None = None
     groups: tuple[Group, ...] = ()
+    widen_groups: Callable[[int], tuple[Group, ...]] | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -59,6 +59,11 @@ class SchwarzPreconditioner:
         self._formed: sparse.csr_matrix | None = None
         self.inverses = [self._place(group) for group in groups]
 
+    def regroup(self, groups: Sequence[Group]) -> None:
+        """Take other surroundings of the same groups; `update` then forms all inverses."""
+        self._formed = None
+        self.inverses = [self._place(group) for group in groups]
+
     def _place(self, group: Group) -> LocalInverse:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
         around = list_nodes(self._mesh, group.around)

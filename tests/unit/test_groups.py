@@ -91,7 +91,17 @@ def test_groups_are_surrounded_by_those_next_to_them(name: str) -> None:
         assert all(set(other) <= set(surrounded.around) for other in touching)
         unknowns = 2 * (mesh.order + 1)
         extra = unknowns * (len(surrounded.around) - sum(len(other) for other in touching))
-        assert extra <= max(groups.NEIGHBOUR_UNKNOWNS, groups.NEIGHBOUR_SHARE * unknowns * len(group))
+        share = groups.TOUCHING_SHARE if len(touching) > 1 else groups.NEIGHBOUR_SHARE
+        assert extra <= max(groups.NEIGHBOUR_UNKNOWNS, share * unknowns * len(group))
+
+
+def test_wider_surroundings_hold_the_narrow_ones() -> None:
+    mesh = take_mesh("cracks")
+    divided = divide_model(mesh)
+    narrow, wide, widest = (surround_groups(mesh, divided, 0, len(divided), k) for k in (1, 2, 1000))
+    assert all(set(one.around) <= set(other.around) for one, other in zip(narrow, wide, strict=True))
+    assert sum(len(group.around) for group in wide) > 1.2 * sum(len(group.around) for group in narrow)
+    assert all(len(group.around) == mesh.elements for group in widest)
 
 
 def test_a_share_of_the_groups_is_surrounded_alike() -> None:

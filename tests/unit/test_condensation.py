@@ -144,7 +144,7 @@ def test_many_pairs_are_solved_by_columns_of_those_that_change_or_by_new_factors
         law = Linearisation(np.where(kept[:, None, None], base.tangent, law.tangent), 1.5 * base.offset)
         constraints = problem.constrain(law, load)
         found = tangent.solve(constraints, load, law)
-        assert found.checked == (number == 0 or not allowed and seed != seeds[number - 1])
+        assert found.checked == (number == 0 or (not allowed and seed != seeds[number - 1]))
         compare(found, solve_directly(problem, law, load), problem)
         compare(tangent.check(found, constraints, load, law), solve_directly(problem, law, load), problem)
     assert len(factorisations) == (1 if allowed else len(set(seeds)))

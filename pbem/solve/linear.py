@@ -18,6 +18,7 @@ from petsc4py import PETSc  # noqa: E402
 
 from pbem.errors import ConvergenceError  # noqa: E402
 from pbem.parallel import gather_parts  # noqa: E402
+from pbem.solve.shares import change_shares, find_own_blocks, share_equally  # noqa: E402
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -268,21 +269,7 @@ class LinearSolver:
         return matrix
 
     def _share(self, part: Real, old: Integer, new: Integer) -> Real:
-        """Rows (old[rank], ...) in other shares (new[rank], ...) of the ranks."""
-        if np.array_equal(old, new):
-            return part
-        width = part[:1].size if part.ndim > 1 else 1
-        ends = [np.concatenate([[0], np.cumsum(counts)]) for counts in (old, new)]
-        rank = self.comm.rank
-
-        def overlap(mine: Integer, others: Integer) -> Integer:
-            begin, end = mine[rank], mine[rank + 1]
-            return np.maximum(np.minimum(others[1:], end) - np.maximum(others[:-1], begin), 0) * width
-
-        result = np.empty((int(new[rank]), *part.shape[1:]))
-        given, taken = overlap(ends[0], ends[1]), overlap(ends[1], ends[0])
-        self.comm.Alltoallv([np.ascontiguousarray(part), given], [result, taken])
-        return result
+        return change_shares(self.comm, part, old, new)
 
     def _multiply(self, part: Real) -> Real:
         return self._share(self.multiply(self._share(part, self.inner, self.outer)), self.outer, self.inner)
@@ -350,24 +337,3 @@ def _explain_factors(code: int | None) -> ConvergenceError:
     return ConvergenceError(
         "singular tangent", "the tangent operator has no LU factors; a body is probably free to move"
     )
-
-
-def share_equally(count: int, ranks: int) -> list[int]:
-    """Shares as ScaLAPACK wants them: all the same, but for the last, which may be smaller, and empty ones after it."""
-    share = -(-count // ranks)
-    return [max(0, min(share, count - share * rank)) for rank in range(ranks)]
-
-
-# Rows and columns of the blocks in which PETSc's ScaLAPACK matrices are dealt to the ranks.
-BLOCK = 64
-
-
-def find_own_blocks(count: int, comm: MPI.Intracomm, across: bool = False) -> Integer:
-    """The rows (across: the columns) of which this rank has blocks, on PETSc's grid of ranks.
-
-    A guess that costs time only if it is wrong: PETSc sends values to where they belong.
-    """
-    down = next(rows for rows in range(int(comm.size**0.5 + 1e-3), 0, -1) if comm.size % rows == 0)
-    wide = comm.size // down
-    ranks, own = (wide, comm.rank % wide) if across else (down, comm.rank // wide)
-    return np.flatnonzero(np.arange(count) // BLOCK % ranks == own)

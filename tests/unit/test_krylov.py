@@ -195,5 +195,11 @@ def test_slender_bodies_are_solved_to_the_true_residual() -> None:
     tip = solution[np.argmax(mesh.position.real), 1]
     bending = 1000.0 / (1 - 0.3**2) / 12
     assert tip == pytest.approx(-0.01 * 40**4 / (8 * bending), rel=1e-2)
-    # Such a beam multiplies the residual by far more; the dense operator has the same tip.
-    assert tip == pytest.approx(-34.758068150, rel=1e-7)
+    # The dense operator has the same tip, up to what such a beam makes of the residual.
+    model = read(SLENDER)
+    dense = assemble_problem(replace(model, solver=replace(model.solver, operator="dense")), mesh, world)
+    direct, load = make_tangent(dense), dense.evaluate_load(0, 1.0)
+    law = linearise_pairs(dense)
+    exact = direct.solve(dense.constrain(law, load), load, law).unknowns.reshape(-1, 2)
+    direct.destroy()
+    assert tip == pytest.approx(exact[np.argmax(mesh.position.real), 1], rel=1e-6)

@@ -6,7 +6,7 @@ the jump u_r - u_l and t the traction on the first face. B v = 0 states every no
     displacement equation   u/2 - A u - B t = 0
     traction equation       t/2 - A u - B t = 0     (on a crack t - A u - B t = 0: both faces lie there)
 
-Traction equations are multiplied by length/shear modulus, so that all rows are lengths.
+Traction equations are multiplied by the element's length over the shear modulus, so that all rows are lengths.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def assemble_rows(
     """Rows of B of the nodes in [first_node, last_node).
 
     needed (4 nodes,): entries of v that can ever differ from zero; the other columns are not stored.
-    length: multiplies the traction equations, over the region's shear modulus.
+    length: the model's size; see scale_equations.
     """
     nodes = np.arange(first_node, last_node)
     scale = scale_equations(mesh, materials, length)
@@ -159,9 +159,14 @@ def add_anchor(
 
 
 def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) -> Real:
-    """Factor (nodes,) of every node's equations: length/shear modulus for traction equations, 1 for the others."""
+    """Factor (nodes,) of every node's equations: length/shear modulus for traction equations, 1 for the others.
+
+    The length is that of the node's element, at most the given one: the hypersingular integrals over an element are its
+    displacements times shear modulus over length, so that all rows have entries of the same size on graded meshes too.
+    """
     shear_modulus = np.array([material.shear_modulus for material in materials])[mesh.node_region]
-    return np.where(mesh.traction_equation, length / shear_modulus, 1.0)
+    own = np.minimum(np.abs(mesh.end - mesh.start)[mesh.node_element], length)
+    return np.where(mesh.traction_equation, own / shear_modulus, 1.0)
 
 
 def collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:

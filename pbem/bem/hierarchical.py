@@ -60,6 +60,18 @@ class Anchoring:
 
 
 @dataclass(frozen=True)
+class RigidMotions:
+    """Of a finite region: basis (3, 2 k), orthonormal, of the rigid motions in the displacements v[columns].
+
+    B of a rigid motion is zero. The expansions of its parts cancel only up to their error, which would be felt where a
+    body moves by much more than it is strained: what fits best is taken off before.
+    """
+
+    columns: Integer
+    basis: Real
+
+
+@dataclass(frozen=True)
 class Sorted:
     """The model's elements in cluster trees, and those of each region as the kernels see them."""
 
@@ -133,6 +145,7 @@ class HierarchicalOperator:
     free: sparse.csr_matrix
     needed: Bool
     anchorings: tuple[Anchoring, ...] = ()
+    rigid: tuple[RigidMotions, ...] = ()
 
     def keep_needed(self, v: Real) -> Real:
         """v with zeros in the entries that the operator was told to leave out."""
@@ -144,11 +157,14 @@ class HierarchicalOperator:
 
     def apply(self, v: Real) -> Real:
         """This rank's rows of B v, lengths, for v of shape (4 nodes,); all ranks call this together."""
-        fields = self.targets.spread(self.sources.collect(v), self.sources.forest)
+        strained = v.copy()
+        for motions in self.rigid:
+            strained[motions.columns] -= (motions.basis @ v[motions.columns]) @ motions.basis
+        fields = self.targets.spread(self.sources.collect(strained), self.sources.forest)
         far = np.ascontiguousarray(fields).view(float).reshape(len(fields), -1)
-        result: Real = self.free @ v
+        result: Real = self.free @ strained
         for each in self.leaves:
-            result[each.rows] += each.near @ v[each.columns] + each.far @ far[each.leaf]
+            result[each.rows] += each.near @ strained[each.columns] + each.far @ far[each.leaf]
         for anchoring in self.anchorings:
             result[anchoring.rows] += anchoring.pattern * (anchoring.functional @ v[anchoring.columns])
         return result
@@ -167,6 +183,22 @@ def anchor_rows(
     return replace(operator, anchorings=(*operator.anchorings, added))
 
 
+def find_rigid_motions(mesh: Mesh, finite: Sequence[int], needed: Bool) -> tuple[RigidMotions, ...]:
+    """Rigid motions of the finite regions (numbers) that have expansions and all of whose displacements are needed."""
+    counts, node_region, node_crack = np.bincount(mesh.region), mesh.node_region, mesh.node_crack
+    made = []
+    for region in finite:
+        if counts[region] <= SMALL_REGION:
+            continue
+        nodes = np.flatnonzero((node_region == region) & ~node_crack)
+        columns = _both(nodes)
+        if needed[columns].all():
+            place = mesh.position[nodes] - mesh.position[nodes].mean()
+            motions = np.stack([_split(np.ones_like(place)), _split(1j * np.ones_like(place)), _split(1j * place)])
+            made.append(RigidMotions(columns, np.ascontiguousarray(np.linalg.qr(motions.T)[0].T)))
+    return tuple(made)
+
+
 def _both(nodes: Integer) -> Integer:
     return (2 * nodes[:, None] + np.arange(2)).ravel()
 
@@ -176,9 +208,12 @@ def _split(value: Complex) -> Real:
 
 
 def assemble_hierarchical(
-    parts: Sorted, sources: SourceTree, nodes: Integer, needed: Bool, length: float
+    parts: Sorted, sources: SourceTree, nodes: Integer, needed: Bool, length: float, finite: Sequence[int] = ()
 ) -> HierarchicalOperator:
-    """Rows of B of the given nodes (k,); needed (4 nodes,), length: as of pbem.bem.operator.assemble_rows."""
+    """Rows of B of the given nodes (k,); needed (4 nodes,), length: as of pbem.bem.operator.assemble_rows.
+
+    finite: numbers of regions that have an outer boundary.
+    """
     mesh, forest, terms = parts.mesh, parts.forest, parts.terms
     row_of_node = np.full(mesh.nodes, -1)
     row_of_node[nodes] = np.arange(len(nodes))
@@ -202,7 +237,8 @@ def assemble_hierarchical(
         rows = (2 * row_of_node[at][:, None] + np.arange(2)).ravel()
         leaves.append(LeafRows(int(leaf), rows, columns, near, far))
     free = collect_free_terms(mesh, nodes, scale)
-    return HierarchicalOperator(parts, nodes, sources, targets, tuple(leaves), free, needed)
+    rigid = find_rigid_motions(mesh, finite, needed)
+    return HierarchicalOperator(parts, nodes, sources, targets, tuple(leaves), free, needed, rigid=rigid)
 
 
 def _evaluate_leaf(

@@ -130,6 +130,10 @@ def _reach_tolerance(
     """The operator of the given nodes with enough terms for the tolerance, and its measured relative error."""
     tolerance = model.solver.tolerance
     materials = [region.material for region in model.regions]
+    finite = [number for number, region in enumerate(model.regions) if not region.infinite]
+    # Rigid motions are taken off from all displacements, also from those that are zero.
+    needed = needed.copy()
+    needed[: 2 * mesh.nodes] |= np.repeat(np.isin(mesh.node_region, finite), 2)
     terms = choose_terms(tolerance)
     while True:
         parts = sort_elements(mesh, materials, terms)
@@ -137,7 +141,7 @@ def _reach_tolerance(
         cuts = np.linspace(0, len(leaves), comm.size + 1).astype(int)
         own = leaves[cuts[comm.rank] : cuts[comm.rank + 1]]
         sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
-        operator = assemble_hierarchical(parts, sources, nodes, needed, model.size)
+        operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite)
         error = measure_product_error(comm, operator, model.size)
         if error <= tolerance or terms >= MOST_TERMS:
             return operator, error

@@ -123,6 +123,18 @@ def test_every_kind_of_model_is_as_with_the_dense_operator(kind: str, many_group
             np.testing.assert_allclose(getattr(one, field), values, rtol=0, atol=limit, equal_nan=True)
 
 
+def test_a_shift_of_a_body_leaves_its_tractions(many_groups: None, tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    found = []
+    for shift in (0.0, 100.0):  # the strains move the body by about 0.01
+        moved = CRACKS.replace("uy = 0.0", f"uy = {-shift}").replace("ux = 0.0", f"ux = {shift}")
+        # Residuals are in proportion to the shift.
+        case.write_text(moved + "[solver]\nnewton_tolerance = 1e-11\n")
+        found.append(pbem.run(case, tmp_path / f"{shift}.h5", operator="hierarchical"))
+    at_rest, shifted = found
+    np.testing.assert_allclose(shifted.traction, at_rest.traction, rtol=0, atol=1e-6 * np.abs(at_rest.traction).max())
+
+
 def test_a_run_is_resumed_with_either_operator(many_groups: None, tmp_path: Path) -> None:
     case = tmp_path / "case.toml"
     whole, begun = (tmp_path / name for name in ("whole.h5", "begun.h5"))

@@ -35,7 +35,8 @@ SIDE = 10.0
 STAGES = ((-1.0, -0.3), (-1.0, 0.3), (-0.4, -0.6), (-1.2, 0.5))
 
 FACTORISE = """
-import sys, time
+import os, sys, time
+os.sched_setaffinity(0, range(os.cpu_count()))  # mpirun binds its ranks to a core each, and what they start
 import numpy as np
 from scipy.linalg import lu_factor
 count = int(sys.argv[1])

@@ -7,6 +7,8 @@ a product reads. The last table profiles the pieces and gives the exponent with 
 
 usage: .venv/bin/python scripts/bench_field.py [--counts 250 500 1000 2000] [--ranks 2] [--operator-only 10000]
        .venv/bin/python scripts/bench_field.py --compare 250     against the dense operator: slip, K, tractions
+       .venv/bin/python scripts/bench_field.py --inclusions 100 --elements 24 [--law bonded]
+       .venv/bin/python scripts/bench_field.py --inclusions 100 1000     circular, in a plane under compression
 """
 
 from __future__ import annotations
@@ -35,6 +37,14 @@ def make_field(folder: Path, count: int, operator: str = "hierarchical") -> Path
     return case
 
 
+def make_inclusions(folder: Path, count: int, elements: int, law: str) -> Path:
+    """The case file of so many circular inclusions, ten times as stiff as the infinite plane around them."""
+    friction = ("--friction", "0.3") if law == "coulomb" else ()
+    case = make_case("inclusions", folder, "--count", str(count), "--elements", str(elements), "--law", law, *friction)
+    case.write_text(case.read_text() + '\n[solver]\noperator = "hierarchical"\n')
+    return case
+
+
 def measure_factorisation() -> float:
     """Seconds of LAPACK's LU per n^3, on one thread."""
     matrix = np.random.default_rng(0).standard_normal((LU_SIZE, LU_SIZE))
@@ -48,7 +58,7 @@ def measure_factorisation() -> float:
 
 def print_sizes(runs: list[tuple[int, dict[str, Any]]], factorisation: float) -> None:
     """One line for every size."""
-    print(f"{'cracks':>7s}{'unknowns':>10s}{'whole s':>9s}{'LU of n s':>11s}{'ratio':>9s}{'MB, all ranks':>15s}"
+    print(f"{'number':>7s}{'unknowns':>10s}{'whole s':>9s}{'LU of n s':>11s}{'ratio':>9s}{'MB, all ranks':>15s}"
           f"{'dense MB':>10s}"
           f"{'Newton':>8s}{'GMRES, most':>13s}{'mean':>6s}{'product ms':>12s}{'/copy':>7s}")
     for count, run in runs:
@@ -106,6 +116,9 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--counts", type=int, nargs="*", default=[250, 500, 1000, 2000])
+    parser.add_argument("--inclusions", type=int, nargs="+", help="fields of inclusions in place of cracks")
+    parser.add_argument("--elements", type=int, default=16, help="of an inclusion")
+    parser.add_argument("--law", choices=("coulomb", "bonded"), default="coulomb", help="of inclusions")
     parser.add_argument("--operator-only", type=int, nargs="*", default=[], help="fields of which only B is built")
     parser.add_argument("--ranks", type=int, default=2)
     parser.add_argument("--compare", type=int, help="a field that is solved with the dense operator as well")
@@ -118,12 +131,15 @@ def main() -> None:
         factorisation = measure_factorisation()
         print(f"{options.ranks} ranks; LAPACK: {2e-9 / 3 / factorisation:.0f} GFlop/s on one thread")
         runs = []
-        for count in options.counts:
-            runs.append((count, run_measured(make_field(folder, count), options.ranks)))
+        for count in options.inclusions or options.counts:
+            case = make_field(folder, count) if not options.inclusions else make_inclusions(
+                folder, count, options.elements, options.law
+            )
+            runs.append((count, run_measured(case, options.ranks)))
         if runs:
             print_sizes(runs, factorisation)
             print_pieces(runs)
-            print("\n" + "\n".join(f"{count} cracks: {run['notes'][0]}" for count, run in runs))
+            print("\n" + "\n".join(f"{count}: {run['notes'][-1]}" for count, run in runs))
         for count in options.operator_only:
             run = run_measured(make_field(folder, count), options.ranks, "--operator-only")
             print(f"\n{count} cracks, {run['unknowns']} unknowns, the operator only: assembly "

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import get_args
 
 from pbem.contact.strength import read_checked_model
-from pbem.errors import ConvergenceError, PbemError
+from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
@@ -54,6 +54,9 @@ def run(
         path = Path(case)
         model = do_on_first(world, PbemError, lambda: read_checked_model(path))
         if operator is not None:
+            if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
+                found = f'"{model.solver.linear}" with operator = "hierarchical", which stores no matrix to factor'
+                raise CaseError(str(path), (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
             model = replace(model, solver=replace(model.solver, operator=operator))
         target = Path(output) if output is not None else Path(path.stem + ".h5")
         do_on_first(world, PbemError, lambda: check_output_path(target))

@@ -61,7 +61,7 @@ class Anchoring:
 
 @dataclass(frozen=True)
 class RigidMotions:
-    """Of a finite region: basis (3, 2 k), orthonormal, of the rigid motions in the displacements v[columns].
+    """Of a finite region: basis (2 or 3, 2 k), orthonormal, of rigid motions in the displacements v[columns].
 
     B of a rigid motion is zero. The expansions of its parts cancel only up to their error, which would be felt where a
     body moves by much more than it is strained: what fits best is taken off before.
@@ -80,6 +80,16 @@ class Sorted:
     sources: tuple[Sources, ...]
     forest: Forest
     terms: int
+
+    @cached_property
+    def node_element(self) -> Integer:
+        """Mesh.node_element, which the mesh makes anew at every call."""
+        return self.mesh.node_element
+
+    @cached_property
+    def node_local(self) -> Real:
+        """Mesh.node_local, likewise."""
+        return self.mesh.node_local
 
     @cached_property
     def first_element(self) -> Integer:
@@ -157,9 +167,7 @@ class HierarchicalOperator:
 
     def apply(self, v: Real) -> Real:
         """This rank's rows of B v, lengths, for v of shape (4 nodes,); all ranks call this together."""
-        strained = v.copy()
-        for motions in self.rigid:
-            strained[motions.columns] -= (motions.basis @ v[motions.columns]) @ motions.basis
+        strained = take_off_rigid_motions(v, self.rigid)
         fields = self.targets.spread(self.sources.collect(strained), self.sources.forest)
         far = np.ascontiguousarray(fields).view(float).reshape(len(fields), -1)
         result: Real = self.free @ strained
@@ -174,28 +182,40 @@ def anchor_rows(
     operator: HierarchicalOperator, nodes: Integer, pattern: Complex, functional: Complex
 ) -> HierarchicalOperator:
     """The operator with pattern (functional . u) added to the equations of a region's nodes (k,): see add_anchor."""
-    row = np.full(int(max(nodes.max(), operator.nodes.max())) + 1, -1)
-    row[operator.nodes] = np.arange(len(operator.nodes))
-    own = row[nodes] >= 0
+    _, row, own = np.intersect1d(operator.nodes, nodes, assume_unique=True, return_indices=True)
     added = Anchoring(
-        rows=_both(row[nodes[own]]), pattern=_split(pattern[own]), columns=_both(nodes), functional=_split(functional)
+        rows=_both(row), pattern=_split(pattern[own]), columns=_both(nodes), functional=_split(functional)
     )
     return replace(operator, anchorings=(*operator.anchorings, added))
 
 
+def take_off_rigid_motions(v: Real, rigid: Sequence[RigidMotions]) -> Real:
+    """v less the rigid motions of bodies that fit its displacements best."""
+    strained = v.copy()
+    for motions in rigid:
+        strained[motions.columns] -= (motions.basis @ v[motions.columns]) @ motions.basis
+    return strained
+
+
 def find_rigid_motions(mesh: Mesh, finite: Sequence[int], needed: Bool) -> tuple[RigidMotions, ...]:
     """Rigid motions of the finite regions (numbers) that have expansions and all of whose displacements are needed."""
-    counts, node_region, node_crack = np.bincount(mesh.region), mesh.node_region, mesh.node_crack
+    bounds = np.searchsorted(mesh.region, np.arange(mesh.region.max() + 2)) * (mesh.order + 1)
+    node_crack = mesh.node_crack
     made = []
     for region in finite:
-        if counts[region] <= SMALL_REGION:
+        first, last = bounds[region], bounds[region + 1]
+        if last - first <= SMALL_REGION * (mesh.order + 1):
             continue
-        nodes = np.flatnonzero((node_region == region) & ~node_crack)
+        nodes = first + np.flatnonzero(~node_crack[first:last])
         columns = _both(nodes)
         if needed[columns].all():
             place = mesh.position[nodes] - mesh.position[nodes].mean()
-            motions = np.stack([_split(np.ones_like(place)), _split(1j * np.ones_like(place)), _split(1j * place)])
-            made.append(RigidMotions(columns, np.ascontiguousarray(np.linalg.qr(motions.T)[0].T)))
+            motions = [_split(np.ones_like(place)), _split(1j * np.ones_like(place))]
+            elements = slice(first // (mesh.order + 1), last // (mesh.order + 1))
+            if mesh.order > 0 and not mesh.sweep[elements].any():
+                # On arcs, and by constants, a rotation is interpolated only: B of it is not zero.
+                motions.append(_split(1j * place))
+            made.append(RigidMotions(columns, np.ascontiguousarray(np.linalg.qr(np.stack(motions, axis=1))[0].T)))
     return tuple(made)
 
 
@@ -250,7 +270,7 @@ def _evaluate_leaf(
     chosen = parts.sources[region].select(elements - parts.first_element[region])
     material = parts.materials[region]
     bounded = bool((chosen.family == 0).any())
-    on = np.searchsorted(elements, mesh.node_element[nodes])
+    on = np.searchsorted(elements, parts.node_element[nodes])
     width = 2 * len(elements) * (mesh.order + 1)
     columns = list_columns(mesh, parts.list_nodes(elements), 2 * width if bounded else width)
     kept = needed[columns]
@@ -263,7 +283,7 @@ def _evaluate_leaf(
         own = nodes[at]
         where = (2 * at[:, None] + np.arange(2)).ravel()
         normal = mesh.normal[own] if traction else None
-        values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, mesh.node_local[own])
+        values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, parts.node_local[own])
         whole = np.concatenate([value for value in values if value is not None], axis=1)
         near[where] = whole[:, kept]
         far[where] = target_matrix(

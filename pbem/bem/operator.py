@@ -77,14 +77,16 @@ class RowOperator:
 def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
     """The elements of every region; lengths in the logarithm are divided by 8 times the region's extent."""
     sources = []
+    bounds = np.searchsorted(mesh.region, np.arange(len(materials) + 1))  # regions follow each other
+    family = mesh.family
     for region, material in enumerate(materials):
-        own = mesh.region == region
+        own = slice(bounds[region], bounds[region + 1])
         start, end = mesh.start[own], mesh.end[own]
         points = np.concatenate([start, end])
         extent = 2 * np.abs(points - points.mean()).max()  # the same however the model is turned
         sources.append(
             Sources(
-                start=start, end=end, center=mesh.center[own], sweep=mesh.sweep[own], family=mesh.family[own],
+                start=start, end=end, center=mesh.center[own], sweep=mesh.sweep[own], family=family[own],
                 local=mesh.local, crack_local=mesh.crack_local,
                 kappa=material.kappa, shear_modulus=material.shear_modulus, length=8 * extent,
             )

@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
-from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_columns, log_lengths
+from pbem.bem.hierarchical import (
+    RATIO,
+    HierarchicalOperator,
+    Sorted,
+    list_columns,
+    log_lengths,
+    take_off_rigid_motions,
+)
 from pbem.bem.interior import Values
 from pbem.bem.leaf import Medium, target_matrix
 from pbem.bem.location import Location
@@ -116,6 +123,7 @@ class TreeRows:
         self._mesh = operator.parts.mesh
         self._outside = location.region < 0
         self._inside = np.flatnonzero((location.region >= 0) & (location.element < 0))
+        self._rigid = operator.rigid
         nowhere = np.full(len(self._inside), -1)
         self._rows = place_points(
             operator.parts, operator.sources, points[self._inside], location.region[self._inside], nowhere,
@@ -133,5 +141,6 @@ class TreeRows:
         moved = np.where(self._outside, np.nan, 0.0) + 0j
         stress = np.where(self._outside, np.nan, 0.0)[:, None] * np.ones(3)
         moved[self._inside] = self._rows.displacement(v)
-        stress[self._inside] = self._rows.stress(v)
+        # The stress of what a body moves without strain would be the error of its expansions.
+        stress[self._inside] = self._rows.stress(take_off_rigid_motions(v, self._rigid))
         return Values(moved, stress)

@@ -74,6 +74,7 @@ Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1, lt=0.5
 HalfTurn = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90), _SHORT]
 FrictionAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=90), _SHORT]
 Power = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=10), _SHORT]
+ProductTolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-13, le=1e-2), _SHORT]
 Tolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=1), _SHORT]
 Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1), _SHORT]
 Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -268,7 +269,7 @@ class SolverTable(Table):
 
     linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
     operator: Literal["auto", "dense", "hierarchical"] = "auto"
-    tolerance: Tolerance = 1e-8
+    tolerance: ProductTolerance = 1e-8
     newton_tolerance: Tolerance = 1e-9
     newton_max_iterations: Count = 50
     min_step: Fraction = 1e-4

@@ -70,6 +70,11 @@ def describe_results(results: Results) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
+# Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by
+# scripts/extrapolate.py.
+KEPT_EVERYWHERE = 2300.0
+
+
 def _describe_region(region: Region, made: Collection[str]) -> str:
     """made: names of generated curves, which are told with their groups."""
     material = region.material
@@ -176,7 +181,8 @@ def _describe_size(model: Model, mesh: Mesh) -> list[str]:
     )
     if is_hierarchical(model, mesh):
         stored = _bytes(estimate_hierarchical_memory(model, mesh))
-        note = "its preconditioner and GMRES less than that"
+        everywhere = _bytes(KEPT_EVERYWHERE * 2 * mesh.nodes)
+        note = f"preconditioner and GMRES up to as much again; besides, on every rank {everywhere}"
         return [size, f"memory over all ranks: hierarchical operator {stored}, {note}"]
     operator, tangent = estimate_dense_memory(model, mesh)
     dense = "dense" if len(model.regions) == 1 else "sparse, by regions"

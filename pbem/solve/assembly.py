@@ -22,6 +22,7 @@ from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
 from pbem.contact.modes import Linearisation
+from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.support import find_free_motions
@@ -127,7 +128,10 @@ def place_nodes_on_cracks(operator: HierarchicalOperator, nodes: Integer) -> Poi
 def _reach_tolerance(
     comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: NDArray[np.bool_], nodes: Integer
 ) -> tuple[HierarchicalOperator, float]:
-    """The operator of the given nodes with enough terms for the tolerance, and its measured relative error."""
+    """The operator of the given nodes with enough terms for the tolerance, and its measured relative error.
+
+    Raises ConvergenceError if no number of terms is enough: "linear solver".
+    """
     tolerance = model.solver.tolerance
     materials = [region.material for region in model.regions]
     finite = [number for number, region in enumerate(model.regions) if not region.infinite]
@@ -143,8 +147,14 @@ def _reach_tolerance(
         sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
         operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite)
         error = measure_product_error(comm, operator, model.size)
-        if error <= tolerance or terms >= MOST_TERMS:
+        if error <= tolerance:
             return operator, error
+        if terms >= MOST_TERMS or not np.isfinite(error):
+            raise ConvergenceError(
+                "linear solver",
+                f"products of the hierarchical operator have a relative error of {error:.1e} (asked: solver.tolerance "
+                f'= {tolerance:g}); ask for less, or for operator = "dense"',
+            )
         terms = min(MOST_TERMS, max(terms + 2, choose_terms(tolerance**2 / error)))
 
 

@@ -26,6 +26,9 @@ NEIGHBOUR_UNKNOWNS = 100
 NEIGHBOUR_SHARE = 0.5
 TOUCHING_SHARE = 4.0
 MOST_NEIGHBOURS = 24
+# A group and those around it have so many unknowns at most, but for the groups that touch it: factors of more would
+# cost more than the iterations that they save.
+MOST_AROUND = 3000
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ def divide_model(mesh: Mesh) -> list[Integer]:
     most = np.full(len(mesh.curve_names), GROUP_ELEMENTS)
     forest = build_forest(mesh.start, mesh.end, bulge, mesh.curve, most)
     groups = [np.sort(forest.items(leaf)) for leaf in forest.leaves]
-    center = np.array([np.mean(0.5 * (mesh.start + mesh.end)[group]) for group in groups])
+    middle = 0.5 * (mesh.start + mesh.end)
+    center = np.array([middle[group].mean() for group in groups])
     nothing = np.zeros(len(groups), dtype=np.int64)
     order = build_forest(center, center, np.zeros(len(groups)), nothing, np.array([1])).order
     return [groups[k] for k in order]
@@ -84,7 +88,7 @@ def surround_groups(
         near = near[np.lexsort((near, gap))][:most]
         touching = np.array([bool(ends[number] & ends[k]) for k in near], dtype=bool)
         share = TOUCHING_SHARE if touching.any() else NEIGHBOUR_SHARE
-        room = widening * max(NEIGHBOUR_UNKNOWNS, share * size[number])
+        room = min(widening * max(NEIGHBOUR_UNKNOWNS, share * size[number]), MOST_AROUND - size[number])
         near = np.concatenate([near[touching], near[~touching]])
         taken = near[(np.cumsum(size[near]) <= room) | (np.arange(len(near)) < touching.sum())]
         around = np.sort(np.concatenate([groups[number], *(groups[k] for k in taken)]))
@@ -93,7 +97,8 @@ def surround_groups(
 
 
 def _enclose_groups(mesh: Mesh, groups: list[Integer]) -> tuple[Complex, Real]:
-    center = np.array([np.mean(0.5 * (mesh.start + mesh.end)[group]) for group in groups])
-    radius = np.array([np.abs(np.concatenate([mesh.start[group], mesh.end[group]]) - middle).max()
-                       for group, middle in zip(groups, center, strict=True)])
+    middle = 0.5 * (mesh.start + mesh.end)
+    center = np.array([middle[group].mean() for group in groups])
+    radius = np.array([np.abs(np.concatenate([mesh.start[group], mesh.end[group]]) - place).max()
+                       for group, place in zip(groups, center, strict=True)])
     return center, radius

@@ -26,7 +26,7 @@ MOST_ATTEMPTS = 4
 # After a system of more iterations than this the groups of the preconditioner take in more around them: each time
 # WIDENING times as much, up to MOST_WIDENING times.
 SLOW = 60
-WIDENING, MOST_WIDENING = 4, 64
+WIDENING, MOST_WIDENING = 4, 16
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
 
@@ -60,6 +60,14 @@ class KrylovTangent:
         inner.setPythonContext(_Preconditioning(self))
         with petsc_options(_choose_options()):
             solver.setFromOptions()
+        if inner.getType() not in ("python", "none"):
+            kind = inner.getType()
+            solver.destroy()
+            raise ConvergenceError(
+                "linear solver",
+                f"PETSc's preconditioner {kind!r} needs a stored matrix, which the hierarchical operator has not; "
+                'leave pc_type out, or ask for operator = "dense"',
+            )
         self._solver = solver
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
@@ -87,12 +95,12 @@ class KrylovTangent:
             v = constraints.evaluate(unknowns)
             residual = problem.measure(problem.apply(v, load)) / scale
             solved = residual <= tolerance
-            widened = self.iterations[-1] > SLOW and self._widen()
+            widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
             if solved:
                 self.solution = unknowns
                 return Solved(unknowns, v, residual, linear_iterations=count)
             # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
-            if not widened and (self.iterations[-1] == MOST_ITERATIONS or not residual < 0.1 * before):
+            if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or not residual < 0.1 * before):
                 break
             if widened:
                 self.preconditioner.update(constraints)

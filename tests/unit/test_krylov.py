@@ -135,6 +135,26 @@ def test_a_shift_of_a_body_leaves_its_tractions(many_groups: None, tmp_path: Pat
     np.testing.assert_allclose(shifted.traction, at_rest.traction, rtol=0, atol=1e-6 * np.abs(at_rest.traction).max())
 
 
+def test_a_shift_of_a_body_leaves_its_interior_stress(many_groups: None, tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    moved = CRACKS.replace("uy = 0.0", "uy = -100.0").replace("ux = 0.0", "ux = 100.0") + GRID
+    case.write_text(moved + "[solver]\nnewton_tolerance = 1e-11\n")
+    one, other = (pbem.run(case, tmp_path / f"{operator}.h5", operator=operator).interior  # type: ignore[arg-type]
+                  for operator in ("dense", "hierarchical"))  # fmt: skip
+    assert one is not None and other is not None
+    np.testing.assert_allclose(other.stress, one.stress, rtol=0, atol=1e-6 * np.abs(one.stress).max())
+
+
+def test_factors_of_the_hierarchical_operator_are_refused(tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(CRACKS + '[solver]\nlinear = "lu"\n')
+    with pytest.raises(pbem.CaseError, match="stores no matrix to factor"):
+        pbem.run(case, tmp_path / "run.h5", operator="hierarchical")
+    case.write_text(CRACKS)
+    with pytest.raises(pbem.ConvergenceError, match="'lu' needs a stored matrix"):
+        pbem.run(case, tmp_path / "run.h5", operator="hierarchical", petsc={"pc_type": "lu"})
+
+
 def test_a_run_is_resumed_with_either_operator(many_groups: None, tmp_path: Path) -> None:
     case = tmp_path / "case.toml"
     whole, begun = (tmp_path / name for name in ("whole.h5", "begun.h5"))

@@ -38,8 +38,10 @@ def evaluate_hoop_stress(
     normal = -1j * direction * np.where(np.arange(len(region)) < mesh.nodes, 1.0, -1.0)
     strain = (np.conj(direction) * stretch).real
     stress = np.empty(len(region))
+    order = np.argsort(region, kind="stable")
+    bounds = np.searchsorted(region[order], np.arange(len(initial) + 1))
     for number, background in enumerate(initial):
-        own = region == number
+        own = order[bounds[number] : bounds[number + 1]]
         n, e = normal[own], direction[own]
         at_rest = Background(background.material, initial=background.initial)
         rest_n = (np.conj(n) * at_rest.traction(position[own], n)).real

@@ -79,5 +79,9 @@ def _add_angles(mesh: Mesh, points: Complex, w: Complex, regions: int) -> Intege
     bulging = np.where(mesh.sweep > 0, w.imag < 0, w.imag > 0)
     between = (np.abs(points[:, None] - mesh.center) < np.abs(mesh.start - mesh.center)) & bulging & (mesh.sweep != 0)
     angle = np.where(mesh.crack, 0.0, angle + 2 * np.pi * np.where(between, np.sign(mesh.sweep), 0.0))
-    turns = np.stack([angle[:, mesh.region == k].sum(axis=1) for k in range(regions)], axis=1)
+    # Elements follow each other region by region; a region may have none.
+    first = np.searchsorted(mesh.region, np.arange(regions + 1))
+    there = np.flatnonzero(np.diff(first))
+    turns = np.zeros((len(points), regions))
+    turns[:, there] = np.add.reduceat(angle, first[there], axis=1)
     return np.rint(np.nan_to_num(turns) / (2 * np.pi)).astype(np.int64)

@@ -185,11 +185,13 @@ def _describe_size(model: Model, mesh: Mesh) -> list[str]:
         note = f"preconditioner and GMRES up to as much again; besides, on every rank {everywhere}"
         return [size, f"memory over all ranks: hierarchical operator {stored}, {note}"]
     operator, tangent = estimate_dense_memory(model, mesh)
-    dense = "dense" if len(model.regions) == 1 else "sparse, by regions"
+    kind, factors = (
+        ("dense", "factored in its place") if len(model.regions) == 1
+        else ("sparse, by regions", "and its factors once more or a few times that")
+    )
     return [
         size,
-        f"memory over all ranks: operator {_bytes(operator)}, tangent operator ({dense}) {_bytes(tangent)}, "
-        "and its factors once more or a few times that",
+        f"memory over all ranks: operator {_bytes(operator)}, tangent operator ({kind}) {_bytes(tangent)}, {factors}",
     ]
 
 

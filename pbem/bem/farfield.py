@@ -46,11 +46,6 @@ def prepare_shifts(forest: Forest, terms: int) -> Shifts:
     return Shifts(shift_matrices(offset, forest.radius, outer, terms), offset, outer)
 
 
-def _list_levels(forest: Forest) -> list[Integer]:
-    """Clusters of each level below the roots."""
-    return [np.flatnonzero(forest.level == depth) for depth in range(1, int(forest.level.max(initial=0)) + 1)]
-
-
 @dataclass(frozen=True)
 class SourceTree:
     """A forest of elements with the matrices of this rank's share of its leaves.
@@ -73,7 +68,7 @@ class SourceTree:
         own = forest.leaves
         flat[own] = self.add_up(flat[own])
         moments = flat.view(complex).reshape(forest.clusters, 2, self.terms + 1)
-        for clusters in reversed(_list_levels(forest)):
+        for clusters in reversed(forest.levels):
             moved = gather_from_children(
                 moments[clusters], self.shifts.matrix[clusters], self.shifts.offset[clusters],
                 forest.radius[clusters], self.shifts.outer[clusters],
@@ -111,7 +106,7 @@ class TargetTree:
             )  # fmt: skip
             reached, first = np.unique(target, return_index=True)
             fields[reached] += np.add.reduceat(carried, first, axis=0)
-        for clusters in _list_levels(forest):
+        for clusters in forest.levels:
             own = clusters[self.wanted[clusters]]
             fields[own] += pass_to_children(
                 fields[forest.parent[own]], self.shifts.matrix[own], self.shifts.offset[own], self.shifts.outer[own]
@@ -123,6 +118,6 @@ def mark_ancestors(forest: Forest, leaves: Sequence[int] | Integer) -> Bool:
     """The given leaves and all clusters that they are in (k,)."""
     wanted = np.zeros(forest.clusters, dtype=bool)
     wanted[leaves] = True
-    for clusters in reversed(_list_levels(forest)):
+    for clusters in reversed(forest.levels):
         wanted[forest.parent[clusters[wanted[clusters]]]] = True
     return wanted

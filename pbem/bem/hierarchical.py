@@ -20,6 +20,7 @@ from pbem.bem.operator import collect_free_terms, collect_sources, scale_equatio
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.bem.tree import Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 
 Real = NDArray[np.float64]
@@ -96,10 +97,6 @@ class Sorted:
         """Number of each region's first element."""
         return np.searchsorted(self.mesh.region, np.arange(len(self.materials)))
 
-    def list_nodes(self, elements: Integer) -> Integer:
-        per_element = self.mesh.order + 1
-        return (elements[:, None] * per_element + np.arange(per_element)).ravel()
-
 
 def choose_terms(tolerance: float) -> int:
     """Terms of the expansions for a relative error of products; the margin was measured."""
@@ -131,7 +128,7 @@ def prepare_sources(
         region = int(forest.region[leaf])
         chosen = parts.sources[region].select(elements - parts.first_element[region])
         matrix = source_matrix(chosen, forest.center[leaf], forest.radius[leaf], parts.terms)
-        columns = list_columns(mesh, parts.list_nodes(elements), matrix.shape[1])
+        columns = list_columns(mesh, list_nodes(mesh, elements), matrix.shape[1])
         kept = needed[columns]
         made.append(LeafSources(int(leaf), columns[kept], np.ascontiguousarray(matrix[:, kept])))
     return SourceTree(forest, parts.terms, tuple(made), prepare_shifts(forest, parts.terms), add_up)
@@ -139,7 +136,7 @@ def prepare_sources(
 
 def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
     """Entries of v of the nodes' displacements and, if the matrix is so wide, of their tractions."""
-    displacement = (2 * nodes[:, None] + np.arange(2)).ravel()
+    displacement = number_components(nodes)
     return displacement if width == len(displacement) else np.concatenate([displacement, 2 * mesh.nodes + displacement])
 
 
@@ -184,7 +181,10 @@ def anchor_rows(
     """The operator with pattern (functional . u) added to the equations of a region's nodes (k,): see add_anchor."""
     _, row, own = np.intersect1d(operator.nodes, nodes, assume_unique=True, return_indices=True)
     added = Anchoring(
-        rows=_both(row), pattern=_split(pattern[own]), columns=_both(nodes), functional=_split(functional)
+        rows=number_components(row),
+        pattern=split_components(pattern[own]),
+        columns=number_components(nodes),
+        functional=split_components(functional),
     )
     return replace(operator, anchorings=(*operator.anchorings, added))
 
@@ -207,24 +207,16 @@ def find_rigid_motions(mesh: Mesh, finite: Sequence[int], needed: Bool) -> tuple
         if last - first <= SMALL_REGION * (mesh.order + 1):
             continue
         nodes = first + np.flatnonzero(~node_crack[first:last])
-        columns = _both(nodes)
+        columns = number_components(nodes)
         if needed[columns].all():
             place = mesh.position[nodes] - mesh.position[nodes].mean()
-            motions = [_split(np.ones_like(place)), _split(1j * np.ones_like(place))]
+            motions = [split_components(np.ones_like(place)), split_components(1j * np.ones_like(place))]
             elements = slice(first // (mesh.order + 1), last // (mesh.order + 1))
             if mesh.order > 0 and not mesh.sweep[elements].any():
                 # On arcs, and by constants, a rotation is interpolated only: B of it is not zero.
-                motions.append(_split(1j * place))
+                motions.append(split_components(1j * place))
             made.append(RigidMotions(columns, np.ascontiguousarray(np.linalg.qr(np.stack(motions, axis=1))[0].T)))
     return tuple(made)
-
-
-def _both(nodes: Integer) -> Integer:
-    return (2 * nodes[:, None] + np.arange(2)).ravel()
-
-
-def _split(value: Complex) -> Real:
-    return np.stack([value.real, value.imag], axis=1).ravel()
 
 
 def assemble_hierarchical(
@@ -237,7 +229,7 @@ def assemble_hierarchical(
     mesh, forest, terms = parts.mesh, parts.forest, parts.terms
     row_of_node = np.full(mesh.nodes, -1)
     row_of_node[nodes] = np.arange(len(nodes))
-    owned = [leaf for leaf in forest.leaves if (row_of_node[parts.list_nodes(forest.items(leaf))] >= 0).any()]
+    owned = [leaf for leaf in forest.leaves if (row_of_node[list_nodes(mesh, forest.items(leaf))] >= 0).any()]
     wanted = mark_ancestors(forest, owned)
     met = find_interactions(forest, forest, RATIO, wanted)
     targets = TargetTree(
@@ -247,14 +239,14 @@ def assemble_hierarchical(
     begin, end = np.searchsorted(met.near_target, owned), np.searchsorted(met.near_target, owned, side="right")
     leaves = []
     for leaf, low, high in zip(owned, begin, end, strict=True):
-        at = parts.list_nodes(forest.items(leaf))
+        at = list_nodes(mesh, forest.items(leaf))
         at = at[row_of_node[at] >= 0]
         elements = np.sort(np.concatenate([forest.items(source) for source in met.near_source[low:high]]))
         columns, near, far = _evaluate_leaf(parts, int(leaf), at, elements, needed)
         factor = -np.repeat(scale[at], 2)[:, None]
         near *= factor
         far *= factor
-        rows = (2 * row_of_node[at][:, None] + np.arange(2)).ravel()
+        rows = number_components(row_of_node[at])
         leaves.append(LeafRows(int(leaf), rows, columns, near, far))
     free = collect_free_terms(mesh, nodes, scale)
     rigid = find_rigid_motions(mesh, finite, needed)
@@ -272,7 +264,7 @@ def _evaluate_leaf(
     bounded = bool((chosen.family == 0).any())
     on = np.searchsorted(elements, parts.node_element[nodes])
     width = 2 * len(elements) * (mesh.order + 1)
-    columns = list_columns(mesh, parts.list_nodes(elements), 2 * width if bounded else width)
+    columns = list_columns(mesh, list_nodes(mesh, elements), 2 * width if bounded else width)
     kept = needed[columns]
     near = np.empty((2 * len(nodes), int(kept.sum())))
     far = np.empty((2 * len(nodes), 4 * (parts.terms + 1)))
@@ -281,7 +273,7 @@ def _evaluate_leaf(
         if len(at) == 0:
             continue
         own = nodes[at]
-        where = (2 * at[:, None] + np.arange(2)).ravel()
+        where = number_components(at)
         normal = mesh.normal[own] if traction else None
         values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, parts.node_local[own])
         whole = np.concatenate([value for value in values if value is not None], axis=1)

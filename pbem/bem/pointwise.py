@@ -21,6 +21,7 @@ from pbem.bem.leaf import Medium, target_matrix
 from pbem.bem.location import Location
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.tree import Interactions, build_forest, find_interactions
+from pbem.mesh.numbering import list_nodes, split_components
 
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
@@ -83,7 +84,7 @@ class PointRows:
         normals = None if normal is None else np.full(len(chosen), normal, dtype=complex)
         values = evaluate_rows(sources, self.point[chosen], on, normals, bounded, self.local[chosen])
         whole = [value for value in values if value is not None]
-        columns = list_columns(parts.mesh, parts.list_nodes(elements), sum(value.shape[1] for value in whole))
+        columns = list_columns(parts.mesh, list_nodes(parts.mesh, elements), sum(value.shape[1] for value in whole))
         width = whole[0].shape[1]
         total: Real = whole[0] @ v[columns[:width]]
         return total if len(whole) == 1 else total + whole[1] @ v[columns[width:]]
@@ -136,8 +137,7 @@ class TreeRows:
         Zero at points on the boundary, NaN outside. All ranks call this together.
         """
         traction = np.where(self._mesh.node_crack, 0.0, traction)  # on a crack those of both faces cancel
-        field = np.concatenate([displacement, traction])
-        v = np.stack([field.real, field.imag], axis=1).ravel()
+        v = split_components(np.concatenate([displacement, traction]))
         moved = np.where(self._outside, np.nan, 0.0) + 0j
         stress = np.where(self._outside, np.nan, 0.0)[:, None] * np.ones(3)
         moved[self._inside] = self._rows.displacement(v)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -38,7 +39,13 @@ class Forest:
     def clusters(self) -> int:
         return len(self.first)
 
-    @property
+    @cached_property
+    def levels(self) -> tuple[Integer, ...]:
+        """Clusters of each level below the roots."""
+        deepest = int(self.level.max(initial=0))
+        return tuple(np.flatnonzero(self.level == depth) for depth in range(1, deepest + 1))
+
+    @cached_property
     def leaves(self) -> Integer:
         """Numbers of the clusters without children, in the order of their items."""
         leaves = np.flatnonzero(self.children == 0)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.operator import scale_equations
 from pbem.bem.rows import evaluate_rows
+from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.parallel import add_up
 
 Real = NDArray[np.float64]
@@ -40,7 +41,7 @@ def measure_equations(
     exact = np.zeros(2 * len(own))
     for k, number in enumerate(own):
         exact[2 * k : 2 * k + 2] = _evaluate_exactly(operator, int(operator.nodes[number]), v, length)
-    rows = (2 * own[:, None] + np.arange(2)).ravel()
+    rows = number_components(own)
     exact += operator.free[rows] @ v
     for anchoring in operator.anchorings:
         added = np.zeros(operator.rows)
@@ -65,7 +66,7 @@ def _make_test_vectors(operator: HierarchicalOperator, length: float) -> tuple[R
     traction = np.where(mesh.node_crack, 0, modulus * mesh.normal)
     coherent = np.concatenate([displacement, traction])
     random[2 * mesh.nodes :] *= np.repeat(modulus, 2)
-    return operator.keep_needed(random), operator.keep_needed(np.stack([coherent.real, coherent.imag], axis=1).ravel())
+    return operator.keep_needed(random), operator.keep_needed(split_components(coherent))
 
 
 def _evaluate_exactly(operator: HierarchicalOperator, node: int, v: Real, length: float) -> Real:
@@ -73,13 +74,13 @@ def _evaluate_exactly(operator: HierarchicalOperator, node: int, v: Real, length
     parts, mesh = operator.parts, operator.parts.mesh
     region = int(mesh.node_region[node])
     sources, first = parts.sources[region], int(parts.first_element[region])
-    nodes = parts.list_nodes(first + np.arange(sources.count))
+    nodes = list_nodes(mesh, first + np.arange(sources.count))
     normal = mesh.normal[[node]] if mesh.traction_equation[node] else None
     bounded = bool((sources.family == 0).any())
     on = np.array([mesh.node_element[node] - first])
     total = np.zeros(2)
     step = max(1, MOST_ENTRIES // (8 * (mesh.order + 1)))
-    columns = (2 * nodes[:, None] + np.arange(2)).ravel()
+    columns = number_components(nodes)
     for begin in range(0, sources.count, step):
         chosen = np.arange(begin, min(begin + step, sources.count))
         inside = np.where((on >= begin) & (on < begin + step), on - begin, -1)

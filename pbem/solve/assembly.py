@@ -24,11 +24,12 @@ from pbem.contact.loads import Load, OuterNodes, collect_outer_nodes, evaluate_l
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes
 from pbem.model.model import Model
 from pbem.model.support import find_free_motions
 from pbem.parallel import add_up, share_nodes
 from pbem.solve.accuracy import measure_product_error
-from pbem.solve.groups import divide_model, list_nodes, share_groups, surround_groups
+from pbem.solve.groups import divide_model, share_groups, surround_groups
 from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]
@@ -58,11 +59,8 @@ def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     operator = assemble_rows(mesh, materials, first, last, needed, model.size)
     for anchor in anchors:
         add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
-    crack_nodes = np.flatnonzero(mesh.node_crack)
-    shares = np.linspace(0, len(crack_nodes), comm.size + 1).astype(int)
-    own_cracks = crack_nodes[shares[comm.rank] : shares[comm.rank + 1]]
+    own_cracks = _share_equally(np.flatnonzero(mesh.node_crack), comm)
     unknowns = find_unknowns_of_regions(mesh, outer, evaluate_load(model, mesh, outer, 0, 1.0))
-    modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
     return Problem(
         comm=comm,
         model=model,
@@ -72,7 +70,7 @@ def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
         operator=operator,
         crack_rows=tuple(assemble_displacement_rows(mesh, materials, own_cracks, needed)),
         crack_nodes=own_cracks,
-        traction_scale=modulus / model.size,
+        traction_scale=_scale_tractions(model),
         equation_scale=scale_equations(mesh, materials, model.size),
         anchors=anchors,
         block_columns=tuple(unknowns[block.region] for block in operator.blocks),
@@ -91,11 +89,8 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
     anchors = anchor_motions(mesh, find_free_motions(model))
     for anchor in anchors:
         operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
-    cracks = np.flatnonzero(mesh.node_crack)
-    shares = np.linspace(0, len(cracks), comm.size + 1).astype(int)
-    own_cracks = cracks[shares[comm.rank] : shares[comm.rank + 1]]
-    points = place_nodes_on_cracks(operator, own_cracks) if len(cracks) else None
-    modulus = float(np.exp(np.mean([np.log(material.shear_modulus) for material in materials])))
+    own_cracks = _share_equally(np.flatnonzero(mesh.node_crack), comm)
+    points = place_nodes_on_cracks(operator, own_cracks) if mesh.crack.any() else None
     return Problem(
         comm=comm,
         model=model,
@@ -105,7 +100,7 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
         operator=operator,
         crack_rows=(),
         crack_nodes=own_cracks,
-        traction_scale=modulus / model.size,
+        traction_scale=_scale_tractions(model),
         equation_scale=scale_equations(mesh, materials, model.size),
         block_columns=(),
         anchors=anchors,
@@ -114,6 +109,18 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
         widen_groups=lambda widening: surround_groups(mesh, groups, first, last, widening),
         notes=(_describe_operator(operator, len(groups), model.solver.tolerance, error),),
     )
+
+
+def _share_equally(numbers: Integer, comm: MPI.Intracomm) -> Integer:
+    """This rank's part of numbers (k,), all parts of the same size but for one."""
+    cuts = np.linspace(0, len(numbers), comm.size + 1).astype(int)
+    return numbers[cuts[comm.rank] : cuts[comm.rank + 1]]
+
+
+def _scale_tractions(model: Model) -> float:
+    """Modulus/length: the geometric mean of the regions' shear moduli over the model's size."""
+    logarithms = [np.log(region.material.shear_modulus) for region in model.regions]
+    return float(np.exp(np.mean(logarithms))) / model.size
 
 
 def place_nodes_on_cracks(operator: HierarchicalOperator, nodes: Integer) -> PointRows:
@@ -141,9 +148,7 @@ def _reach_tolerance(
     terms = choose_terms(tolerance)
     while True:
         parts = sort_elements(mesh, materials, terms)
-        leaves = parts.forest.leaves
-        cuts = np.linspace(0, len(leaves), comm.size + 1).astype(int)
-        own = leaves[cuts[comm.rank] : cuts[comm.rank + 1]]
+        own = _share_equally(parts.forest.leaves, comm)
         sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
         operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite)
         error = measure_product_error(comm, operator, model.size)

@@ -63,12 +63,6 @@ def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tu
     return int(bounds[rank]), int(bounds[rank + 1])
 
 
-def list_nodes(mesh: Mesh, elements: Integer) -> Integer:
-    """The nodes of elements (k,), in their order."""
-    per_element = mesh.order + 1
-    return (elements[:, None] * per_element + np.arange(per_element)).ravel()
-
-
 def surround_groups(
     mesh: Mesh, groups: list[Integer], first: int, last: int, widening: int = 1
 ) -> tuple[Group, ...]:

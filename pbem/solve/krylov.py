@@ -10,6 +10,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
+from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.choice import make_dense_tangent
 from pbem.solve.linear import PREFIX, PETSc, petsc_options
@@ -105,10 +106,12 @@ class KrylovTangent:
             if widened:
                 self.preconditioner.update(constraints)
                 self._solver.getPC().setUp()
+        singular = int(add_up(problem.comm, np.array([float(self.preconditioner.singular)]))[0])
+        loose = f"; {singular} groups of elements are held by nothing near to them" if singular else ""
         raise ConvergenceError(
             "linear solver",
-            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}); try "
-            'operator = "dense"',
+            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"
+            '; try operator = "dense"',
         )
 
     def _widen(self) -> bool:
@@ -205,4 +208,4 @@ def _find_order(problem: Problem) -> NDArray[np.int64]:
     """Unknowns of all ranks, one rank after the other."""
     own = problem.operator.nodes.astype(float)
     nodes = gather_parts(problem.comm, own).astype(np.int64)
-    return (2 * nodes[:, None] + np.arange(2)).ravel()
+    return number_components(nodes)

@@ -20,8 +20,9 @@ from pbem.bem.rows import Sources, evaluate_rows
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
-from pbem.solve.groups import Group, list_nodes
+from pbem.solve.groups import Group
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -57,6 +58,7 @@ class SchwarzPreconditioner:
         # The mesh makes these anew at every call, for all nodes.
         self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
         self._formed: sparse.csr_matrix | None = None
+        self.singular = 0  # groups without an inverse, of those formed last
         self.inverses = [self._place(group) for group in groups]
 
     def regroup(self, groups: Sequence[Group]) -> None:
@@ -67,7 +69,7 @@ class SchwarzPreconditioner:
     def _place(self, group: Group) -> LocalInverse:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
         around = list_nodes(self._mesh, group.around)
-        return LocalInverse(group, _both(at), _both(around))
+        return LocalInverse(group, number_components(at), number_components(around))
 
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
@@ -76,7 +78,7 @@ class SchwarzPreconditioner:
         self._formed = matrix
         by_column = matrix.tocsc()
         free = (self._free @ matrix).tocsr()
-        count = 0
+        count, self.singular = 0, 0
         for inverse in self.inverses:
             if inverse.matrix is None or changed[inverse.around].any():
                 inverse.matrix = self._invert(inverse, by_column, free)
@@ -92,7 +94,7 @@ class SchwarzPreconditioner:
     def _invert(self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix) -> Real:
         around = inverse.around
         local = self._form(inverse.group.around, around, constraints, free)
-        wanted = np.flatnonzero(np.isin(around, _both(list_nodes(self._mesh, inverse.group.elements))))
+        wanted = np.flatnonzero(np.isin(around, number_components(list_nodes(self._mesh, inverse.group.elements))))
         unit = np.zeros((len(around), len(wanted)))
         unit[wanted, np.arange(len(wanted))] = 1.0
         factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(local), overwrite_a=True)
@@ -101,6 +103,7 @@ class SchwarzPreconditioner:
             if np.isfinite(rows).all():
                 return np.ascontiguousarray(rows)
         # A group that nothing holds without the rest of the model: its residual serves as it is.
+        self.singular += 1
         return np.ascontiguousarray(unit.T)
 
     def _form(
@@ -123,7 +126,7 @@ class SchwarzPreconditioner:
             place, known = _find_places(columns, row)
             entries = (value[known], (place[known], column[known]))
             chosen = sparse.csr_matrix(entries, shape=(len(columns), len(around)))
-            local[_both(own)] += (chosen.T @ values.T).T
+            local[number_components(own)] += (chosen.T @ values.T).T
         return local
 
     def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
@@ -133,7 +136,7 @@ class SchwarzPreconditioner:
         bounded = bool((sources.family == 0).any())
         on = np.searchsorted(elements, self._node_element[nodes])
         seen = list_nodes(mesh, elements)
-        columns = _both(seen)
+        columns = number_components(seen)
         if bounded:
             columns = np.concatenate([columns, 2 * mesh.nodes + columns])
         values = np.empty((2 * len(nodes), len(columns)))
@@ -143,7 +146,7 @@ class SchwarzPreconditioner:
                 own = nodes[at]
                 normal = mesh.normal[own] if traction else None
                 parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
-                values[_both(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
+                values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
         values *= -np.repeat(self._scale[nodes], 2)[:, None]
         for anchor in self._anchors:
             if anchor.region == region:
@@ -155,7 +158,8 @@ class SchwarzPreconditioner:
         """Add an anchor's part in the equations of nodes and the displacements of those seen."""
         at, pattern = _look_up(anchor.nodes, anchor.pattern, nodes)
         on, functional = _look_up(anchor.nodes, anchor.functional, seen)
-        values[np.ix_(_both(at), _both(on))] += np.outer(_split(pattern), _split(functional))
+        where = np.ix_(number_components(at), number_components(on))
+        values[where] += np.outer(split_components(pattern), split_components(functional))
 
 
 def _look_up(
@@ -182,15 +186,6 @@ def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
     """Where numbers are in a sorted list, and whether they are."""
     place = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
     return place, known[place] == numbers
-
-
-def _both(nodes: Integer) -> Integer:
-    """Numbers of both components of nodes."""
-    return (2 * nodes[:, None] + np.arange(2)).ravel()
-
-
-def _split(value: NDArray[np.complex128]) -> Real:
-    return np.stack([value.real, value.imag], axis=1).ravel()
 
 
 def _find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:

@@ -15,6 +15,8 @@ class Leg:
 
     A circular leg has its `center` and the signed angle `sweep` (radians, counter-clockwise positive) it runs
     through. Element ends lie at t^power from every refined end (t uniform); with no refined end they are uniform.
+    Where `fractions` (elements + 1, rising from 0 to 1) is given, the element ends lie at these fractions of the
+    length instead.
     """
 
     start: complex
@@ -25,6 +27,7 @@ class Leg:
     power: float = 3.0
     center: complex | None = None
     sweep: float = 0.0
+    fractions: tuple[float, ...] | None = None
 
     @property
     def length(self) -> float:
@@ -52,17 +55,20 @@ class Leg:
         return replace(
             self, start=self.end, end=self.start, sweep=-self.sweep,
             refine_start=self.refine_end, refine_end=self.refine_start,
+            fractions=None if self.fractions is None else tuple(1.0 - t for t in reversed(self.fractions)),
         )
 
     def split(self, t: float, elements: tuple[int, int]) -> tuple[Leg, Leg]:
         """Two legs that meet at the fraction t, with the given numbers of elements and no refined ends at t."""
-        middle = complex(self.point(np.array(t)))
-        first = replace(self, end=middle, elements=elements[0], sweep=self.sweep * t, refine_end=False)
-        second = replace(self, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False)
+        middle, whole = complex(self.point(np.array(t))), replace(self, fractions=None)
+        first = replace(whole, end=middle, elements=elements[0], sweep=self.sweep * t, refine_end=False)
+        second = replace(whole, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False)
         return first, second
 
     def element_fractions(self) -> NDArray[np.float64]:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
+        if self.fractions is not None:
+            return np.array(self.fractions)
         t = np.linspace(0.0, 1.0, self.elements + 1)
         if self.refine_start and self.refine_end:
             t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)

@@ -39,8 +39,8 @@ def describe_unsettled(
         return ConvergenceError(
             reason,
             f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these "
-            f"{len(group)}: {_name(problem, group)}; {lost} lost at once where faces part, and there again where they meet: "
-            "cohesion_lost = true makes that loss last",
+            f"{len(group)}: {_name(problem, group)}; {lost} lost at once where faces part, and back "
+            "where they meet: cohesion_lost = true makes that loss last",
         )
     names = problem.mesh.interface_names
     numbers, counts = np.unique(problem.mesh.pairs.interface[proposal.changed], return_counts=True)

@@ -1,0 +1,127 @@
+"""Balance of the forces on every region: what the collocated equations fulfil only as well as the mesh is fine.
+
+The elastic part of a region's tractions - all but those of the fields that stand for weight and in-situ stress - has no
+resultant and no moment. What is left over is a measure of the error; and it is what anchors carry where bodies would
+move freely.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.hierarchical import HierarchicalOperator
+from pbem.contact.loads import Load
+from pbem.contact.support import Support
+from pbem.errors import ConvergenceError
+from pbem.model.support import FreeMotion
+from pbem.solve.problem import Problem
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
+# anchors hold it, and that make a result wrong.
+NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
+# Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
+ROUNDING, FAINT = 1e-9, 1e-6
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What is left over on r regions.
+
+    resultant (r, 3): force along x and y (stress times length) and moment about the region's centre, the mean of its
+    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; 0 for infinite
+    regions, which may carry a resultant. carried (r,): as relative, of what the acting anchors carry; 0 without any.
+    """
+
+    resultant: Real
+    relative: Real
+    carried: Real
+
+
+def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
+    """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted."""
+    mesh, count = problem.mesh, len(problem.mesh.region_names)
+    of, weight = mesh.node_region, np.where(mesh.node_crack, 0.0, mesh.weight)
+
+    def add(values: Real) -> Real:
+        return np.bincount(of, weight * values, count).astype(float)
+
+    def add_vectors(values: Complex) -> Complex:
+        return add(values.real) + 1j * add(values.imag)
+
+    length = add(np.ones(mesh.nodes))
+    # About a node of the region first, as coordinates can be large.
+    start = mesh.position[np.searchsorted(of, np.arange(count))]
+    middle = start + add_vectors(mesh.position - start[of]) / length
+    lever = mesh.position - middle[of]
+    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    elastic = whole - known
+    force, moment = add_vectors(elastic), add((np.conj(lever) * elastic).imag)
+    least = _find_least_traction(problem, v, np.abs(whole[weight > 0]).max(initial=0.0))
+    forces = np.maximum(add(np.abs(whole)), least * length) + np.abs(add_vectors(known))
+    moments = np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever))) + np.abs(
+        add((np.conj(lever) * known).imag)
+    )
+    finite = np.array([not region.infinite for region in problem.model.regions])
+    relative = np.where(finite, np.maximum(_divide(np.abs(force), forces), _divide(np.abs(moment), moments)), 0.0)
+    carried = np.zeros(count)
+    if support.acting.shape[1]:
+        for motion in support.motions:
+            own, part = _measure_power(problem, motion, middle, (force, moment), (forces, moments))
+            carried[own] = np.maximum(carried[own], part)
+    return Balance(np.stack([force.real, force.imag, moment], axis=1), relative, carried)
+
+
+def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
+    """Tractions that are smaller are taken to be as large as this."""
+    rounding = ROUNDING
+    if isinstance(problem.operator, HierarchicalOperator):
+        rounding = max(rounding, problem.model.solver.tolerance)
+    moved = float(np.abs(v[: 2 * problem.mesh.nodes]).max(initial=0.0))
+    return max(FAINT * largest, rounding * problem.traction_scale * moved)
+
+
+def _measure_power(
+    problem: Problem, motion: FreeMotion, middle: Complex, left: tuple[Complex, Real], whole: tuple[Real, Real]
+) -> tuple[list[int], float]:
+    """The regions of a motion, and the power of what is left over on them, to that of all forces without signs."""
+    numbers = {name: number for number, name in enumerate(problem.mesh.region_names)}
+    power, scale = 0.0, 0.0
+    for name, (shift, spin) in motion.velocities.items():
+        at = numbers[name]
+        velocity = shift + 1j * spin * middle[at]
+        power += float((np.conj(left[0][at]) * velocity).real + left[1][at] * spin)
+        scale += float(whole[0][at] * abs(velocity) + whole[1][at] * abs(spin))
+    return [numbers[name] for name in motion.velocities], abs(power) / scale if scale > 0 else 0.0
+
+
+def _divide(part: Real, whole: Real) -> Real:
+    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
+
+
+def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
+    """What is left over where it is worth a note, the worst region first; None if all regions are in balance.
+
+    Raises ConvergenceError ("not in balance") where it makes the result wrong.
+    """
+    worst = int(np.argmax(balance.relative))
+    amount = float(balance.relative[worst])
+    if amount <= NOTED:
+        return None
+    name = problem.mesh.region_names[worst]
+    x, y, moment = balance.resultant[worst]
+    left = (
+        f"the forces on region '{name}' do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
+        f"{100 * amount:.2g} % of their sum without signs"
+    )
+    held = float(balance.carried[worst])
+    if held > NOTED:
+        left += ", which nothing but the condition on its mean motion carries"
+    if amount > NOT_IN_BALANCE:
+        raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
+    return left

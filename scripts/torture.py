@@ -2,7 +2,7 @@
 """Runs seeded models of contact of all kinds, checks what every run has to obey, and prints a table by kind.
 
     .venv/bin/python scripts/torture.py [--count 1000] [--first 0] [--kinds tree,masonry] [--units 1] [--ranks 1,2,3]
-    .venv/bin/python scripts/torture.py --save SEED FILE.toml [--variant K]    writes the case of a seed, to run it by hand
+    .venv/bin/python scripts/torture.py --save SEED FILE.toml [--variant K]    writes the case of a seed
 
 Models: fields and trees of cracks, cracks from edges and through plates, tight and loose inclusions, pins in holes,
 masonry, wedges, blocks on slopes, stacks; with friction from 0 to 1.2, cohesion, tensile strength, weakening, brittle
@@ -10,9 +10,10 @@ bonds, elastic joints, loads to and fro, lengths from 1e-6 to 1e7 and stresses f
 
 Columns: models; settled; named: ended with a reason that is one of the model's, told apart below the table by whether
 bodies taken to be rigid have no balance ("true"), none without the strength that slip takes ("weakened"), one of them
-carries no load ("loose"), or neither ("unproved"); failed: ended otherwise; faulty: settled against the conditions; iterations of a step: median, 90 %, most; steps halved; largest
-violation of the contact conditions (of the largest traction or jump), of the balance of a body (of the forces on it) and
-of the sign of energies; equal runs in other units and on other ranks. Exit code 1 if anything failed.
+carries no load ("loose"), or neither ("unproved"); failed: ended otherwise; faulty: settled against the conditions;
+iterations of a step: median, 90 %, most; steps halved; largest violation of the contact conditions (of the largest
+traction or jump), of the balance of a body (of the forces on it) and of the sign of energies; equal runs in other units
+and on other ranks. Exit code 1 if anything failed.
 """
 
 from __future__ import annotations
@@ -196,7 +197,8 @@ def main() -> int:
         return 0
     seeds = range(options.first, options.first + options.count)
     ranks = sorted({1, *map(int, options.ranks.split(","))})
-    tasks = {count: [(seed, 0) for seed in seeds if count == 1 or seed // len(kinds) % options.share == 0] for count in ranks}
+    shared = [seed for seed in seeds if seed // len(kinds) % options.share == 0]
+    tasks = {count: [(seed, 0) for seed in (seeds if count == 1 else shared)] for count in ranks}
     tasks[1] += [(seed, variant) for seed in seeds for variant in range(1, options.units + 1)]
     records = run_all(tasks, kinds, options.jobs, options.timeout)
     if options.records:

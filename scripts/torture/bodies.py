@@ -38,7 +38,8 @@ def _add_wall(
     draft: Draft, breaks: list[list[float]], height: float, elements: int
 ) -> tuple[list[str], list[str], list[list[str]]]:
     """Joints, curves of the top, and the boundary of each block."""
-    joints, top = [], []
+    joints: list[str] = []
+    top: list[str] = []
     levels: list[dict[str, tuple[float, float]]] = []
     rows = len(breaks)
     for level in range(rows + 1):
@@ -200,7 +201,8 @@ def _add_stack(
             boundary += [f"ledge{number}", f"seat{number + 1}", f"shelf{number}"]
         else:
             floor = f"floor{number + 1}"
-            boundary.append(draft.add_line(floor, complex(right, high), complex(left, high), elements=rng.randint(8, 16)))
+            draft.add_line(floor, complex(right, high), complex(left, high), elements=rng.randint(8, 16))
+            boundary.append(floor)
         draft.regions[f"block{number}"] = {"material": material, "boundary": boundary}
         level = high
 

@@ -32,7 +32,9 @@ def measure_scales(results: Results, tables: Tables) -> Scales:
     """The scales of a run, by which violations are divided."""
     far = [abs(value) for table in (tables, *tables.get("stages", ())) for value in table.get("remote", {}).values()]
     stress = max(float(np.abs(results.traction).max(initial=0.0)), *far, 0.0)
-    jumps = [np.abs(values).max(initial=0.0) for each in results.contact.values() for values in (each.opening, each.slip)]
+    jumps = [
+        np.abs(values).max(initial=0.0) for each in results.contact.values() for values in (each.opening, each.slip)
+    ]
     vertices = results.elements.vertices.reshape(-1, 2)
     size = float(np.ptp(vertices, axis=0).max())
     hardest = max(material["young"] for material in tables["materials"].values())
@@ -60,7 +62,9 @@ def measure_contact(results: Results, tables: Tables, scales: Scales) -> dict[st
     return worst
 
 
-def _measure_pairs(contact: Any, law: Tables, broken: NDArray[np.bool_], pressure: Real) -> dict[str, tuple[float, bool]]:
+def _measure_pairs(
+    contact: Any, law: Tables, broken: NDArray[np.bool_], pressure: Real
+) -> dict[str, tuple[float, bool]]:
     """Largest violations at the pairs of one curve, and whether they are lengths (or stresses)."""
     mode, p_n, p_s = contact.mode, contact.traction_n, contact.traction_s
     stick, slips, is_open = (mode == kind for kind in (STICK, SLIP, OPEN))
@@ -149,7 +153,8 @@ def _weigh_nodes(results: Results, position: Complex) -> Real:
 def measure_energy(results: Results) -> float:
     """How much dissipation is taken back, or elastic energy negative, relative to the largest energy."""
     energy = results.energy
-    scale = max(float(np.abs(values).max(initial=0.0)) for values in (energy.external, energy.elastic, energy.dissipated))
+    kinds = (energy.external, energy.elastic, energy.dissipated)
+    scale = max(float(np.abs(values).max(initial=0.0)) for values in kinds)
     taken = max(0.0, -float(np.diff(energy.dissipated, prepend=0.0).min(initial=0.0)))
     negative = max(0.0, -float(energy.elastic.min(initial=0.0)))
     return max(taken, negative) / scale if scale > 0 else 0.0

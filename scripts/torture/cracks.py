@@ -6,6 +6,7 @@ import cmath
 import math
 import random
 from collections.abc import Sequence
+from itertools import pairwise
 
 from .draft import Draft, draw_laws, draw_log
 from .planes import add_plate, load_plate, load_remote, press_and_shear, start_plane
@@ -117,7 +118,8 @@ def _add_field(
         points = [center - half * direction, center + half * direction]
         if rng.random() < 0.2:
             points.insert(1, center + 1j * half * direction * rng.uniform(-0.6, 0.6))
-        inside = all(max(abs(z.real), abs(z.imag)) <= 0.5 * side for z in points) or not draft.regions["body"]["boundary"]
+        reach = max(max(abs(z.real), abs(z.imag)) for z in points)
+        inside = reach <= 0.5 * side or not draft.regions["body"]["boundary"]
         if inside and all(_is_clear(points, other, clearance) for other in found):
             found.append(points)
         if len(found) == count:
@@ -135,7 +137,7 @@ def _count_elements(rng: random.Random, length: float) -> int:
 
 
 def _steps(points: Sequence[complex]) -> list[complex]:
-    return [b - a for a, b in zip(points[:-1], points[1:], strict=True)]
+    return [b - a for a, b in pairwise(points)]
 
 
 def measure_distance(first: Segment, second: Segment) -> float:
@@ -162,8 +164,8 @@ def _cross(first: Segment, second: Segment) -> bool:
 def _is_clear(points: Sequence[complex], other: Sequence[complex], clearance: float) -> bool:
     return all(
         measure_distance((a, b), (c, d)) >= clearance
-        for a, b in zip(points[:-1], points[1:], strict=True)
-        for c, d in zip(other[:-1], other[1:], strict=True)
+        for a, b in pairwise(points)
+        for c, d in pairwise(other)
     )
 
 

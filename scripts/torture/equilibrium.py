@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -160,7 +161,7 @@ def list_legs(tables: Tables, curve: str, body: str) -> list[tuple[complex, comp
         points = [complex(z) for z in complex(*table["center"]) + table["radius"] * turns]
     else:
         points = [complex(*point) for point in table["points"]]
-    legs = list(zip(points[:-1], points[1:], strict=True))
+    legs = list(pairwise(points))
     middle, along = 0.5 * (legs[0][0] + legs[0][1]), legs[0][1] - legs[0][0]
     if _is_inside(tables, body, middle + 1e-4j * along):
         return legs
@@ -176,7 +177,7 @@ def _is_inside(tables: Tables, body: str, point: complex) -> bool:
             crossings += abs(point - complex(*table["center"])) < table["radius"]
             continue
         points = [complex(*each) - point for each in table["points"]]
-        for start, end in zip(points[:-1], points[1:], strict=True):
+        for start, end in pairwise(points):
             if (start.imag > 0) != (end.imag > 0):
                 crossings += start.real - start.imag * (end - start).real / (end - start).imag > 0
     return (crossings % 2 == 1) != bool(tables["regions"][body].get("infinite"))

@@ -8,6 +8,7 @@ import random
 
 from .draft import Draft, draw_log, draw_material, local
 
+
 def start_plane(rng: random.Random, title: str) -> tuple[Draft, float]:
     """A draft with one material and one infinite region without cracks, and the strain of its loads."""
     draft = Draft(title)
@@ -38,7 +39,7 @@ def load_remote(draft: Draft, rng: random.Random, strain: float) -> None:
         draft.remote = stress(first, second, turn)
         draft.analysis["steps"] = rng.choice((1, 1, 2, 4))
         return
-    ways = [(first, second, turn)]
+    ways: list[tuple[float, float, complex]] = [(first, second, turn)]
     for _ in range(rng.randint(1, 2)):
         factor = rng.uniform(-0.4, 1.2)
         ways.append((first * factor, second * rng.uniform(0.2, 1.5), turn * cmath.exp(1j * rng.uniform(-0.7, 0.7))))

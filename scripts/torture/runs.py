@@ -121,7 +121,8 @@ def run_sample(seed: int, variant: int, folder: Path, kinds: tuple[str, ...]) ->
         watch.wasted += watch.count
     except CaseError as error:
         results, record.detail = None, "; ".join(map(str, error.faults))
-        record.status = "refused" if re.search(r"free rigid motion|loads do not balance", record.detail) else "CaseError"
+        is_true = re.search(r"free rigid motion|loads do not balance", record.detail)
+        record.status = "refused" if is_true else "CaseError"
     record.seconds = time.perf_counter() - begin
     record.iterations, record.halved, record.wasted, record.notes = (
         watch.iterations, watch.halved, watch.wasted, watch.notes

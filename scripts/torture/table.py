@@ -16,8 +16,8 @@ def format_table(records: Sequence[Record]) -> str:
     kinds = list(dict.fromkeys(record.kind for record in base))
     pairs = _pair(records)
     head = (
-        f"{'kind':8s} {'models':>6s} {'settled':>7s} {'named':>5s} {'failed':>6s} {'faulty':>6s}  {'median':>6s} {'90 %':>5s}"
-        f" {'most':>5s} {'halved':>6s}  {'contact':>8s} {'balance':>8s} {'energy':>8s}  {'units':>9s} {'ranks':>9s} {'s':>6s}"
+        "kind     models settled named failed faulty  median  90 %  most halved   contact  balance   energy  "
+        "    units     ranks      s"
     )
     lines = [head]
     for kind in (*kinds, "all"):
@@ -38,11 +38,12 @@ def _format_row(kind: str, own: Sequence[Record], pairs: Sequence[tuple[Record, 
     units, ranks = (
         [not compare(*pair) for pair in pairs if (pair[1].ranks > 1) == several] for several in (False, True)
     )
+    seconds = sum(record.seconds for record in own)
     return (
         f"{kind:8s} {len(own):6d} {len(settled):7d} {named:5d} {len(own) - len(settled) - named:6d} {faulty:6d}  "
         f"{np.median(counts):6.0f} {np.percentile(counts, 90):5.0f} {counts.max():5d} "
         f"{sum(record.halved for record in own):6d}  {contact:8.1e} {balance:8.1e} {energy:8.1e}  "
-        f"{sum(units):4d}/{len(units):<4d} {sum(ranks):4d}/{len(ranks):<4d} {sum(record.seconds for record in own):6.0f}"
+        f"{sum(units):4d}/{len(units):<4d} {sum(ranks):4d}/{len(ranks):<4d} {seconds:6.0f}"
     )
 
 

@@ -8,12 +8,13 @@ Models: fields and trees of cracks, cracks from edges and through plates, tight 
 masonry, wedges, blocks on slopes, stacks; with friction from 0 to 1.2, cohesion, tensile strength, weakening, brittle
 bonds, elastic joints, loads to and fro, lengths from 1e-6 to 1e7 and stresses from 1e-3 to 1e12.
 
-Columns: models; settled; named: ended with a reason that is one of the model's, told apart below the table by whether
-bodies taken to be rigid have no balance ("true"), none without the strength that slip takes ("weakened"), one of them
-carries no load ("loose"), or neither ("unproved"); failed: ended otherwise; faulty: settled against the conditions;
-iterations of a step: median, 90 %, most; steps halved; largest violation of the contact conditions (of the largest
-traction or jump), of the balance of a body (of the forces on it) and of the sign of energies; equal runs in other units
-and on other ranks. Exit code 1 if anything failed.
+Columns: models; settled; named: ended with a reason that is one of the model's; failed: ended otherwise; faulty:
+settled against the conditions; iterations of a step: median, 90 %, most; steps halved; largest violation of the contact
+conditions (of the largest traction or jump), of the balance of a body (of the forces on it) and of the sign of
+energies; equal runs in other units and on other ranks. Below the table, early ends are told apart by what is known of
+the model without the solver: taken to be rigid, the bodies have no balance ("true"), none without the strength that
+slip takes ("weakened"), none at loads a little larger ("near"); a body without loads can lie loose ("loose") or not
+("squeezed", a fault of its own), or may ("unloaded"); or nothing is ("unproved"). Exit code 1 if anything failed.
 """
 
 from __future__ import annotations

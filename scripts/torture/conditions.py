@@ -150,13 +150,17 @@ def _weigh_nodes(results: Results, position: Complex) -> Real:
     return np.asarray((np.where(elements.crack, 0.0, half)[:, None] * weight[..., 0]).ravel())
 
 
-def measure_energy(results: Results) -> float:
-    """How much dissipation is taken back, or elastic energy negative, relative to the largest energy."""
+def measure_energy(results: Results, tables: Tables) -> float:
+    """How much dissipation is taken back, or elastic energy negative, relative to the largest energy.
+
+    The energy of an infinite region is counted from that of the stress far away alone, and may be negative.
+    """
     energy = results.energy
     kinds = (energy.external, energy.elastic, energy.dissipated)
     scale = max(float(np.abs(values).max(initial=0.0)) for values in kinds)
+    infinite = any(table.get("infinite") for table in tables["regions"].values())
     taken = max(0.0, -float(np.diff(energy.dissipated, prepend=0.0).min(initial=0.0)))
-    negative = max(0.0, -float(energy.elastic.min(initial=0.0)))
+    negative = 0.0 if infinite else max(0.0, -float(energy.elastic.min(initial=0.0)))
     return max(taken, negative) / scale if scale > 0 else 0.0
 
 

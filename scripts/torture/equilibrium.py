@@ -58,14 +58,16 @@ def can_balance(tables: Tables, stage: int, factor: float, weakened: bool = Fals
     return programme.is_feasible(-given / scale)
 
 
-def is_unloaded(tables: Tables, stage: int, factor: float) -> bool:
-    """Whether some finite body carries no load and no condition of its own: it may lie loose."""
+def find_unloaded(tables: Tables, stage: int, factor: float) -> list[str]:
+    """The finite bodies that carry no load and no condition of their own: they may lie loose."""
     loads = evaluate_loads(tables, stage, factor)
-    for name, table in tables["regions"].items():
-        conditioned = any(curve in loads.boundary for curve in table["boundary"])
-        if not table.get("infinite") and not conditioned and not np.abs(_sum_loads(tables, name, loads)).max() > 0:
-            return True
-    return False
+    return [
+        name
+        for name, table in tables["regions"].items()
+        if not table.get("infinite")
+        and not any(curve in loads.boundary for curve in table["boundary"])
+        and not np.abs(_sum_loads(tables, name, loads)).max() > 0
+    ]
 
 
 class _Programme:

@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 
 import pbem
-from pbem.errors import CaseError, ConvergenceError
+from pbem.errors import CaseError, ConvergenceError, PbemError
 from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve.step import Iteration, SilentReporter, Step
 
 from .conditions import is_finite, measure_balance, measure_contact, measure_energy, measure_scales
-from .equilibrium import can_balance, is_unloaded
+from .equilibrium import can_balance, find_unloaded
 from .history import count_stages
 from .kinds import Sample, draw_sample, vary_units
+from .looseness import measure_play
 
 # Reasons that tell something true of a model; all others (mode cycle, iteration limit, ...) are failures.
 NAMED_REASONS = ("free motion", "limit load", "no solution", "several solutions", "refused")
@@ -31,6 +32,8 @@ CONTACT = 1e-7
 # Of the forces on a body: the discretisation's error.
 BALANCE = 2e-2
 ENERGY = 1e-6
+# Rigid bodies bear more than elastic ones, which part and slip where they are loaded most.
+NEAR = 1.25
 # Between the same model in other units, places and on other ranks, of the largest value.
 EQUAL = 1e-5
 
@@ -128,22 +131,20 @@ def run_sample(seed: int, variant: int, folder: Path, kinds: tuple[str, ...]) ->
         watch.iterations, watch.halved, watch.wasted, watch.notes
     )  # fmt: skip
     if world.rank == 0:
-        judge(record, sample, results, sample.draft.tables(units), watch.target)
+        if results is not None:
+            judge(record, results, sample.draft.tables(units))
+        elif world.size == 1:
+            record.verdict = judge_end(sample, record.status, watch.target, stem.with_suffix(".open.toml"))
+            if record.status not in NAMED_REASONS or record.verdict == "squeezed":
+                record.faults.append(f"ended: {record.status} ({record.verdict})")
         for path in (case, output):
             path.unlink(missing_ok=True)
     world.Barrier()
     return record
 
 
-def judge(
-    record: Record, sample: Sample, results: Results | None, tables: dict[str, Any], target: tuple[int, float]
-) -> None:
-    """Complete a record with what the results obey, or with whether its early end is true."""
-    if results is None:
-        record.verdict = judge_end(record.status, sample.draft.tables(), target)
-        if record.status not in NAMED_REASONS:
-            record.faults.append(f"ended: {record.status}")
-        return
+def judge(record: Record, results: Results, tables: dict[str, Any]) -> None:
+    """Complete the record of a settled run with what its results obey."""
     if not is_finite(results):
         record.faults.append("not finite")
         return
@@ -151,7 +152,7 @@ def judge(
     record.pairs = results.pairs.count
     record.contact = measure_contact(results, tables, scales)
     record.balance = measure_balance(results, tables)
-    record.energy = measure_energy(results)
+    record.energy = measure_energy(results, tables)
     record.marks, record.values = describe(results)
     record.faults += [f"{rule} {value:.1e}" for rule, value in record.contact.items() if not value <= CONTACT]
     if not record.balance <= BALANCE:
@@ -162,15 +163,29 @@ def judge(
         record.faults.append(f"{max(record.iterations)} iterations")
 
 
-def judge_end(status: str, tables: dict[str, Any], target: tuple[int, float]) -> str:
-    """What rigid bodies say of an early end: "true" if no balance exists, "weakened" if none exists once the contacts
-    have lost what they can lose, "loose" if some body carries no load, else "unproved"."""
+def judge_end(sample: Sample, status: str, target: tuple[int, float], case: Path) -> str:
+    """What can be said of an early end without the solver of contact.
+
+    "true": taken to be rigid, the bodies have no balance; "weakened": none once the contacts have lost what they can
+    lose; "near": none at loads a little larger; "loose": a body can lie between its neighbours without touching them;
+    "squeezed": no body without loads can; "unloaded": there are some, of which nothing is known; else "unproved".
+    """
+    tables = sample.draft.tables()
     moments = [(stage, 1.0) for stage in range(count_stages(tables))] if status == "refused" else [target]
     if not all(can_balance(tables, *moment) for moment in moments):
         return "true"
     if not all(can_balance(tables, *moment, weakened=True) for moment in moments):
         return "weakened"
-    return "loose" if any(is_unloaded(tables, *moment) for moment in moments) else "unproved"
+    if not all(can_balance(tables, stage, NEAR * factor) for stage, factor in moments):
+        return "near"
+    bodies = find_unloaded(tables, *moments[-1])
+    if not bodies:
+        return "unproved"
+    try:
+        play = measure_play(sample.draft, bodies, *moments[-1], case)
+    except PbemError:
+        return "unloaded"
+    return "loose" if max(play.values()) > 0 else "squeezed"
 
 
 def describe(results: Results) -> tuple[list[str], list[float]]:

@@ -62,8 +62,10 @@ class Draft:
         return name
 
     def add_circle(self, name: str, center: complex, radius: float, elements: int) -> str:
-        """A full circle; returns its name."""
-        self.curves[name] = {"center": [center.real, center.imag], "radius": radius, "elements": elements}
+        """A full circle, whose elements turn with the case; returns its name."""
+        self.curves[name] = {
+            "center": [center.real, center.imag], "radius": radius, "angles": [0.0, 360.0], "elements": elements,
+        }  # fmt: skip
         return name
 
     def tables(self, units: Units | None = None) -> Tables:
@@ -180,7 +182,8 @@ def draw_material(rng: random.Random, softest: float = 0.5, hardest: float = 2.0
 
 def draw_units(rng: random.Random) -> Units:
     """Units of a case: lengths from 1e-6 to 1e7, stresses from 1e-3 to 1e12, turned and shifted now and then."""
-    turn = rng.choice((0.0, 0.0, 90.0, rng.uniform(-180, 180)))
+    # In parts of a degree that have no rounding, so that circles still close.
+    turn = rng.choice((0.0, 0.0, 90.0, round(64 * rng.uniform(-180, 180)) / 64))
     shift = complex(rng.uniform(-20, 20), rng.uniform(-20, 20)) if rng.random() < 0.5 else 0j
     return Units(draw_log(rng, 1e-6, 1e7), draw_log(rng, 1e-3, 1e12), turn, shift)
 

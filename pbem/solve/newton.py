@@ -12,7 +12,6 @@ from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
-    Frozen,
     Linearisation,
     Proposal,
     find_failures,
@@ -21,9 +20,13 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
+from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.contact.support import close_nearest_pairs, find_ties
 from pbem.errors import ConvergenceError
+from pbem.parallel import do_on_first
 from pbem.solve.problem import Problem
+from pbem.solve.response import find_response
+from pbem.solve.search import Caution, Search
 from pbem.solve.step import Iteration, Reporter
 from pbem.solve.tangent import AnyTangent, Solved
 
@@ -46,29 +49,11 @@ class Solution:
     iterations: tuple[Iteration, ...]
 
 
-@dataclass(frozen=True)
-class Caution:
-    """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest.
-
-    frozen: what of the friction bound is taken as it is at the last iterate.
-    """
-
-    softening: float
-    share: float
-    frozen: Frozen = "nothing"
-
-
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# Each cycle of modes moves one level down; the last changes one pair at a time.
-CAUTIONS = (
-    Caution(1.0, 0.0),
-    Caution(0.1, 0.0, "slip"),
-    Caution(0.1, 0.0, "strength"),
-    Caution(0.01, 0.3, "strength"),
-    Caution(0.01, 1.0, "strength"),
-)
+# The most pairs that are solved by pivoting; with the hierarchical operator each costs two solutions by GMRES.
+MOST_PIVOTED, MOST_PIVOTED_BY_GMRES = 300, 12
 
 
 def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
@@ -83,7 +68,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     laws = problem.laws
     modes = _hold_free_bodies(problem, memory.modes, laws.gap)
     normal_traction, slip = memory.normal_traction, memory.slip
-    search = _Search(problem.model.solver.newton_max_iterations, modes)
+    search = Search(MOST_PIVOTED if problem.groups == () else MOST_PIVOTED_BY_GMRES)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -104,15 +89,52 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         if outcome.settled and failing.any():
             memory = replace(memory, broken=memory.broken | failing)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
-            search.restart(modes)
+            search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
         reporter.iterate(iterations[-1])
         if outcome.settled and not failing.any():
             _refuse_free_motion(problem, modes)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
-        modes = _hold_free_bodies(problem, limit_changes(modes, proposal, search.caution.share), pairs.g_n)
+        search.note(proposal)
+        if len(search.counts) == problem.model.solver.newton_max_iterations:
+            _refuse_free_motion(problem, proposal.modes)
+            raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
+        chosen = _pivot(problem, tangent, modes, memory, load, law, solved, search)
+        if chosen is None:
+            chosen = limit_changes(modes, proposal, search.caution.share)
+            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
+                _refuse_free_motion(problem, proposal.modes)
+                raise ConvergenceError("mode cycle", _describe_changes(problem, proposal))
+        modes = _hold_free_bodies(problem, chosen, pairs.g_n)
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
-        search.note(problem, modes, proposal)
+
+
+def _pivot(
+    problem: Problem, tangent: AnyTangent, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
+    solved: Solved, search: Search,
+) -> ModeState | None:
+    """The modes with those of the search's group solved by pivoting; None if it has none or they have no solution."""
+    group = search.choose_group()
+    if not len(group):
+        return None
+    response = find_response(problem, tangent, load, law, solved, group)
+    subset = take_subset(problem.laws, memory, load.pressure, modes, group)
+    floor = _find_floor(problem, solved)
+
+    def judge(chosen: ModeState, state: PairState) -> Proposal:
+        softening = search.caution.softening
+        return propose_modes(subset.laws, chosen, state, subset.memory, subset.pressure, softening, floor)
+
+    found: Settled = do_on_first(problem.comm, ConvergenceError, lambda: settle_subset(subset, response, judge))
+    if found.modes is None:
+        return None
+    mode, sign = modes.mode.copy(), modes.sign.copy()
+    mode[group], sign[group] = found.modes.mode, found.modes.sign
+    return ModeState(mode, sign)
+
+
+def _find_floor(problem: Problem, solved: Solved) -> float:
+    return STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
 
 
 @dataclass(frozen=True)
@@ -130,7 +152,7 @@ def _judge(
 ) -> _Outcome:
     laws = problem.laws
     pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
-    floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
+    floor = _find_floor(problem, solved)
     proposal = propose_modes(laws, modes, pairs, memory, load.pressure, caution.softening, floor)
     law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
     settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
@@ -143,37 +165,6 @@ def _hold_free_bodies(problem: Problem, modes: ModeState, opening: Real) -> Mode
     if not problem.free_motions(tuple(ties.items())):
         return modes
     return close_nearest_pairs(problem.mesh, problem.laws, modes, opening)
-
-
-class _Search:
-    """Watches the sequence of modes: more caution when they come back, an end when nothing helps."""
-
-    def __init__(self, most: int, modes: ModeState) -> None:
-        self.most = most
-        self.restart(modes)
-
-    def restart(self, modes: ModeState) -> None:
-        self.count = 0
-        self.level = 0
-        self.seen = {modes.fingerprint()}
-
-    @property
-    def caution(self) -> Caution:
-        return CAUTIONS[self.level]
-
-    def note(self, problem: Problem, modes: ModeState, proposal: Proposal) -> None:
-        """Take note of the next modes. Raises ConvergenceError when they go round in spite of all caution."""
-        self.count += 1
-        if proposal.changed.any() and modes.fingerprint() in self.seen:
-            if self.level == len(CAUTIONS) - 1:
-                _refuse_free_motion(problem, proposal.modes)
-                raise ConvergenceError("mode cycle", _describe_changes(problem, proposal))
-            self.level += 1
-            self.seen.clear()
-        self.seen.add(modes.fingerprint())
-        if self.count == self.most:
-            _refuse_free_motion(problem, proposal.modes)
-            raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
 
 
 def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:

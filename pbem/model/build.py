@@ -13,6 +13,7 @@ from pbem.errors import CaseError, Fault
 from pbem.model.balance import describe_unbalance
 from pbem.model.crack import check_closing, check_inside, check_near_misses, check_tip_elements, find_tips
 from pbem.model.curve import Curve
+from pbem.model.facing import check_facing
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
 from pbem.model.junction import find_crossings, split_at_junctions
@@ -89,7 +90,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
     if faults:
         return None, faults
     model = replace(_compose(case, roles, loading, topology), interior_points=interior)
-    faults = check_turning(case, model.curves)
+    faults = [*check_turning(case, model.curves), *check_facing(case, model)]
     gaps = [
         fault for name, interface in model.interfaces.items()
         for fault in check_gap(case, ("interfaces", name), interface.law, model.curves[name])

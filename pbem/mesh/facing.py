@@ -12,14 +12,13 @@ from pbem.mesh.elements import Elements
 from pbem.mesh.mortar import LEAST_COVER, OVERLAP, Coupling, couple_curves, measure_contrast
 from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
+from pbem.model.support import ROUNDINGS
 
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 Columns = dict[str, np.ndarray]
 
-# A distance is known to so many roundings of the largest coordinate that it was computed from.
-ROUNDINGS = 64
 # Meshes whose lengths agree to this part are equally fine.
 EQUAL = 1e-6
 

@@ -93,7 +93,8 @@ def share(total: int, lengths: Sequence[float]) -> list[int]:
         worst = max(range(len(counts)), key=lambda i: (round(wanted[i] - counts[i], 9), -i))
         counts[worst] += 1
     while sum(counts) > max(total, len(counts)):
-        worst = max((i for i in range(len(counts)) if counts[i] > 1), key=lambda i: (round(counts[i] - wanted[i], 9), i))
+        several = (i for i in range(len(counts)) if counts[i] > 1)
+        worst = max(several, key=lambda i: (round(counts[i] - wanted[i], 9), i))
         counts[worst] -= 1
     return counts
 

@@ -24,6 +24,7 @@ from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.contact.support import close_nearest_pairs, find_ties
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
+from pbem.solve.cascade import run_cascade
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.search import Caution, Search
@@ -86,8 +87,13 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             _refuse_free_motion(problem, modes)
             raise
         pairs, proposal, failing = outcome.pairs, outcome.proposal, outcome.failing
+        cascade = None
         if outcome.settled and failing.any():
-            memory = replace(memory, broken=memory.broken | failing)
+            floor = _find_floor(problem, solved)
+            cascade = run_cascade(
+                problem, tangent, modes, memory, load, law, solved, failing, floor, search.most_pivoted
+            )
+            memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
@@ -99,7 +105,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         if len(search.counts) == problem.model.solver.newton_max_iterations:
             _refuse_free_motion(problem, proposal.modes)
             raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
-        chosen = _pivot(problem, tangent, modes, memory, load, law, solved, search)
+        chosen = cascade.modes if cascade else _pivot(problem, tangent, modes, memory, load, law, solved, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():

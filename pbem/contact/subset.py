@@ -45,10 +45,14 @@ Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
 
 # Choices of detached pairs that are followed from one to the next, and beyond that tried one by one.
-MOST_FOLLOWED = 30
+MOST_FOLLOWED = 60
 MOST_ENUMERATED = 6
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
 ROUNDING, PERTURBATION = 1e-12, 1e-10
+# Tractions that some motion hardly changes leave a body free without these pairs.
+FREE = 1e-11
+# Stiffness of the springs that then hold it, relative to that of its surroundings.
+SPRING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -111,12 +115,14 @@ class Settled:
     """Admissible modes of the pairs, or the reason why there are none.
 
     modes: None if none were found. exhaustive: whether then every choice was tried and there are none at all (while the
-    other pairs keep their modes). tried: number of complementarity problems that were solved.
+    other pairs keep their modes). tried: number of complementarity problems that were solved. wrong (s,): pairs whose
+    own compliance has the wrong sign, on meshes that cannot carry contact.
     """
 
     modes: ModeState | None
     exhaustive: bool
     tried: int
+    wrong: Bool
 
 
 def settle_subset(
@@ -125,23 +131,43 @@ def settle_subset(
     """Find modes of s pairs that `judge` leaves as they are; the judge sees modes and states of these pairs alone."""
     problem = _pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
+    compliance = _find_compliance(problem)
+    none = np.zeros(len(loses), dtype=bool)
+    if compliance is None:
+        return Settled(None, False, 0, none)
+    wrong = (np.diag(compliance) >= 0).reshape(2, -1).any(axis=0)
     tried: set[bytes] = set()
     complete = True
     for detached in _choose_detached(subset.modes.mode == OPEN, loses):
         follow: Bool | None = detached
         while follow is not None and follow.tobytes() not in tried and len(tried) < _most_tried(loses):
             tried.add(follow.tobytes())
-            modes = _pivot(problem, follow)
-            d = None if modes is None else _solve_in_modes(problem, modes)
-            if modes is None or d is None:
+            modes = _pivot(problem, compliance, follow)
+            if modes is None:
                 complete = False
                 break
+            d = _solve_in_modes(problem, modes)
+            if d is None:  # a body that these modes leave free: it has to be held, and cannot be judged here
+                return Settled(modes, False, len(tried), wrong)
             proposal = judge(modes, response.evaluate(d))
             if not proposal.changed.any():
-                return Settled(modes, False, len(tried))
-            parts = proposal.modes.mode == OPEN
-            follow = np.where(loses, parts, False) if not np.array_equal(loses & parts, follow) else None
-    return Settled(None, complete and len(tried) >= 2 ** int(loses.sum()), len(tried))
+                return Settled(modes, False, len(tried), wrong)
+            follow = _follow(proposal, loses, follow, tried)
+    return Settled(None, complete and len(tried) >= 2 ** int(loses.sum()), len(tried), wrong)
+
+
+def _follow(proposal: Proposal, loses: Bool, detached: Bool, tried: set[bytes]) -> Bool | None:
+    """The next choice of detached pairs: what the judge says of all of them, or, where that was tried, of the worst."""
+    wanted = loses & (proposal.modes.mode == OPEN)
+    if wanted.tobytes() not in tried:
+        return wanted
+    for pair in np.argsort(-proposal.violation, kind="stable"):
+        if wanted[pair] != detached[pair]:
+            one = detached.copy()
+            one[pair] = wanted[pair]
+            if one.tobytes() not in tried:
+                return one
+    return None
 
 
 def _most_tried(loses: Bool) -> int:
@@ -201,17 +227,29 @@ def _pose(subset: Subset, response: Response) -> _Pairs:
     )  # fmt: skip
 
 
-def _pivot(pairs: _Pairs, detached: Bool) -> ModeState | None:
-    """The modes of the complementarity problem in which some pairs are detached; None where pivoting fails."""
-    count = len(detached)
+def _find_compliance(pairs: _Pairs) -> Real | None:
+    """What tractions (p_n of all pairs, then p_s) do to the jumps, (2 s, 2 s); None if that cannot be found.
+
+    Where the tractions leave a body free, as pairs that alone hold it do, soft springs tie its faces to where they are.
+    """
+    count = len(pairs.sign)
+    tractions, jumps = (pairs.change[k : k + 2].reshape(2 * count, 2 * count) for k in (0, 2))
+    values = np.linalg.svd(tractions, compute_uv=False)
+    if values[-1] <= FREE * values[0]:
+        tractions = tractions - SPRING * values[0] / np.linalg.norm(jumps, 2) * jumps
     try:
-        by_traction = np.linalg.inv(pairs.change[:2].reshape(2 * count, 2 * count))
+        found = jumps @ np.linalg.inv(tractions)
     except np.linalg.LinAlgError:
         return None
-    compliance = pairs.change[2:].reshape(2 * count, 2 * count) @ by_traction
+    return found if np.isfinite(found).all() else None
+
+
+def _pivot(pairs: _Pairs, compliance: Real, detached: Bool) -> ModeState | None:
+    """The modes of the complementarity problem in which some pairs are detached; None where pivoting fails."""
+    count = len(detached)
     # In a unit of length in which compliances are numbers of about one.
     softness = float(np.abs(np.diag(compliance)).mean()) or 1.0
-    compliance /= softness
+    compliance = compliance / softness
     # The pairs that may touch, with N and the friction traction zero.
     closed = np.flatnonzero(~detached)
     rough = np.flatnonzero(pairs.rough[closed])

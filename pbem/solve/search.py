@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.modes import Frozen, Proposal
+from pbem.contact.subset import Settled
 
 Integer = NDArray[np.int64]
 
@@ -51,6 +52,8 @@ CAUTIONS = (
 SLOW = 0.5
 # Iterations that are plain Newton steps whatever they change.
 PLAIN = 3
+# Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
+FUTILE = 6
 
 
 class Search:
@@ -68,6 +71,9 @@ class Search:
         self.counts: list[int] = []
         self.changed: list[Integer] = []
         self.group: Integer = np.zeros(0, dtype=np.int64)
+        self.failed_group: Integer = self.group
+        self.failed: Settled | None = None
+        self.futile = 0
         self.level = 0
         self.returned = False
         self.seen: set[bytes] = set()
@@ -78,6 +84,7 @@ class Search:
 
     def note(self, proposal: Proposal) -> None:
         """Take note of what the last solution asks for."""
+        self.proposal = proposal
         self.changed.append(np.flatnonzero(proposal.changed))
         self.counts.append(len(self.changed[-1]))
         if not self.counts[-1] and self.level and not self.returned:
@@ -96,6 +103,20 @@ class Search:
                 self.group = group
                 return group
         return nothing
+
+    def conclude(self, found: Settled) -> bool:
+        """Take note of what pivoting found for the group; True if there seems to be nothing to be found.
+
+        That is certain where all choices were tried for the same pairs twice, with what all others make of it between;
+        of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
+        """
+        if found.modes is not None:
+            self.futile = 0
+            return False
+        again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
+        self.failed_group, self.failed = self.group, found
+        self.futile += found.tried > 1
+        return (again and found.exhaustive) or self.futile >= FUTILE
 
     def returns(self, fingerprint: bytes) -> bool:
         """Note a state of modes; whether it was there before at this level of caution."""

@@ -19,6 +19,8 @@ Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 Columns = dict[str, np.ndarray]
 
+# Fewer elements than these do not resolve the pressure of a contact.
+FEWEST = 5
 # Meshes whose lengths agree to this part are equally fine.
 EQUAL = 1e-6
 

@@ -92,6 +92,16 @@ def pair_contact(
     return made, links
 
 
+def describe_sparse_meshes(contacts: Sequence[tuple[str, Integer]], order: int) -> tuple[str, ...]:
+    """A sentence for every contact (name, slot nodes) that has less than five elements with pairs."""
+    counts = {name: len(np.unique(slots // (order + 1))) for name, slots in contacts}
+    return tuple(
+        f"Contact '{name}' has {count} element{'s' * (count != 1)} that face each other: fewer than {FEWEST} do not "
+        "resolve its pressure."
+        for name, count in counts.items() if count < FEWEST
+    )
+
+
 def _choose_slave(one: Chain, other: Chain, others: Elements) -> tuple[Chain, Chain, Coupling]:
     """Slave, master and what couples them: the slave is the one that is nowhere much finer than the other."""
     seen = couple_curves(one.elements, other.elements, one.local, others)

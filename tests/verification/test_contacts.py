@@ -105,6 +105,37 @@ def test_the_order_of_the_curves_changes_signs_only(gradings: tuple[str, str]) -
     np.testing.assert_allclose(found["lower"], found["upper"], rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.parametrize("first", ["base", "foot"])
+@pytest.mark.parametrize(("base", "foot", "left"), [(6, 16, 0.53), (24, 6, 0.53), (3, 16, 0.9), (11, 12, 1.3)])
+@pytest.mark.parametrize("gap", [0.0, 3e-4])
+def test_forces_pass_where_one_curve_ends_opposite_the_other(
+    base: int, foot: int, left: float, first: str, gap: float
+) -> None:
+    """A smooth punch 1 wide on a base 3 wide: both carry the same force, as does the ground, to the mesh's error."""
+    ends = {"foot": (left + 1j * (1 + gap), left + 1 + 1j * (1 + gap)), "base": (3 + 1j, 1j)}
+    right, high = ends["foot"][1], left + 2j
+    sides = {"bottom": (0, 3), "right": (3, 3 + 1j), "base": ends["base"], "left": (1j, 0), "foot": ends["foot"]}
+    sides |= {"punch_right": (right, high + 1), "top": (high + 1, high), "punch_left": (high, ends["foot"][0])}
+    count, names = {"base": base, "foot": foot}, list(sides)
+    text = write_case({
+        "materials": {"rock": {"young": 1e3, "poisson": 0.3}},
+        "curves": {name: line(a, b, count.get(name, 8), "none" if name in count else "auto")
+                   for name, (a, b) in sides.items()},
+        "regions": {
+            "ground": {"material": "rock", "boundary": names[:4]}, "punch": {"material": "rock", "boundary": names[4:]},
+        },
+        "contacts": {"seat": {"between": ["base", "foot"] if first == "base" else ["foot", "base"], "friction": 0.0}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"ux": 0.0, "uy": -1e-3 - gap}},
+        "analysis": {"steps": 1},
+    })  # fmt: skip
+    solved = solve_model(parse_model(text)[1])
+    signs = {"foot": 1, "base": -1, "top": -1, "bottom": 1}
+    forces = [sign * solved.reaction(name).imag for name, sign in signs.items()]
+    assert forces[0] > 0.6
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
+    np.testing.assert_allclose(forces[2:], forces[0], rtol=2e-3)
+
+
 @cache
 def solve_slotted(width: float, scheme: str, load: float, apart: bool, size: float = 1.0) -> Solved:
     """A block 3 x 2, held below, with a slot from the right to its middle; a traction along y on its upper side.

@@ -19,6 +19,10 @@ Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 Columns = dict[str, np.ndarray]
 
+# Fewer elements than these do not resolve the pressure of a contact.
+FEWEST = 5
+# A coarse slave's pairs carry at least this part of the length that those of the finer curve would.
+MOST_CARRIED = 0.9
 # Meshes whose lengths agree to this part are equally fine.
 EQUAL = 1e-6
 
@@ -73,7 +77,7 @@ def pair_contact(
         "displacement_weight": product / (own_weight * seen.cover)[own],
         "traction_pair": pair_of_node[own],
         "traction_node": master.first_node + other,
-        "traction_weight": product / other_weight[other],
+        "traction_weight": product / (seen.cover[own] * other_weight[other]),
     }
     nearest = np.zeros(len(nodes), dtype=np.int64)
     by_weight = np.argsort(product, kind="stable")
@@ -90,13 +94,34 @@ def pair_contact(
     return made, links
 
 
+def describe_sparse_meshes(contacts: Sequence[tuple[str, Integer]], order: int) -> tuple[str, ...]:
+    """A sentence for every contact (name, slot nodes) that has less than five elements with pairs."""
+    counts = {name: len(np.unique(slots // (order + 1))) for name, slots in contacts}
+    return tuple(
+        f"Contact '{name}' has {count} element{'s' * (count != 1)} that face each other: fewer than {FEWEST} do not "
+        "resolve its pressure."
+        for name, count in counts.items() if count < FEWEST
+    )
+
+
 def _choose_slave(one: Chain, other: Chain, others: Elements) -> tuple[Chain, Chain, Coupling]:
-    """Slave, master and what couples them: the slave is the one that is nowhere much finer than the other."""
+    """Slave, master and what couples them: the slave is the one that is nowhere much finer than the other, unless its
+    elements are so long that they lose much of the length over which the two face each other."""
     seen = couple_curves(one.elements, other.elements, one.local, others)
     worse, better = measure_contrast(seen, one.elements, other.elements)
-    if worse <= better * (1 + EQUAL):
-        return one, other, seen
-    return other, one, couple_curves(other.elements, one.elements, other.local, others)
+    chosen = (one, other, seen)
+    if worse <= better * (1 + EQUAL) and 0 < seen.shared.sum() <= _carried(chosen) / MOST_CARRIED:
+        return chosen
+    exchanged = (other, one, couple_curves(other.elements, one.elements, other.local, others))
+    coarser, finer = (chosen, exchanged) if worse <= better * (1 + EQUAL) else (exchanged, chosen)
+    return finer if _carried(coarser) < MOST_CARRIED * _carried(finer) else coarser
+
+
+def _carried(chosen: tuple[Chain, Chain, Coupling]) -> float:
+    """Length of the slave's nodes that are pairs, as far as it faces the master."""
+    slave, _, seen = chosen
+    weight = slave.elements.weights(slave.local).ravel()
+    return float((weight * seen.cover)[seen.cover > LEAST_COVER].sum())
 
 
 def _place_on_first(slave: Chain, master: Chain, nodes: Integer, slave_first: bool) -> Columns:

@@ -9,7 +9,8 @@ import numpy as np
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import divide_curve
 from pbem.mesh.equations import Equations, choose_equations
-from pbem.mesh.mesh import Mesh
+from pbem.mesh.facing import describe_sparse_meshes
+from pbem.mesh.mesh import Mesh, Pairs
 from pbem.mesh.pairing import pair_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
 from pbem.model.model import Model
@@ -52,7 +53,7 @@ def generate_mesh(model: Model) -> Mesh:
         region_names=tuple(region.name for region in model.regions),
         curve_names=curve_names,
         interface_names=(*model.interfaces, *model.contacts),
-        notes=equations.notes,
+        notes=(*equations.notes, *_note_contacts(model, pairs)),
     )
 
 
@@ -73,6 +74,12 @@ def _list_chains(model: Model, equations: Equations) -> list[Chain]:
             chains.append(Chain(number, curve, forward, crack, by_element, elements, first_node, order))
             first_node += elements.count * (order + 1)
     return chains
+
+
+def _note_contacts(model: Model, pairs: Pairs) -> tuple[str, ...]:
+    first = len(model.interfaces)
+    slots = [(name, pairs.slot[pairs.interface == first + number]) for number, name in enumerate(model.contacts)]
+    return describe_sparse_meshes(slots, model.analysis.order)
 
 
 def _mark_tips(model: Model, chain: Chain) -> np.ndarray:

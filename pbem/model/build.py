@@ -20,7 +20,7 @@ from pbem.model.crack import (
     find_tips,
 )
 from pbem.model.curve import Curve
-from pbem.model.facing import check_facing
+from pbem.model.facing import check_facing, split_opposite_ends
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
@@ -137,6 +137,10 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         closing, cuts = check_closing(case, curves, cracks, loops)
         faults += closing
         notes += cuts
+    if not faults:
+        written = {name for name in curves if case.curves[name].expression}
+        curves, opposite = split_opposite_ends(curves, loops, roles.contacts, written)
+        notes += opposite
     tips = find_tips(curves, cracks)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pbem.case import Case
 from pbem.errors import Fault
-from pbem.model.curve import Leg
-from pbem.model.intersection import inner_points, measure_distances
-from pbem.model.junction import format_point
-from pbem.model.loop import side_legs
+from pbem.model.curve import Curve, Leg
+from pbem.model.intersection import inner_points, measure_distances, project
+from pbem.model.junction import format_point, split_leg
+from pbem.model.loop import Loops, side_legs
 from pbem.model.model import Contact, Model, Region, Side
 from pbem.model.sampling import leg_normals
 
@@ -29,6 +29,8 @@ OPPOSITE = -0.5
 NARROW = 0.25
 # Faces that touch may lie in one another by this part of the shorter curve (rounding, chords of curved sides).
 OVERLAP = 1e-3
+# A leg is not split nearer to its ends than this part of its mean element.
+LEAST_PIECE = 0.25
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,61 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
             if ((seen.leg >= 0) & (seen.product < 0)).any():
                 return True
     return False
+
+
+def split_opposite_ends(
+    curves: Mapping[str, Curve], loops: Loops, contacts: Mapping[str, tuple[str, str]], kept: Set[str] = frozenset()
+) -> tuple[dict[str, Curve], list[str]]:
+    """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
+
+    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well.
+    kept: curves that are not split. Ends near those of an element are left.
+    """
+    sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
+    result, notes = dict(curves), []
+    for pair in contacts.values():
+        for name, other in (pair, pair[::-1]):
+            if name in kept or name not in sides or other not in sides:
+                continue
+            cuts: dict[int, list[float]] = {}
+            for end, normal in _outward_ends(curves[other], sides[other]):
+                found = _find_opposite(curves[name], sides[name].forward, end, normal, curves[other].length)
+                if found is not None:
+                    cuts.setdefault(found[0], []).append(found[1])
+            legs = []
+            for number, leg in enumerate(result[name].legs):
+                points = {complex(leg.point(np.array(t))): t for t in cuts.get(number, ())}
+                legs += split_leg(leg, points)
+                notes += [f"'{name}' is split at {format_point(at)}, opposite an end of '{other}'." for at in points]
+            result[name] = Curve(name, tuple(legs))
+    return result, notes
+
+
+def _outward_ends(curve: Curve, side: Side) -> list[tuple[complex, complex]]:
+    """Both ends of a curve with the outward normals there."""
+    if curve.closed:
+        return []
+    sign = 1 if side.forward else -1
+    return [
+        (point, sign * complex(leg_normals(leg, np.array([point]))[0]))
+        for leg, point in ((curve.legs[0], curve.start), (curve.legs[-1], curve.end))
+    ]
+
+
+def _find_opposite(
+    curve: Curve, forward: bool, end: complex, normal: complex, length: float
+) -> tuple[int, float] | None:
+    """Number of the leg and fraction of it whose normal meets an end of the other curve (of a length) face to face."""
+    number = min(range(len(curve.legs)), key=lambda at: project(curve.legs[at], end)[1])
+    leg = curve.legs[number]
+    t, distance = project(leg, end)
+    foot = leg.point(np.array([t]))
+    outward = complex(leg_normals(leg, foot)[0]) * (1 if forward else -1)
+    shorter = min(length, curve.length)
+    ahead = ((end - complex(foot[0])) * outward.conjugate()).real
+    if min(t, 1 - t) * leg.elements < LEAST_PIECE or distance > shorter or ahead < -OVERLAP * shorter:
+        return None
+    return None if (normal * outward.conjugate()).real > OPPOSITE else (number, t)
 
 
 def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]]) -> list[Strip]:

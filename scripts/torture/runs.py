@@ -24,7 +24,7 @@ from .kinds import Sample, draw_sample, vary_units
 from .looseness import measure_play
 
 # Reasons that tell something true of a model; all others (mode cycle, iteration limit, ...) are failures.
-NAMED_REASONS = ("free motion", "limit load", "no solution", "several solutions", "refused")
+NAMED_REASONS = ("free motion", "limit load", "no admissible modes", "refused")
 
 MOST_ITERATIONS = 25
 # Of the largest traction or jump: what equations and laws are solved to, and rounding.

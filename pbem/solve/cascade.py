@@ -51,7 +51,8 @@ def run_cascade(
     rounding does (see pbem.contact.modes). most: the largest number of brittle pairs that are followed at once.
     """
     broken = memory.broken | failing
-    pairs = np.flatnonzero(problem.laws.brittle)
+    leader = problem.laws.leader
+    pairs = np.flatnonzero(problem.laws.brittle & ~problem.laws.follows)
     if len(pairs) > most:
         return Cascade(broken, None)
     response = find_response(problem, tangent, load, law, solved, pairs)
@@ -60,11 +61,12 @@ def run_cascade(
     subset = take_subset(problem.laws, start, load.pressure, modes, pairs)
     lost, own = do_on_first(problem.comm, ConvergenceError, lambda: _follow(subset, response, scale, floor))
     broken[pairs] = lost
+    broken = broken[leader]
     if own is None:
         return Cascade(broken, None)
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[pairs], sign[pairs] = own.mode, own.sign
-    return Cascade(broken, ModeState(mode, sign))
+    return Cascade(broken, ModeState(mode[leader], sign[leader]))
 
 
 def _follow(subset: Subset, response: Response, scale: float, floor: float) -> tuple[Bool, ModeState | None]:

@@ -73,7 +73,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     hold = Hold(problem)
     modes = hold.apply(memory.modes, laws.gap, np.zeros(laws.count))
     normal_traction, slip = memory.normal_traction, memory.slip
-    search = Search(MOST_PIVOTED_BY_GMRES if problem.groups else MOST_PIVOTED)
+    search = Search(MOST_PIVOTED_BY_GMRES if problem.groups else MOST_PIVOTED, laws.follows)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -150,7 +150,7 @@ def _pivot(
         return None
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[group], sign[group] = found.modes.mode, found.modes.sign
-    return ModeState(mode, sign)
+    return ModeState(mode[problem.laws.leader], sign[problem.laws.leader])
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

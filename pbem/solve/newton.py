@@ -24,6 +24,7 @@ from pbem.contact.modes import (
 from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast, do_on_first
+from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
@@ -72,7 +73,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     hold = Hold(problem)
     modes = hold.apply(memory.modes, laws.gap, np.zeros(laws.count))
     normal_traction, slip = memory.normal_traction, memory.slip
-    search = Search(MOST_PIVOTED_BY_GMRES if problem.groups else MOST_PIVOTED)
+    search = Search(MOST_PIVOTED_BY_GMRES if problem.groups else MOST_PIVOTED, laws.follows)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -90,9 +91,14 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             hold.refuse_free_motion(modes)
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
-        fails = outcome.settled and bool(outcome.failing.any())
+        fails, cascade = outcome.settled and bool(outcome.failing.any()), None
         if fails:
-            memory = replace(memory, broken=memory.broken | outcome.failing)
+            floor = _find_floor(problem, solved)
+            cascade = run_cascade(
+                problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
+                search.most_pivoted,
+            )
+            memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
@@ -108,7 +114,9 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         search.note(proposal)
         if len(search.counts) == problem.model.solver.newton_max_iterations:
             raise _end(hold, "iteration limit", proposal, search)
-        chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
+        chosen = cascade.modes if cascade else _pivot(
+            hold, tangent, constraints, modes, memory, load, law, solved, search
+        )
         if chosen is None:
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
@@ -149,7 +157,7 @@ def _pivot(
         return None
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[group], sign[group] = found.modes.mode, found.modes.sign
-    return ModeState(mode, sign)
+    return ModeState(mode[problem.laws.leader], sign[problem.laws.leader])
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.results.balance import create_balance
 from pbem.results.configuration import dump_configuration
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
@@ -93,6 +94,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     energy = file.create_group("energy")
     for name in ENERGIES:
         create_energy(energy, name)
+    create_balance(file, mesh)
     if model.interior_points:
         interior = file.create_group("interior")
         interior["position"] = to_columns(np.array(model.interior_points))

@@ -66,7 +66,7 @@ def truncate(file: h5py.File, last_number: int) -> None:
             item.resize(k, axis=0)
 
     # What is in other groups are views of these.
-    for group in ("steps", "fields", "all", "energy", *(["interior"] if "interior" in file else [])):
+    for group in ("steps", "fields", "all", "energy", *(name for name in ("interior", "balance") if name in file)):
         file[group].visititems(cut)
     convergence = file["convergence"]
     convergence.resize(int(np.searchsorted(convergence["step"], last_number, side="right")), axis=0)

@@ -7,8 +7,6 @@ move freely.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +16,7 @@ from pbem.contact.support import Support
 from pbem.errors import ConvergenceError
 from pbem.model.support import FreeMotion
 from pbem.solve.problem import Problem
+from pbem.solve.step import Balance
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -27,20 +26,6 @@ Complex = NDArray[np.complex128]
 NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
-
-
-@dataclass(frozen=True)
-class Balance:
-    """What is left over on r regions.
-
-    resultant (r, 3): force along x and y (stress times length) and moment about the region's centre, the mean of its
-    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; 0 for infinite
-    regions, which may carry a resultant. carried (r,): as relative, of what the acting anchors carry; 0 without any.
-    """
-
-    resultant: Real
-    relative: Real
-    carried: Real
 
 
 def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
@@ -105,7 +90,7 @@ def _divide(part: Real, whole: Real) -> Real:
 
 
 def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
-    """What is left over where it is worth a note, the worst region first; None if all regions are in balance.
+    """What is left over on the worst region, where that is worth a note; None if all regions are in balance.
 
     Raises ConvergenceError ("not in balance") where it makes the result wrong.
     """

@@ -42,7 +42,8 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
     length = add(np.ones(mesh.nodes))
     # About a node of the region first, as coordinates can be large.
     start = mesh.position[np.searchsorted(of, np.arange(count))]
-    middle = start + add_vectors(mesh.position - start[of]) / length
+    # Of a plane with nothing but cracks in it there is no boundary.
+    middle = start + add_vectors(mesh.position - start[of]) / np.where(length > 0, length, 1.0)
     lever = mesh.position - middle[of]
     whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
     elastic = whole - known

@@ -21,6 +21,8 @@ Integer = NDArray[np.int64]
 
 # A body that slips on all its contacts is held by single pairs at most so often in one step.
 MOST_HELD = 12
+# The same modes come back so often before pairs that hold a body are given up.
+MOST_REPEATED = 3
 
 
 class Hold:
@@ -40,6 +42,7 @@ class Hold:
         self.pairs: Integer = np.zeros(0, dtype=np.int64)
         self.count = 0
         self.driven = False
+        self.repeated = 0
 
     def release(self, constraints: ConstraintMap, modes: ModeState) -> ConstraintMap:
         """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
@@ -64,7 +67,17 @@ class Hold:
         """The modes, with pairs closed or sticking where a body would be free to move.
 
         opening, slip (m,): as they are, the slip of this step alone; before: the modes that led to them.
+        Raises ConvergenceError ("free motion") if the pairs that hold a body do not stay closed.
         """
+        held = self._choose(modes, opening, slip, before)
+        # Pairs that hold a body only by pulling open again each time: there is no state in which they hold it.
+        same = before is not None and held is not modes and held.fingerprint() == before.fingerprint()
+        self.repeated = self.repeated + 1 if same else 0
+        if self.repeated == MOST_REPEATED:
+            self.refuse_free_motion(modes)
+        return held
+
+    def _choose(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
         if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
@@ -109,7 +122,7 @@ class Hold:
         free = self.find_free(modes)
         if not free:
             return None
-        detail = f"nothing in the present contact prevents a {free}; hold it by a condition"
+        detail = f"nothing in the present contact prevents a {free}; hold it by a condition, or let elements be shorter where it touches"
         return ConvergenceError("free motion", detail)
 
     def refuse_free_motion(self, modes: ModeState) -> None:

@@ -29,7 +29,8 @@ ROUNDING = 1e-9
 SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
-    "KI": "intensity", "KII": "intensity", "reactions": "force",
+    "KI": "intensity", "KII": "intensity", "reactions": "force", "resultant": "force", "relative": "share",
+    "carried": "share",
 }  # fmt: skip
 GROUPS = {"reactions": "force", "energy": "energy"}
 
@@ -59,7 +60,7 @@ def read_results(path: Path) -> dict[str, Array]:
 
 def measure_scales(results: dict[str, Array]) -> dict[str, float]:
     """The largest magnitude of each kind of field."""
-    scales: dict[str, float] = {}
+    scales = {"share": 1.0}
     for name, values in results.items():
         kind = find_kind(name)
         if kind:

@@ -122,7 +122,8 @@ class Hold:
         free = self.find_free(modes)
         if not free:
             return None
-        detail = f"nothing in the present contact prevents a {free}; hold it by a condition, or let elements be shorter where it touches"
+        advice = "hold it by a condition, or use shorter elements where it touches"
+        detail = f"nothing in the present contact prevents a {free}; {advice}"
         return ConvergenceError("free motion", detail)
 
     def refuse_free_motion(self, modes: ModeState) -> None:

@@ -20,7 +20,7 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem
-from pbem.solve.tangent import AnyTangent, Solved, describe_residual, select_states
+from pbem.solve.tangent import AnyTangent, Solved, describe_residual, select_states, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -71,7 +71,7 @@ class ReleasedTangent:
         for _ in range(1 + MOST_CORRECTIONS):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load, constraints.released)
-            residual = problem.measure(left) / scale
+            residual = problem.measure(left) / size_residual(scale, unknowns)
             if best is not None and not residual < best.residual:
                 break
             best = Solved(unknowns, v, residual)

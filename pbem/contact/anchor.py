@@ -39,7 +39,7 @@ def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, .
     numbers = {name: number for number, name in enumerate(mesh.region_names)}
     bounds = np.searchsorted(mesh.region, np.arange(len(numbers) + 1)) * (mesh.order + 1)
     nodes = _Nodes(mesh, numbers, bounds, mesh.node_crack)
-    return tuple(anchor for group in _group_motions(motions) for anchor in _anchor_group(nodes, group))
+    return tuple(anchor for group in group_motions(motions) for anchor in _anchor_group(nodes, group))
 
 
 def see_motions(mesh: Mesh, anchors: Sequence[Anchor], motions: Sequence[FreeMotion]) -> Real:
@@ -57,7 +57,7 @@ def see_motions(mesh: Mesh, anchors: Sequence[Anchor], motions: Sequence[FreeMot
     return seen
 
 
-def _group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
+def group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
     """Motions that have regions in common, directly or by way of others."""
     members: dict[int, list[int]] = {}
     group_of: dict[str, int] = {}

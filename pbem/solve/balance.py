@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
+from pbem.contact.anchor import group_motions
 from pbem.contact.loads import Load
 from pbem.contact.support import Support
 from pbem.errors import ConvergenceError
@@ -26,6 +27,8 @@ Complex = NDArray[np.complex128]
 NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
+# Motions that differ by less than this part of their size are one.
+SAME = 1e-9
 
 
 def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
@@ -57,8 +60,8 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
     relative = np.where(finite, np.maximum(_divide(np.abs(force), forces), _divide(np.abs(moment), moments)), 0.0)
     carried = np.zeros(count)
     if support.acting.shape[1]:
-        for motion in support.motions:
-            own, part = _measure_power(problem, motion, middle, (force, moment), (forces, moments))
+        for motions in group_motions(support.motions):
+            own, part = _measure_carried(problem, motions, middle, (force, moment), (forces, moments))
             carried[own] = np.maximum(carried[own], part)
     return Balance(np.stack([force.real, force.imag, moment], axis=1), relative, carried)
 
@@ -72,18 +75,29 @@ def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
     return max(FAINT * largest, rounding * problem.traction_scale * moved)
 
 
-def _measure_power(
-    problem: Problem, motion: FreeMotion, middle: Complex, left: tuple[Complex, Real], whole: tuple[Real, Real]
+def _measure_carried(
+    problem: Problem, motions: list[FreeMotion], middle: Complex, left: tuple[Complex, Real], whole: tuple[Real, Real]
 ) -> tuple[list[int], float]:
-    """The regions of a motion, and the power of what is left over on them, to that of all forces without signs."""
+    """The regions of motions that have some in common, and the part of what is left over that works on the motions.
+
+    Whatever motions span the same space, the part is the same; of one body it is that of its own forces.
+    """
     numbers = {name: number for number, name in enumerate(problem.mesh.region_names)}
-    power, scale = 0.0, 0.0
-    for name, (shift, spin) in motion.velocities.items():
-        at = numbers[name]
-        velocity = shift + 1j * spin * middle[at]
-        power += float((np.conj(left[0][at]) * velocity).real + left[1][at] * spin)
-        scale += float(whole[0][at] * abs(velocity) + whole[1][at] * abs(spin))
-    return [numbers[name] for name in motion.velocities], abs(power) / scale if scale > 0 else 0.0
+    own = sorted({numbers[name] for motion in motions for name in motion.velocities})
+    # A lever makes moments forces, and turns velocities.
+    lever = _divide(whole[1][own], whole[0][own])
+    moves = np.zeros((len(own), 3, len(motions)))
+    for column, motion in enumerate(motions):
+        for name, (shift, spin) in motion.velocities.items():
+            at = own.index(numbers[name])
+            velocity = shift + 1j * spin * middle[own[at]]
+            moves[at, :, column] = velocity.real, velocity.imag, spin * lever[at]
+    directions, sizes, _ = np.linalg.svd(moves.reshape(3 * len(own), -1), full_matrices=False)
+    directions = directions[:, sizes > SAME * sizes.max(initial=0.0)]
+    moment = _divide(left[1][own], lever)
+    power = np.stack([left[0][own].real, left[0][own].imag, moment], axis=1).ravel() @ directions
+    scale = whole[0][own] @ np.linalg.norm(directions.reshape(len(own), 3, -1), axis=1)
+    return own, float(np.linalg.norm(_divide(power, scale)))
 
 
 def _divide(part: Real, whole: Real) -> Real:

@@ -70,7 +70,7 @@ def find_free_motions(model: Model, ties: Mapping[str, Tie | PairTie] | None = N
     center, scale = _frame(model)
     links = [*_link_to_ground(model, center, scale), *_link_regions(model, names, dict(ties or {}), center, scale)]
     return tuple(
-        _describe(vector, [names[body] for body in bodies], center, scale)
+        describe_motion(vector, [names[body] for body in bodies], center, scale)
         for bodies, vector in find_moving_bodies(len(names), links)
     )
 
@@ -151,7 +151,8 @@ def _touches(model: Model, joint: Interface | Contact) -> bool:
     return measure_opening(model, joint) <= max(TOUCHING * shorter, ROUNDINGS * sys.float_info.epsilon * largest)
 
 
-def _describe(vector: NDArray[np.float64], names: list[str], center: complex, scale: float) -> FreeMotion:
+def describe_motion(vector: NDArray[np.float64], names: list[str], center: complex, scale: float) -> FreeMotion:
+    """A motion (3 bodies,) of named bodies: along x, along y, and the angle times scale about the center."""
     velocities: dict[str, tuple[complex, float]] = {}
     parts: dict[str, list[str]] = {}
     moving = np.flatnonzero(np.abs(vector.reshape(-1, 3)).max(axis=1) >= 1e-6)

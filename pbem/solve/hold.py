@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.cut_parts import describe_cut_motions
 from pbem.contact.laws import SLIP, STICK, ModeState
 from pbem.contact.loads import Load
 from pbem.contact.support import close_nearest_pairs, stick_calmest_pairs
@@ -117,12 +118,20 @@ class Hold:
         support = self.problem.find_support(modes)
         return (support.text or None) if self.driven else support.unheld
 
+    def _find_cut_motion(self, modes: ModeState) -> str | None:
+        """The motions of parts that cracks cut off, for which there are no anchors."""
+        problem = self.problem
+        if not problem.parts.cut.any():
+            return None
+        return describe_cut_motions(problem.model, problem.mesh, problem.outer, problem.parts, modes)
+
     def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:
         """The error that names what can move freely in the present contact; None if nothing can."""
-        free = self.find_free(modes)
+        free, advice = self.find_free(modes), "hold it by a condition, or use shorter elements where it touches"
+        if not free:
+            free, advice = self._find_cut_motion(modes), "hold it by a condition"
         if not free:
             return None
-        advice = "hold it by a condition, or use shorter elements where it touches"
         detail = f"nothing in the present contact prevents a {free}; {advice}"
         return ConvergenceError("free motion", detail)
 

@@ -22,6 +22,7 @@ from pbem.contact.modes import Linearisation
 from pbem.contact.support import Support, find_support, find_ties
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.mesh.numbering import number_components, split_components
+from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
 from pbem.model.support import FreeMotion
 from pbem.parallel import gather_parts, norm_of_parts
@@ -76,6 +77,11 @@ class Problem:
     def second_faces(self) -> Integer:
         """Nodes of the cracks' second faces in the order in which results append them."""
         return second_face_nodes(self.mesh)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """Into which cracks cut the regions."""
+        return find_parts(self.mesh)
 
     def find_support(self, modes: ModeState) -> Support:
         """What holds the bodies in given modes; remembered, as modes are asked of several times."""

@@ -1,0 +1,138 @@
+"""The parts into which cracks cut the regions: faces of the plane graph of boundary elements and both crack faces.
+
+Every boundary element is travelled once and every crack element twice, always with material on the left; at its end the
+way goes on along the element that is the first one clockwise of where it came from. What closes counter-clockwise
+bounds a part, what closes clockwise is a hole or a group of cracks in one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from pbem.mesh.mesh import Mesh
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+
+# End points nearer to each other than this part of the model's size are one.
+COINCIDENT = 1e-9
+# Directions that differ by less (radians) are one.
+SAME_WAY = 1e-9
+
+
+@dataclass(frozen=True)
+class Parts:
+    """first, second (e,): the part on the left of every element, and that of a crack's second face (first elsewhere).
+
+    region (p,): of every part; the last one of an infinite region is that without a boundary. cut (p,): parts that
+    share their region with others.
+    """
+
+    first: Integer
+    second: Integer
+    region: Integer
+    cut: NDArray[np.bool_]
+
+
+def find_parts(mesh: Mesh) -> Parts:
+    """The parts of all regions; one for each that no cracks cut."""
+    first = mesh.region.astype(np.int64).copy()
+    second, region = first.copy(), list(range(len(mesh.region_names)))
+    for number in np.unique(mesh.region[mesh.crack]):
+        own = np.flatnonzero(mesh.region == number)
+        label, count = _divide_region(mesh, own)
+        if count < 2:
+            continue
+        numbers = np.array([number, *range(len(region), len(region) + count - 1)])
+        region += [int(number)] * (count - 1)
+        first[own] = numbers[label[: len(own)]]
+        second[own] = first[own]
+        crack = mesh.crack[own]
+        second[own[crack]] = numbers[label[len(own) :]]
+    owner = np.array(region, dtype=np.int64)
+    return Parts(first, second, owner, np.bincount(owner)[owner] > 1)
+
+
+def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
+    """Part of every way along the elements of a region, cracks' second faces last, and the number of parts."""
+    cracks = own[mesh.crack[own]]
+    start = np.concatenate([mesh.start[own], mesh.end[cracks]])
+    end = np.concatenate([mesh.end[own], mesh.start[cracks]])
+    leave, arrive = _find_directions(mesh, own)
+    back_leave, back_arrive = _find_directions(mesh, cracks)
+    leave, arrive = np.concatenate([leave, -back_arrive]), np.concatenate([arrive, -back_leave])
+    count = len(start)
+    vertex = _number_vertices(np.concatenate([start, end]))
+    follower = _follow(vertex[:count], vertex[count:], np.angle(leave), np.angle(-arrive))
+    loops, label = connected_components(
+        sparse.csr_matrix((np.ones(count), (np.arange(count), follower)), shape=(count, count)), directed=False
+    )
+    # Twice the area, and of an arc what lies beyond its chord.
+    origin = start.mean()
+    area = np.asarray((np.conj(start - origin) * (end - origin)).imag, dtype=float)
+    sweep = np.concatenate([mesh.sweep[own], -mesh.sweep[cracks]])
+    radius = np.abs(start - np.concatenate([mesh.center[own], mesh.center[cracks]]))
+    beyond = np.where(sweep != 0, radius**2 * (sweep - np.sin(sweep)), 0.0)
+    area = np.asarray(np.bincount(label, area + beyond, loops), dtype=float)
+    size = np.abs(start - origin).max() ** 2
+    outer = np.flatnonzero(area > COINCIDENT * size)
+    outer = outer[np.argsort(area[outer], kind="stable")]
+    if not len(outer):
+        return np.zeros(count, dtype=np.int64), 1
+    # Both sides of closed cracks cancel: what is left is the material's area, or that of the holes in a plane.
+    bounded = float(area.sum()) > COINCIDENT * size
+    part = np.full(loops, 0 if bounded else len(outer), dtype=np.int64)
+    part[outer] = np.arange(len(outer))
+    inner = np.setdiff1d(np.arange(loops), outer)
+    _, at = np.unique(label, return_index=True)
+    for number in reversed(range(len(outer))):
+        edges = label == outer[number]
+        part[inner[_is_inside(start[at[inner]], start[edges], end[edges])]] = number
+    return part[label], len(outer) + (not bounded)
+
+
+def _find_directions(mesh: Mesh, elements: Integer) -> tuple[Complex, Complex]:
+    """Directions of travel at the start and the end of elements."""
+    chord, sweep = mesh.end[elements] - mesh.start[elements], mesh.sweep[elements]
+    return chord * np.exp(-0.5j * sweep), chord * np.exp(0.5j * sweep)
+
+
+def _number_vertices(points: Complex) -> Integer:
+    places = np.stack([points.real, points.imag], axis=1)
+    near = cKDTree(places).query_pairs(COINCIDENT * float(np.abs(points - points.mean()).max()), output_type="ndarray")
+    count = len(points)
+    links = sparse.csr_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1])
+
+
+def _follow(leaves: Integer, reaches: Integer, leaving: NDArray[np.float64], coming: NDArray[np.float64]) -> Integer:
+    """The way (k,) that follows each: at its end the first clockwise of where it comes from (angles, radians)."""
+    order = np.argsort(leaves, kind="stable")
+    bounds = np.searchsorted(leaves[order], np.arange(max(leaves.max(), reaches.max()) + 2))
+    first, count = bounds[reaches], bounds[reaches + 1] - bounds[reaches]
+    follower, least = np.arange(len(leaves)), np.full(len(leaves), np.inf)
+    for number in range(int(count.max())):
+        ways = np.flatnonzero(count > number)
+        others = order[first[ways] + number]
+        clockwise = (coming[ways] - leaving[others]) % (2 * np.pi)
+        clockwise[clockwise < SAME_WAY] = 2 * np.pi  # the way back comes last
+        nearer = clockwise < least[ways]
+        follower[ways[nearer]], least[ways[nearer]] = others[nearer], clockwise[nearer]
+    return follower
+
+
+def _is_inside(points: Complex, start: Complex, end: Complex) -> NDArray[np.bool_]:
+    """Whether points lie inside of the polygon of edges: by crossings of a ray."""
+    inside = np.zeros(len(points), dtype=bool)
+    for number, point in enumerate(points):
+        crosses = (start.imag > point.imag) != (end.imag > point.imag)
+        a, b = start[crosses], end[crosses]
+        x = a.real + (point.imag - a.imag) / (b.imag - a.imag) * (b.real - a.real)
+        inside[number] = np.count_nonzero(x > point.real) % 2 == 1
+    return inside

@@ -25,6 +25,7 @@ from pbem.contact.modes import (
 from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast, do_on_first
+from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold, describe_free_motion, refuse_free_motion
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
@@ -74,7 +75,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     modes = hold.apply(memory.modes, laws.gap, np.zeros(laws.count))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    search = Search(MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED)
+    search = Search(MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED, laws.follows)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -92,9 +93,13 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             refuse_free_motion(problem, modes)
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
-        fails = outcome.settled and bool(outcome.failing.any())
+        fails, cascade = outcome.settled and bool(outcome.failing.any()), None
         if fails:
-            memory = replace(memory, broken=memory.broken | outcome.failing)
+            floor = _find_floor(problem, solved)
+            cascade = run_cascade(
+                problem, tangent, modes, memory, load, law, solved, outcome.failing, floor, search.most_pivoted
+            )
+            memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
@@ -107,7 +112,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         search.note(proposal)
         if len(search.counts) == problem.model.solver.newton_max_iterations:
             raise _end(problem, "iteration limit", proposal, search)
-        chosen = _pivot(problem, tangent, modes, memory, load, law, solved, search)
+        chosen = cascade.modes if cascade else _pivot(problem, tangent, modes, memory, load, law, solved, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
@@ -147,7 +152,7 @@ def _pivot(
         return None
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[group], sign[group] = found.modes.mode, found.modes.sign
-    return ModeState(mode, sign)
+    return ModeState(mode[problem.laws.leader], sign[problem.laws.leader])
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

@@ -59,11 +59,12 @@ FUTILE = 6
 class Search:
     """Watches the changes of modes and says what comes next; the same on all ranks, from the same proposals.
 
-    most_pivoted: the largest group of pairs that is solved by pivoting.
+    most_pivoted: the largest group of pairs that is solved by pivoting. follows (m,): pairs that take the mode of
+    another one, which are in no such group.
     """
 
-    def __init__(self, most_pivoted: int) -> None:
-        self.most_pivoted = most_pivoted
+    def __init__(self, most_pivoted: int, follows: NDArray[np.bool_] | None = None) -> None:
+        self.most_pivoted, self.follows = most_pivoted, follows
         self.restart()
 
     def restart(self) -> None:
@@ -85,8 +86,9 @@ class Search:
     def note(self, proposal: Proposal) -> None:
         """Take note of what the last solution asks for."""
         self.proposal = proposal
-        self.changed.append(np.flatnonzero(proposal.changed))
-        self.counts.append(len(self.changed[-1]))
+        own = proposal.changed if self.follows is None else proposal.changed & ~self.follows
+        self.changed.append(np.flatnonzero(own))
+        self.counts.append(int(proposal.changed.sum()))
         if not self.counts[-1] and self.level and not self.returned:
             self.level, self.returned = 0, True
 

@@ -113,6 +113,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         if len(search.counts) == problem.model.solver.newton_max_iterations:
             raise _end(problem, "iteration limit", proposal, search)
         chosen = cascade.modes if cascade else _pivot(problem, tangent, modes, memory, load, law, solved, search)
+        if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
+            raise _end(problem, "mode cycle", proposal, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():

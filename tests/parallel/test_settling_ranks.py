@@ -32,15 +32,16 @@ def test_this_model_takes_pivoting(monkeypatch: pytest.MonkeyPatch) -> None:
     assert max(map(len, groups)) > 0
 
 
-@pytest.mark.parametrize("operator", OPERATORS)
-def test_modes_and_iterations_are_the_same_on_all_ranks(operator: str, tmp_path: Path, mpirun: Launch) -> None:
+@pytest.mark.parametrize(("operator", "most"), [("dense", 3), ("hierarchical", 2)])
+def test_modes_and_iterations_are_the_same_on_all_ranks(
+    operator: str, most: int, tmp_path: Path, mpirun: Launch
+) -> None:
     (tmp_path / "junction.toml").write_text(OPERATORS[operator])
-    results = []
-    for ranks in (1, 2, 3):
+    (alone,) = run(OPERATORS[operator])
+    for ranks in range(2, most + 1):
         done = mpirun(ranks, "run", "junction.toml", "-o", f"{ranks}.h5", "--quiet", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
-        results.append(open_results(tmp_path / f"{ranks}.h5"))
-    for other in results[1:]:
-        assert other.steps.iterations.tolist() == results[0].steps.iterations.tolist()
-        for name in ("b0", "b1", "b2"):
-            np.testing.assert_array_equal(other.contact[name].mode, results[0].contact[name].mode)
+        results = open_results(tmp_path / f"{ranks}.h5")
+        assert results.steps.iterations.tolist() == [len(alone.iterations)]
+        modes = np.concatenate([results.contact[name].mode[-1] for name in ("b0", "b1", "b2")])
+        np.testing.assert_array_equal(modes, alone.contact.mode)

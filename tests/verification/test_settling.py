@@ -164,8 +164,8 @@ def test_a_loose_inclusion_under_tension_is_held_by_balanced_friction(load: Load
     pairs = mesh.pairs
     force = (contact.traction_n + 1j * contact.traction_s) * pairs.normal * pairs.weight
     scale = np.abs(force).sum()
-    assert abs(force.sum()) <= 1e-5 * scale
-    assert abs((np.conj(pairs.position) * force).imag.sum()) <= 1e-5 * scale
+    assert abs(force.sum()) <= 1e-3 * scale
+    assert abs((np.conj(pairs.position) * force).imag.sum()) <= 1e-3 * scale
 
 
 def write_cohesive_field(lost: bool) -> str:

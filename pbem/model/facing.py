@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from pbem.case import Case
 from pbem.errors import Fault
+from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points, measure_distances, project
+from pbem.model.intersection import inner_points, measure_distances, project, surround
 from pbem.model.junction import format_point, split_leg
 from pbem.model.loop import Loops, side_legs
 from pbem.model.model import Contact, Model, Region, Side
@@ -205,19 +206,32 @@ def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]])
         numbers = range(len(own)) if side.forward else range(len(own) - 1, -1, -1)
         legs += own
         names += [(side.curve, number) for number in numbers]
-    wanted, around = set(chosen), Surroundings(legs)
+    wanted = set(chosen)
     strips: dict[frozenset[tuple[str, int]], Strip] = {}
-    for name, leg in zip(names, legs, strict=True):
+    for (name, leg), near in zip(zip(names, legs, strict=True), _find_near(legs), strict=True):
         if name not in wanted:
             continue
+        around = Surroundings([legs[number] for number in near])
         points = inner_points(leg, SAMPLES)
         for inside, normals in ((False, leg_normals(leg, points)), (True, -leg_normals(leg, points))):
             seen = around.look_along(points, normals, 1e-12 * model.size)
             facing = (seen.leg >= 0) & ((-seen.product if inside else seen.product) < OPPOSITE)
             for number in np.unique(seen.leg[facing]):
-                other = names[number]
+                other = names[near[number]]
                 width = float(seen.distance[facing & (seen.leg == number)].min())
-                length = min(model.curves[name[0]].length, model.curves[other[0]].length)
+                length = min(leg.length, legs[near[number]].length)
                 if other in wanted and other != name and width < NARROW * length:
                     strips.setdefault(frozenset((name, other)), Strip(name, other, width, inside))
     return list(strips.values())
+
+
+def _find_near(legs: Sequence[Leg]) -> list[list[int]]:
+    """Of every leg the numbers of those, itself among them, that a narrow strip may lie between it and."""
+    reach = NARROW * np.array([leg.length for leg in legs])
+    corners = [surround([leg]) for leg in legs]
+    wide = [(low - (1 + 1j) * r, high + (1 + 1j) * r) for (low, high), r in zip(corners, reach, strict=True)]
+    near: list[list[int]] = [[] for _ in legs]
+    at, found = Boxes.of_corners(corners).find_meeting(Boxes.of_corners(wide))
+    for number, other in zip(at.tolist(), found.tolist(), strict=True):
+        near[number].append(other)
+    return near

@@ -30,7 +30,7 @@ OPPOSITE = -0.5
 NARROW = 0.25
 # Faces that touch may lie in one another by this part of the shorter curve (rounding, chords of curved sides).
 OVERLAP = 1e-3
-# A leg is not split nearer to its ends than this part of its mean element.
+# A leg is not split nearer to its ends than this part of its mean element, nor for faces farther away than that.
 LEAST_PIECE = 0.25
 
 
@@ -147,7 +147,8 @@ def split_opposite_ends(
 ) -> tuple[dict[str, Curve], list[str]]:
     """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
 
-    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well.
+    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well, and
+    faces far away are not.
     kept: curves that are not split. Ends near those of an element are left.
     """
     sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
@@ -192,7 +193,8 @@ def _find_opposite(
     outward = complex(leg_normals(leg, foot)[0]) * (1 if forward else -1)
     shorter = min(length, curve.length)
     ahead = ((end - complex(foot[0])) * outward.conjugate()).real
-    if min(t, 1 - t) * leg.elements < LEAST_PIECE or distance > shorter or ahead < -OVERLAP * shorter:
+    piece = LEAST_PIECE * leg.length / leg.elements
+    if min(t, 1 - t) * leg.length < piece or distance > piece or ahead < -OVERLAP * shorter:
         return None
     return None if (normal * outward.conjugate()).real > OPPOSITE else (number, t)
 

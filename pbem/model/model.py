@@ -87,7 +87,7 @@ class Interface:
 class Contact:
     """Two different outer curves that may touch; their meshes need not match, the gap follows from the geometry.
 
-    first, second: names of the curves; the first carries the contact pairs and gives their normal. Neither has a
+    first, second: names of the curves; the pairs lie on the first, which gives their normal. Neither has a
     Condition: where they do not touch they are free of traction.
     """
 

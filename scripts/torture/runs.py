@@ -138,7 +138,7 @@ def run_sample(seed: int, variant: int, folder: Path, kinds: tuple[str, ...]) ->
             judge(record, results, sample.draft.tables(units), read_checked_model(case).ties)
         elif world.size == 1:
             record.verdict = judge_end(sample, record.status, watch.target, stem.with_suffix(".open.toml"))
-            if record.status not in NAMED_REASONS or record.verdict == "squeezed":
+            if record.status not in NAMED_REASONS or (record.status, record.verdict) == ("free motion", "squeezed"):
                 record.faults.append(f"ended: {record.status} ({record.verdict})")
         for path in (case, output):
             path.unlink(missing_ok=True)

@@ -31,7 +31,7 @@ class Results:
     """What a result file holds. k stored steps, n nodes.
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; pairs: all of them at
-    once; groups: interfaces that a table [[generate]] made; tips: per crack its stress-intensity factors, J and T; energy: the
+    once; groups: interfaces that a table [[generate]] made; tips: per crack what its tips carry; energy: the
     balance; interior: points inside, None if the case has none; convergence: one row per Newton iteration with the
     fields step, iteration, residual, changed, stick, slip, open, seconds.
     failure: why the run ended early (status "failed"), otherwise empty.
@@ -181,10 +181,10 @@ def _read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
         return {}
     group = file["all/tips"]
     unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
-    values = [freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS]
+    values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
     moduli = group["plane_modulus"][...] if "plane_modulus" in group else np.full(len(names), np.nan)
     return {
-        name: Tips(*(each[:, number] for each in values), plane_modulus=float(moduli[number]))
+        name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
         for number, name in enumerate(names)
     }
 

@@ -21,6 +21,8 @@ Real = NDArray[np.float64]
 REACH = 0.5
 REACH_ALONG = 0.6
 MOST_INSIDE = 12
+# A crack that turns by more between two elements (radians) has a corner, where the field is not smooth.
+KINK = np.radians(10.0)
 # Elements of the crack up to so many radii are taken together.
 NEAR = 3.0
 
@@ -95,7 +97,7 @@ def _follow(mesh: Mesh, element: Integer, end: Integer, most: int) -> list[_Chai
 
 
 def _reach_along(mesh: Mesh, tip: complex, chain: _Chain) -> tuple[int, float]:
-    """How many elements lead away from the tip all the time, and the largest radius that they allow."""
+    """How many elements lead away from the tip without a corner, and the largest radius that they allow."""
     numbers = np.array(chain.elements)
     outward = np.array(chain.outward)
     start = np.where(outward, mesh.start[numbers], mesh.end[numbers]) - tip
@@ -104,6 +106,7 @@ def _reach_along(mesh: Mesh, tip: complex, chain: _Chain) -> tuple[int, float]:
     leaves, arrives = (end - start) * np.exp(-1j * half), (end - start) * np.exp(1j * half)
     away = (np.conj(start) * leaves).real >= 0
     away &= (np.conj(end) * arrives).real > 0
+    away[1:] &= np.abs(np.angle(leaves[1:] / arrives[:-1])) < KINK
     inside = len(away) if away.all() else int(np.argmin(away))
     if inside == 0:
         return 1, float(np.abs(end[0]))

@@ -1,4 +1,4 @@
-"""What the jumps near a crack tip say of it: stress-intensity factors, J-integral and T-stress by conservation integrals.
+"""Stress-intensity factors, J-integral and T-stress of a tip by conservation integrals over the jumps near it.
 
 Read from the last element alone, K is as wrong as the jump there: by a tenth where elements grow fast. The jumps of all
 elements near the tip are right in the mean: their tractions fulfil the equations at the collocation points. So three
@@ -36,8 +36,8 @@ STRAIGHT = 1e-9
 
 @dataclass(frozen=True)
 class TipForms:
-    """By the jumps x (2 m (p + 1),) of all nodes, or of the first ones: intensity (2, :), KI and KII; release (n, n), J is
-    x . release x; parallel (l,), the T-stress's part of them.
+    """By the jumps x (2 m (p + 1),) of all nodes, or of the first ones: intensity (2, :), KI and KII; release (n, n),
+    J is x . release x; parallel (l,), the T-stress's part of them.
 
     of_mean (j,) complex: T has the real part of its sum with the mean displacement of both faces; of_normal (j,): and
     of its sum with the normal stress on the faces.
@@ -111,8 +111,9 @@ class _Near:
         self.weight = np.pi * self.radius * weights
         self.spread = _differentiate(points) / (np.pi * self.radius)
         self.moved = self.field.displacement(self.radius * self.normal)
-        one = np.ones(ON_CIRCLE, dtype=complex)
-        self.on_x, self.on_y = (self.field.traction(self.radius * self.normal, n * one) for n in (1, 1j))
+        along_x = np.ones(ON_CIRCLE, dtype=complex)
+        self.on_x = self.field.traction(self.radius * self.normal, along_x)
+        self.on_y = self.field.traction(self.radius * self.normal, 1j * along_x)
 
     def integrate_intensity(self) -> Real:
         """K by Betti's theorem with the duals of the square-root fields: on the circle and on both faces.
@@ -166,14 +167,14 @@ class _Near:
         along, normal = (np.conj(a) * self.on_faces).real, (np.conj(1j * a) * self.on_faces).real
         stretched = (np.conj(a) * self.across).real
         ahead, aside = a.real, -a.imag
-        g = a * (stretched * aside - along * ahead) + 1j * a * (along * aside - normal * ahead)
+        g: Complex = a * (stretched * aside - along * ahead) + 1j * a * (along * aside - normal * ahead)
         s, weight = self._divide_faces(by_length=False)
         slope = self._spread_over_nodes(differentiate(self.local, s), weight)
         jumps = self._jumps(s)
         form = -_multiply(slope @ g, jumps)
         # Between elements, and where the circle cuts the last.
         ends = np.stack([np.full(len(s), -1.0), self.last], axis=1)
-        values = (self._spread_over_nodes(interpolate(self.local, ends), np.ones_like(ends)) @ g)
+        values = self._spread_over_nodes(interpolate(self.local, ends), np.ones_like(ends)) @ g
         at_ends = self._jumps(ends)
         form += _multiply(values[-1:], at_ends[-1:])
         form -= _multiply(values[2::2] - values[1:-1:2], 0.5 * (at_ends[2::2] + at_ends[1:-1:2]))

@@ -154,17 +154,16 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
     if not len(number):
         return TipRules(cracks, is_tip, gap, model, mesh, ())
     paths = trace_paths(mesh, element, number % 2, MOST_WHOLE)
-    point = np.where(number % 2 == 0, mesh.start[element], mesh.end[element])
     seen = [_see_from_tip(mesh, path) for path in paths]
     regions = mesh.region[element]
-    alike: dict[Hashable, list[int]] = {}
-    for place, (path, shape) in enumerate(zip(paths, seen, strict=True)):
+    alike: dict[tuple[Material, tuple[Hashable, ...]], list[int]] = {}
+    for place, (path, view) in enumerate(zip(paths, seen, strict=True)):
         material = model.regions[int(regions[place])].material
-        alike.setdefault((material, *_describe(path, shape, mesh)), []).append(place)
+        alike.setdefault((material, _describe(path, view, mesh)), []).append(place)
     pair_of = np.full(mesh.nodes, -1)
     pair_of[mesh.pairs.first[mesh.pairs.crack]] = np.flatnonzero(mesh.pairs.crack)
     groups = []
-    for (material, *_), places in alike.items():
+    for (material, _), places in alike.items():
         path, (elements, _, _) = paths[places[0]], seen[places[0]]
         tip = np.where(path.outward, mesh.tip[path.elements], np.array([0, 2, 1])[mesh.tip[path.elements]])
         shape = TipShape(elements, tip, mesh.crack_local, material.kappa, path.whole, path.near, path.cut, path.cut_at)

@@ -178,8 +178,8 @@ class ResultWriter:
         for quantity in PAIR_DATASETS if len(self._pairs) else ():
             append_row(together["contact"][quantity], getattr(step.contact, quantity)[self._pairs])
         if self._model.crack_tips:
-            for kind, values in self._tip_rules.evaluate_all(step).items():
-                append_row(together["tips"][kind], values)
+            for kind, at_tips in self._tip_rules.evaluate_all(step).items():
+                append_row(together["tips"][kind], at_tips)
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.

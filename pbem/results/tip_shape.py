@@ -14,6 +14,7 @@ left and the right one for somebody who leaves the tip. Stresses are in units of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -257,7 +258,7 @@ class _Near:
         return rows
 
 
-def _multiply(first: Complex, second: Complex) -> Real:
+def _multiply(first: NDArray[Any], second: NDArray[Any]) -> Real:
     """The form of the sum of the scalar products of vectors, by their rows."""
     return np.asarray(first.real.T @ second.real + first.imag.T @ second.imag)
 

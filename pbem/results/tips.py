@@ -91,7 +91,7 @@ class TipRules:
             slides = (contact.slip != 0)[first].any(axis=1)
             KI[group.tip] = np.where(opens, factors[:, 0], 0.0)
             KII[group.tip] = np.where(slides, factors[:, 1], 0.0)
-        return KI.reshape(-1, 2), KII.reshape(-1, 2)
+        return KI.reshape(-1, 2) + 0.0, KII.reshape(-1, 2) + 0.0  # no negative zeros
 
     def evaluate_release(self, contact: ContactState) -> Real:
         """J (cracks, 2), stress times length: the energy released per length of growth straight ahead."""
@@ -99,8 +99,8 @@ class TipRules:
         for group in self.groups:
             jumps = self._jumps(contact, group)[:, : len(group.forms.release)]
             form = np.einsum("ki,ij,kj->k", jumps, group.forms.release, jumps, optimize=True)
-            J[group.tip] = group.material.plane_modulus / group.length * form + 0.0
-        return J.reshape(-1, 2)
+            J[group.tip] = group.material.plane_modulus / group.length * form
+        return J.reshape(-1, 2) + 0.0
 
     def evaluate_parallel(self, step: Step) -> Real:
         """T (cracks, 2), stress: what stays finite at the tip of the normal stress along the crack, loads included."""

@@ -142,7 +142,7 @@ def arc_crack_intensity(radius: float, half_angle: float, stress: float) -> Inte
 
 
 def arc_crack_parallel_stress(half_angle: float, stress: float) -> float:
-    """T-stress of the crack of `arc_crack_intensity`: the potential of Muskhelishvili, section 124, without its root."""
+    """T-stress of the crack of `arc_crack_intensity`: what its potential has beside the root (Muskhelishvili, 124)."""
     share = np.sin(0.5 * half_angle) ** 2
     return float(2 * stress * share / (1 + share))
 

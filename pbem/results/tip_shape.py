@@ -31,8 +31,8 @@ ON_CIRCLE = 32
 ON_ELEMENT = 10
 # Of the polynomials that the smooth part of the mean displacement is continued to the tip by.
 MOST_DEGREE = 5
-# A crack turns by less than this (radians) from end to end if it is straight.
-STRAIGHT = 1e-9
+# A straight crack turns by less than this (radians), and leaves its line by less than this part of its length.
+STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True)

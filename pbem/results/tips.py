@@ -17,7 +17,7 @@ from pbem.model.material import Material
 from pbem.model.model import Model
 from pbem.results.tip_field import TipShape
 from pbem.results.tip_path import TipPath, trace_paths
-from pbem.results.tip_shape import TipForms, derive_forms
+from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import ContactState, Step
 
@@ -187,10 +187,26 @@ def _see_from_tip(mesh: Mesh, path: TipPath) -> tuple[Elements, complex, float]:
     )  # fmt: skip
     chord = elements.end[0] - elements.start[0]
     length = float(np.abs(chord))
-    direction = complex(-chord / length * np.exp(-0.5j * elements.sweep[0]))
+    direction = _find_direction(elements)
     tip, turned = elements.start[0], np.conj(direction) / length
     start, end, center = ((points - tip) * turned for points in (elements.start, elements.end, elements.center))
     return Elements(start, end, np.where(elements.sweep == 0, 0, center), elements.sweep), direction, length
+
+
+def _find_direction(elements: Elements) -> complex:
+    """The direction in which the tip of a crack with these elements points.
+
+    Of a straight crack it is that of all of it: the ends of a short element have lost digits if it lies far from the
+    origin.
+    """
+    start, end, sweep = elements.start, elements.end, elements.sweep
+    chord = end - start
+    rounding = 16 * np.finfo(float).eps * np.abs(end) / np.abs(chord)
+    turned = np.abs(np.angle(chord / chord[np.argmax(np.abs(chord))])) > STRAIGHT + rounding
+    if not turned.any() and not sweep.any():
+        chord = end - start[0]
+        return complex(-chord[-1] / np.abs(chord[-1]))
+    return complex(-chord[0] / np.abs(chord[0]) * np.exp(-0.5j * sweep[0]))
 
 
 def _describe(path: TipPath, seen: tuple[Elements, complex, float], mesh: Mesh) -> tuple[Hashable, ...]:

@@ -16,8 +16,8 @@ from pbem.exact import (
     collinear_cracks_intensity,
     inclined_crack_intensity,
 )
-from pbem.model.material import Material
 from pbem.mesh.generate import generate_mesh
+from pbem.model.material import Material
 from pbem.model.model import Law, Model, Stage
 from pbem.results.tips import collect_tip_rules
 from tests.verification.planes import FREE, ROCK, make_arc, make_plane, make_straight, solve
@@ -67,7 +67,7 @@ def test_griffith_crack_without_tip_elements(order: int, power: float | None) ->
 
 
 @pytest.mark.parametrize("pressurised", [False, True])
-def test_T_is_the_stress_along_the_crack_that_stays_finite_at_the_tip(pressurised: bool) -> None:
+def test_parallel_stress_is_the_stress_along_the_crack_that_stays_finite_at_the_tip(pressurised: bool) -> None:
     # A pressurised crack is one under tension without the uniform tension across it.
     along = np.exp(0.4j)
     sxx, syy, sxy = 0.7, 1.5, -0.4
@@ -82,7 +82,7 @@ def test_T_is_the_stress_along_the_crack_that_stays_finite_at_the_tip(pressurise
     expect_factors(found["T"][0], sxx + syy - 2 * across, 1e-10)
 
 
-def test_T_of_an_edge_crack() -> None:
+def test_parallel_stress_of_an_edge_crack() -> None:
     # Fett, T-stress in edge-cracked specimens: -0.526 of the tension of a half-plane.
     solved = solve_plate(100.0, 200.0, (0.0, 1.0), {}, 12, power=4.0)
     found = collect_tip_rules(solved.model, solved.mesh).evaluate_all(solved.last)
@@ -95,8 +95,8 @@ def test_T_of_an_edge_crack() -> None:
 def test_griffith_crack_cut_and_graded_anyhow(seed: int) -> None:
     way = make_griffith(seed)
     found = measure(way)
-    assert found.KI < 3e-3 and found.KII < 3e-3, way.text
-    assert found.T < 3e-3, way.text
+    # Exact but for rounding: the first elements are as short as 1e-6 of the distance from the origin.
+    assert found.KI < 1e-5 and found.KII < 1e-5 and found.T < 1e-5, way.text
     assert measure(limit_ratios(way)).J < 1e-2, way.text
 
 
@@ -130,7 +130,7 @@ def test_cracks_that_look_alike_share_what_is_derived_of_them() -> None:
     rng = np.random.default_rng(3)
     places = 9 * (np.arange(12) % 4 + 1j * (np.arange(12) // 4))
     along = np.exp(2j * np.pi * rng.random(12)) * rng.uniform(0.5, 1.5, 12)
-    cracks = {f"crack {k}": [make_straight(z - d, z + d, 8)] for k, (z, d) in enumerate(zip(places, along, strict=True))}
+    cracks = {f"crack {k}": [make_straight(places[k] - along[k], places[k] + along[k], 8)] for k in range(12)}
     model = make_plane((0.0, 1.0, 0.0), cracks)
     assert len(collect_tip_rules(model, generate_mesh(model)).groups) == 1
 

@@ -41,8 +41,8 @@ class Way:
 
 @dataclass(frozen=True)
 class Errors:
-    """Largest errors: of KI and KII relative to the root of the sum of their squares, of J to itself, of T to the stress
-    far away."""
+    """Largest errors: of KI and KII relative to the root of the sum of their squares, of J to itself, of T to the
+    stress far away."""
 
     KI: float
     KII: float

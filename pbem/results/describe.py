@@ -259,9 +259,9 @@ def _describe_tips(results: Results) -> list[str]:
 
 
 def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float, float, float]]:
-    """Crack, end, KI, KII, J, T of every end of a crack that is a tip."""
+    """Crack, end, KI, KII, J, T of every tip; those of cracks along interfaces have J alone."""
     values = zip(("start", "end"), *(each[-1].tolist() for each in (tips.KI, tips.KII, tips.J, tips.T)), strict=True)
-    return [(name, *each) for each in values if not np.isnan(each[1])]
+    return [(name, *each) for each in values if not (np.isnan(each[1]) and np.isnan(each[3]))]
 
 
 def _section(title: str, lines: Iterable[str]) -> str:

@@ -16,6 +16,7 @@ from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.configuration import dump_configuration
+from pbem.results.interface_tips import list_tip_curves
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
 
@@ -89,7 +90,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     together = file.create_group("all")
     _write_reactions(file.create_group("reactions"), together, list(model.conditions))
     _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
-    _write_tips(file.create_group("tips"), together.create_group("tips"), model)
+    _write_tips(file.create_group("tips"), together.create_group("tips"), model, mesh)
     energy = file.create_group("energy")
     for name in ENERGIES:
         _create_growing(energy, name, (), "f8")
@@ -133,13 +134,13 @@ def _write_reactions(group: h5py.Group, together: h5py.Group, names: list[str]) 
         source.create_view(group.id, name, number)
 
 
-def _write_tips(group: h5py.Group, together: h5py.Group, model: Model) -> None:
-    names = list(model.crack_tips)
+def _write_tips(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
+    names = list(list_tip_curves(model, mesh))
     group.attrs["names"] = _text(names)
     if not names:
         return
     of_crack = {name: region.material.plane_modulus for region in model.regions for name in region.cracks}
-    together["plane_modulus"] = np.array([of_crack[name] for name in names])
+    together["plane_modulus"] = np.array([of_crack.get(name, np.nan) for name in names])
     sources = {kind: Columns(_create_growing(together, kind, (len(names), 2), "f8")) for kind in TIP_DATASETS}
     for number, name in enumerate(names):
         crack = create_group(group.id, name)

@@ -16,6 +16,7 @@ AGREEMENT = 0.02
 SMALL = 1e-6
 MOST_NAMES = 8
 ENDS = ("start", "end")
+ALONG = "a crack along an interface ends there, whose field oscillates if the materials differ; J is what it releases"
 
 
 def compare_release(results: Results) -> list[str]:
@@ -51,7 +52,10 @@ def explain_missing_factors(results: Results) -> list[str]:
     ends = _find_crack_ends(results)
     reasons: dict[str, list[str]] = defaultdict(list)
     for name, end in missing:
-        if name in ends and (reason := _find_reason(results, name, meeting[ends[name][end]])):
+        if name not in ends:
+            if not np.isnan(results.tips[name].J[-1, end]):
+                reasons[ALONG].append(f"'{name}' ({ENDS[end]})")
+        elif (reason := _find_reason(results, name, meeting[ends[name][end]])):
             reasons[reason].append(f"'{name}' ({ENDS[end]})")
     return [f"No K at {list_names(names, MOST_NAMES)}: {reason}." for reason, names in reasons.items()]
 

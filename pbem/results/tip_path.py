@@ -61,7 +61,7 @@ def trace_paths(mesh: Mesh, element: Integer, end: Integer, most_whole: int) -> 
     tips = np.where(end == 0, mesh.start[element], mesh.end[element])
     reach = [_reach_along(mesh, tip, chain) for tip, chain in zip(tips, chains, strict=True)]
     inside = [chain.elements[:count] for chain, (count, _) in zip(chains, reach, strict=True)]
-    free = _measure_clearance(mesh, tips, np.array([distance for _, distance in reach]), inside)
+    free = measure_clearance(mesh, tips, np.array([distance for _, distance in reach]), inside)
     return [
         _cut(mesh, tip, chain, count, distance, clearance)
         for tip, chain, (count, distance), clearance in zip(tips, chains, reach, free, strict=True)
@@ -116,7 +116,7 @@ def _reach_along(mesh: Mesh, tip: complex, chain: _Chain) -> tuple[int, float]:
     return inside, (REACH_ALONG if chain.ends_in_tip else REACH) * farthest
 
 
-def _measure_clearance(mesh: Mesh, tips: Complex, radius: Real, own: list[list[int]]) -> Real:
+def measure_clearance(mesh: Mesh, tips: Complex, radius: Real, own: list[list[int]]) -> Real:
     """Distance of each tip to the nearest element that is not its own; infinite beyond twice the radius."""
     lengths = Elements(mesh.start, mesh.end, mesh.center, mesh.sweep).lengths
     middle = 0.5 * (mesh.start + mesh.end)

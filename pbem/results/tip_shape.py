@@ -110,7 +110,7 @@ class _Near:
         self.turn = np.pi * points + np.angle(-cut)
         self.normal = np.exp(1j * self.turn)
         self.weight = np.pi * self.radius * weights
-        self.spread = _differentiate(points) / (np.pi * self.radius)
+        self.spread = differentiate_at(points) / (np.pi * self.radius)
         self.moved = self.field.displacement(self.radius * self.normal)
         along_x = np.ones(ON_CIRCLE, dtype=complex)
         self.on_x = self.field.traction(self.radius * self.normal, along_x)
@@ -263,7 +263,7 @@ def _multiply(first: NDArray[Any], second: NDArray[Any]) -> Real:
     return np.asarray(first.real.T @ second.real + first.imag.T @ second.imag)
 
 
-def _differentiate(points: Real) -> Real:
+def differentiate_at(points: Real) -> Real:
     """Matrix of the derivatives at points of the polynomial through values there (Berrut, Trefethen 2004)."""
     apart = points[:, None] - points
     np.fill_diagonal(apart, 1.0)

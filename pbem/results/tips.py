@@ -15,6 +15,8 @@ from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.material import Material
 from pbem.model.model import Model
+from pbem.results.interface_release import InterfaceRelease, prepare_interface_release
+from pbem.results.interface_tips import list_tip_curves
 from pbem.results.tip_field import TipShape
 from pbem.results.tip_path import TipPath, trace_paths
 from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
@@ -54,8 +56,8 @@ class _Alike:
 class TipRules:
     """How the values at the tips follow from the pairs and from the displacement of the faces.
 
-    cracks: their names. is_tip (2 cracks,): of the start and the end of the first crack, of the second, ...
-    gap (m,): the initial gap of all pairs.
+    cracks: their names, then those of interfaces that end as a crack does. is_tip (2 cracks,): of the start and the end
+    of the first crack, of the second, ...; False on interfaces. gap (m,): the initial gap of all pairs.
     """
 
     cracks: tuple[str, ...]
@@ -64,15 +66,19 @@ class TipRules:
     model: Model
     mesh: Mesh
     groups: tuple[_Alike, ...]
+    interfaces: InterfaceRelease
 
     def evaluate(self, contact: ContactState) -> dict[str, tuple[Real, Real]]:
         """KI and KII (2,) of every crack at its start and its end, as in `evaluate_factors`."""
         return dict(zip(self.cracks, zip(*self.evaluate_factors(contact), strict=True), strict=True))
 
     def evaluate_all(self, step: Step) -> dict[str, Real]:
-        """KI, KII, J and T (cracks, 2) at start and end."""
+        """KI, KII, J and T (cracks, 2) at start and end; of cracks along interfaces J alone."""
         KI, KII = self.evaluate_factors(step.contact)
-        return {"KI": KI, "KII": KII, "J": self.evaluate_release(step.contact), "T": self.evaluate_parallel(step)}
+        J = self.evaluate_release(step.contact)
+        for tip, released in zip(self.interfaces.tips, self.interfaces.evaluate(step), strict=True):
+            J[self.cracks.index(tip.name), tip.end] = released
+        return {"KI": KI, "KII": KII, "J": J, "T": self.evaluate_parallel(step)}
 
     def evaluate_factors(self, contact: ContactState) -> tuple[Real, Real]:
         """KI and KII (cracks, 2) at start and end, stress times sqrt(length); NaN where no tip is.
@@ -94,7 +100,8 @@ class TipRules:
         return KI.reshape(-1, 2) + 0.0, KII.reshape(-1, 2) + 0.0  # no negative zeros
 
     def evaluate_release(self, contact: ContactState) -> Real:
-        """J (cracks, 2), stress times length: the energy released per length of growth straight ahead."""
+        """J (cracks, 2), stress times length: the energy released per length of growth straight ahead; NaN on
+        interfaces, whose J needs all of the boundary."""
         J = self._start()
         for group in self.groups:
             jumps = self._jumps(contact, group)[:, : len(group.forms.release)]
@@ -144,15 +151,16 @@ class TipRules:
 
 def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
     """How the values at the tips follow from the jumps; the forms are derived once for all cracks that look alike."""
-    cracks = tuple(model.crack_tips)
-    is_tip = np.array(list(model.crack_tips.values()), dtype=bool).ravel()
+    cracks = list_tip_curves(model, mesh)
+    interfaces = prepare_interface_release(model, mesh)
+    is_tip = np.array([model.crack_tips.get(name, (False, False)) for name in cracks], dtype=bool).ravel()
     number = np.flatnonzero(is_tip)
     sorted_pairs = sort_pairs(mesh)
     own = [sorted_pairs[cracks[tip // 2]][-1 if tip % 2 else 0] for tip in number]
     element = mesh.pairs.first[np.array(own, dtype=np.int64)] // (mesh.order + 1)
     gap = collect_laws(model, mesh).gap
     if not len(number):
-        return TipRules(cracks, is_tip, gap, model, mesh, ())
+        return TipRules(cracks, is_tip, gap, model, mesh, (), interfaces)
     paths = trace_paths(mesh, element, number % 2, MOST_WHOLE)
     seen = [_see_from_tip(mesh, path) for path in paths]
     regions = mesh.region[element]
@@ -175,7 +183,7 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
             np.array([seen[place][1] for place in places]), np.array([seen[place][2] for place in places]),
             pair_of[nodes], np.repeat(sense, mesh.order + 1, axis=1),
         ))  # fmt: skip
-    return TipRules(cracks, is_tip, gap, model, mesh, tuple(groups))
+    return TipRules(cracks, is_tip, gap, model, mesh, tuple(groups), interfaces)
 
 
 def _see_from_tip(mesh: Mesh, path: TipPath) -> tuple[Elements, complex, float]:

@@ -177,7 +177,7 @@ class ResultWriter:
             append_row(together["reactions"], to_columns(self._sum_reactions(step.traction)))
         for quantity in PAIR_DATASETS if len(self._pairs) else ():
             append_row(together["contact"][quantity], getattr(step.contact, quantity)[self._pairs])
-        if self._model.crack_tips:
+        if self._tip_rules.cracks:
             for kind, at_tips in self._tip_rules.evaluate_all(step).items():
                 append_row(together["tips"][kind], at_tips)
         for kind in ENERGIES:

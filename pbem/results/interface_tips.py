@@ -92,9 +92,9 @@ def _make_tip(
     if abs(np.angle(_tangent(mesh, sides[0][1][0], True) / _tangent(mesh, sides[0][2][0], False))) > KINK:
         return None  # a corner, whose singularity is another one
     reach = min(float(max(abs(mesh.start[chain[-1]] - point), abs(mesh.end[chain[-1]] - point))) for chain in chains)
-    inside = np.concatenate(chains).tolist()
-    clearance = measure_clearance(mesh, np.array([point]), np.array([reach]), [inside])[0]
-    most = min(REACH_ALONG * reach, REACH * float(clearance))
+    inside: Integer = np.concatenate(chains)
+    clearance = measure_clearance(mesh, np.array([point]), np.array([reach]), np.zeros_like(inside), inside)
+    most = min(REACH_ALONG * reach, REACH * float(clearance[0]))
     tip = InterfaceTip(name, end, point, complex(direction / abs(direction)), tuple(sides), most)
     return InterfaceTip(name, end, point, tip.direction, tip.sides, _choose_radius(mesh, tip, most))
 

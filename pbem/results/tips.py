@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +17,7 @@ from pbem.model.model import Model
 from pbem.results.interface_release import InterfaceRelease, prepare_interface_release
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.tip_field import TipShape
-from pbem.results.tip_path import TipPath, trace_paths
+from pbem.results.tip_path import TipPaths, trace_paths, view_outward
 from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import ContactState, Step
@@ -161,48 +160,55 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
     gap = collect_laws(model, mesh).gap
     if not len(number):
         return TipRules(cracks, is_tip, gap, model, mesh, (), interfaces)
-    paths = trace_paths(mesh, element, number % 2, MOST_WHOLE)
-    seen = [_see_from_tip(mesh, path) for path in paths]
-    regions = mesh.region[element]
-    alike: dict[tuple[Material, tuple[Hashable, ...]], list[int]] = {}
-    for place, (path, view) in enumerate(zip(paths, seen, strict=True)):
-        material = model.regions[int(regions[place])].material
-        alike.setdefault((material, _describe(path, view, mesh)), []).append(place)
     pair_of = np.full(mesh.nodes, -1)
     pair_of[mesh.pairs.first[mesh.pairs.crack]] = np.flatnonzero(mesh.pairs.crack)
-    groups = []
-    for (material, _), places in alike.items():
-        path, (elements, _, _) = paths[places[0]], seen[places[0]]
-        tip = np.where(path.outward, mesh.tip[path.elements], np.array([0, 2, 1])[mesh.tip[path.elements]])
-        shape = TipShape(elements, tip, mesh.crack_local, material.kappa, path.whole, path.near, path.cut, path.cut_at)
-        at = np.array(places)
-        nodes = np.array([_list_outward(mesh, paths[place]) for place in places])
-        sense = np.array([np.where(paths[place].outward, 1.0, -1.0) for place in places])
-        groups.append(_Alike(
-            derive_forms(shape), material, number[at], regions[at],
-            np.array([seen[place][1] for place in places]), np.array([seen[place][2] for place in places]),
-            pair_of[nodes], np.repeat(sense, mesh.order + 1, axis=1),
-        ))  # fmt: skip
+    groups: list[_Alike] = []
+    for paths in trace_paths(mesh, element, number % 2, MOST_WHOLE):
+        groups += _gather_alike(model, mesh, paths, number, pair_of)
     return TipRules(cracks, is_tip, gap, model, mesh, tuple(groups), interfaces)
 
 
-def _see_from_tip(mesh: Mesh, path: TipPath) -> tuple[Elements, complex, float]:
-    """The elements of a path in the tip's frame; the direction that the tip points along, and the unit of length."""
-    own = path.elements
-    elements = Elements(
-        np.where(path.outward, mesh.start[own], mesh.end[own]), np.where(path.outward, mesh.end[own], mesh.start[own]),
-        mesh.center[own], np.where(path.outward, mesh.sweep[own], -mesh.sweep[own]),
-    )  # fmt: skip
-    chord = elements.end[0] - elements.start[0]
-    length = float(np.abs(chord))
-    direction = _find_direction(elements)
-    tip, turned = elements.start[0], np.conj(direction) / length
+def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pair_of: Integer) -> list[_Alike]:
+    """Sort paths by what they look like."""
+    seen, direction, length = _see_from_tip(mesh, paths)
+    region = mesh.region[paths.elements[:, 0]]
+    tip = np.where(paths.outward, mesh.tip[paths.elements], np.array([0, 2, 1])[mesh.tip[paths.elements]])
+    chord = seen.end - seen.start
+    columns = np.column_stack([
+        np.round(chord[:, 1:] / chord[:, :-1] / ALIKE), np.round(seen.sweep / ALIKE), np.round(paths.cut_at / ALIKE),
+        paths.cut, paths.near, paths.whole, tip,
+    ]) + 0.0  # fmt: skip
+    alike: dict[tuple[Material, bytes], list[int]] = {}
+    for place, row in enumerate(np.ascontiguousarray(columns, dtype=complex)):
+        alike.setdefault((model.regions[int(region[place])].material, row.tobytes()), []).append(place)
+    groups = []
+    for (material, _), places in alike.items():
+        at, first = np.array(places), places[0]
+        shape = TipShape(
+            Elements(seen.start[first], seen.end[first], seen.center[first], seen.sweep[first]), tip[first],
+            mesh.crack_local, material.kappa, bool(paths.whole[first]), int(paths.near[first]), int(paths.cut[first]),
+            float(paths.cut_at[first]),
+        )  # fmt: skip
+        pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])]
+        sense = np.repeat(np.where(paths.outward[at], 1.0, -1.0), mesh.order + 1, axis=1)
+        groups.append(_Alike(derive_forms(shape), material, number[paths.tip[at]], region[at], direction[at],
+                             length[at], pair, sense))
+    return groups
+
+
+def _see_from_tip(mesh: Mesh, paths: TipPaths) -> tuple[Elements, Complex, Real]:
+    """The elements (k, m) of paths in the tips' frames; the directions (k,) of the tips, and the units of length."""
+    elements = view_outward(mesh, paths.elements, paths.outward)
+    tip = elements.start[:, :1]
+    length = np.abs(elements.end[:, 0] - tip[:, 0])
+    direction = _find_directions(elements)
+    turned = (np.conj(direction) / length)[:, None]
     start, end, center = ((points - tip) * turned for points in (elements.start, elements.end, elements.center))
     return Elements(start, end, np.where(elements.sweep == 0, 0, center), elements.sweep), direction, length
 
 
-def _find_direction(elements: Elements) -> complex:
-    """The direction in which the tip of a crack with these elements points.
+def _find_directions(elements: Elements) -> Complex:
+    """The directions (k,) in which the tips of cracks with these elements (k, m) point.
 
     Of a straight crack it is that of all of it: the ends of a short element have lost digits if it lies far from the
     origin.
@@ -210,25 +216,14 @@ def _find_direction(elements: Elements) -> complex:
     start, end, sweep = elements.start, elements.end, elements.sweep
     chord = end - start
     rounding = 16 * np.finfo(float).eps * np.abs(end) / np.abs(chord)
-    turned = np.abs(np.angle(chord / chord[np.argmax(np.abs(chord))])) > STRAIGHT + rounding
-    if not turned.any() and not sweep.any():
-        chord = end - start[0]
-        return complex(-chord[-1] / np.abs(chord[-1]))
-    return complex(-chord[0] / np.abs(chord[0]) * np.exp(-0.5j * sweep[0]))
+    longest = np.take_along_axis(chord, np.argmax(np.abs(chord), axis=1)[:, None], axis=1)
+    straight = ~(np.abs(np.angle(chord / longest)) > STRAIGHT + rounding).any(axis=1) & ~sweep.any(axis=1)
+    leading = np.where(straight, end[:, -1] - start[:, 0], chord[:, 0] * np.exp(-0.5j * sweep[:, 0]))
+    return np.asarray(-leading / np.abs(leading))
 
 
-def _describe(path: TipPath, seen: tuple[Elements, complex, float], mesh: Mesh) -> tuple[Hashable, ...]:
-    """What is equal for paths that look alike."""
-    elements = seen[0]
-    chord = elements.end - elements.start
-    ratio = np.concatenate([chord[1:] / chord[:-1], elements.sweep, [path.cut_at]])
-    rounded = np.round(ratio.astype(complex) / ALIKE) + 0.0
-    tips = mesh.tip[path.elements] > 0
-    return path.whole, path.near, path.cut, rounded.tobytes(), tips.tobytes()
-
-
-def _list_outward(mesh: Mesh, path: TipPath) -> Integer:
-    """The nodes of a path in the order in which they are met when leaving the tip."""
+def _list_outward(mesh: Mesh, elements: Integer, outward: NDArray[np.bool_]) -> Integer:
+    """The nodes (k, m (p + 1)) of elements (k, m) in the order in which they are met when leaving the tip."""
     within = np.arange(mesh.order + 1)
-    along = np.where(path.outward[:, None], within, within[::-1])
-    return np.asarray(path.elements[:, None] * (mesh.order + 1) + along).ravel()
+    along = np.where(outward[..., None], within, within[::-1])
+    return np.asarray((elements[..., None] * (mesh.order + 1) + along).reshape(len(elements), -1))

@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.curve import Leg
-from pbem.results.tip_path import TipPath, trace_paths
+from pbem.results.tip_path import TipPaths, trace_paths
 from tests.verification.planes import make_arc, make_plane, make_straight
+
+
+@dataclass(frozen=True)
+class TipPath:
+    """A single one of TipPaths."""
+
+    elements: NDArray[np.int64]
+    outward: NDArray[np.bool_]
+    whole: bool
+    near: int
+    cut: int
+    cut_at: float
+
+    @staticmethod
+    def of(paths: TipPaths) -> TipPath:
+        assert paths.tip.tolist() == [0]
+        return TipPath(paths.elements[0], paths.outward[0], bool(paths.whole[0]), int(paths.near[0]),
+                       int(paths.cut[0]), float(paths.cut_at[0]))
 
 
 def trace(cracks: dict[str, list[Leg]], name: str, end: int, most: int = 100) -> tuple[TipPath, Mesh]:
     mesh = generate_mesh(make_plane((0.0, 1.0, 0.0), cracks))
     own = np.flatnonzero(mesh.curve == mesh.curve_names.index(name))
-    return trace_paths(mesh, own[[-1 if end else 0]], np.array([end]), most)[0], mesh
+    (paths,) = trace_paths(mesh, own[[-1 if end else 0]], np.array([end]), most)
+    return TipPath.of(paths), mesh
 
 
 def radius_of(path: TipPath, mesh: Mesh, tip: complex) -> float:

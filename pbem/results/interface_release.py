@@ -21,6 +21,7 @@ from pbem.mesh.numbering import list_nodes
 from pbem.model.material import Material
 from pbem.model.model import Model
 from pbem.results.interface_tips import InterfaceTip, find_cut, find_interface_tips, select_element
+from pbem.results.tip_field import place_gauss
 from pbem.results.tip_shape import differentiate_at
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Step
@@ -99,7 +100,7 @@ def _integrate_arc(
     tip: InterfaceTip, turn: Real, half: float, moved: Complex, stress: Real, material: Material
 ) -> float:
     """Of w n_x - t . du/dx on an arc; x is the tip's direction, turn (p,) the angles from it, half: half the arc's."""
-    points, weights = np.polynomial.legendre.leggauss(ON_ARC)
+    points, weights = place_gauss(ON_ARC)
     normal = np.exp(1j * turn)
     local = moved * np.conj(tip.direction)
     sxx, syy, sxy = stress.T
@@ -173,7 +174,7 @@ class _BoundaryPart:
         self, mesh: Mesh, tip: InterfaceTip, element: int, low: float, high: float, displacement: Complex,
         traction: Complex,
     ) -> None:
-        points, weights = np.polynomial.legendre.leggauss(ON_ELEMENT)
+        points, weights = place_gauss(ON_ELEMENT)
         self._local = mesh.local[None]
         self._one = select_element(mesh, element)
         nodes = element * (mesh.order + 1) + np.arange(mesh.order + 1)
@@ -209,7 +210,7 @@ def prepare_interface_release(model: Model, mesh: Mesh) -> InterfaceRelease:
     tips = find_interface_tips(model, mesh)
     if not tips:
         return InterfaceRelease(model, mesh, (), np.zeros(0, dtype=complex), (), None)
-    points, arcs = np.polynomial.legendre.leggauss(ON_ARC)[0], []
+    points, arcs = place_gauss(ON_ARC)[0], []
     places, regions = [], []
     for tip in tips:
         for region, leaving, arriving in tip.sides:

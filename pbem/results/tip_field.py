@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,13 @@ class TipShape:
     near: int
     cut: int
     cut_at: float
+
+
+@cache
+def place_gauss(count: int) -> tuple[Real, Real]:
+    """Points in (-1, 1) and weights of Gauss's rule."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    return points, weights
 
 
 class Field:

@@ -19,9 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.interpolation import differentiate, interpolate, interpolate_tips
+from pbem.mesh.interpolation import interpolate_tips
+from pbem.mesh.shapes import interpolate_shapes
 from pbem.results.eigenfield import evaluate_eigenfield
-from pbem.results.tip_field import Field, TipShape
+from pbem.results.tip_field import Field, TipShape, place_gauss
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -75,15 +76,15 @@ def _integrate_straight_crack(shape: TipShape) -> Real:
     elements, length = shape.elements, abs(shape.elements.end[-1])
     traction = Field(shape, shape.elements.count).traction_at_nodes(True)
     turns = np.arccos(np.clip(1 - 2 * np.abs([elements.start, elements.end]) / length, -1, 1))
-    points, weights = np.polynomial.legendre.leggauss(ON_ELEMENT)
+    points, weights = place_gauss(ON_ELEMENT)
     half = 0.5 * (turns[1] - turns[0])
     turn = 0.5 * (turns[0] + turns[1])[:, None] + half[:, None] * points
     distance = 0.5 * length * (1 - np.cos(turn))
     low, high = np.abs(elements.start)[:, None], np.abs(elements.end)[:, None]
     along = (2 * distance - low - high) / (high - low)
     weight = half[:, None] * weights * (1 + np.cos(turn)) * np.sqrt(0.5 * length / np.pi)
-    local = np.broadcast_to(shape.local, (elements.count, len(shape.local)))
-    of_node = np.einsum("eq,eqj->ej", weight, interpolate(local, along)).ravel()
+    powers = along[..., None] ** np.arange(len(shape.local))
+    of_node = np.einsum("eq,eqj->ej", weight, powers @ interpolate_shapes(shape.local)).ravel()
     total = of_node @ traction
     return np.stack([total.imag, total.real])
 
@@ -104,9 +105,10 @@ class _Near:
         self.last[-1] = shape.cut_at
         self.elements = shape.elements.select(np.arange(inside))
         self.local = np.broadcast_to(shape.local, (inside, len(shape.local)))
+        self._powers, self._coefficients = np.arange(len(shape.local)), interpolate_shapes(shape.local)
         cut = complex(self.elements.place(self.last)[-1, -1])
         self.radius = abs(cut)
-        points, weights = np.polynomial.legendre.leggauss(ON_CIRCLE)
+        points, weights = place_gauss(ON_CIRCLE)
         self.turn = np.pi * points + np.angle(-cut)
         self.normal = np.exp(1j * self.turn)
         self.weight = np.pi * self.radius * weights
@@ -170,12 +172,12 @@ class _Near:
         ahead, aside = a.real, -a.imag
         g: Complex = a * (stretched * aside - along * ahead) + 1j * a * (along * aside - normal * ahead)
         s, weight = self._divide_faces(by_length=False)
-        slope = self._spread_over_nodes(differentiate(self.local, s), weight)
+        slope = self._spread_over_nodes(self._differentiate(s), weight)
         jumps = self._jumps(s)
         form = -_multiply(slope @ g, jumps)
         # Between elements, and where the circle cuts the last.
         ends = np.stack([np.full(len(s), -1.0), self.last], axis=1)
-        values = self._spread_over_nodes(interpolate(self.local, ends), np.ones_like(ends)) @ g
+        values = self._spread_over_nodes(self._interpolate(ends), np.ones_like(ends)) @ g
         at_ends = self._jumps(ends)
         form += _multiply(values[-1:], at_ends[-1:])
         form -= _multiply(values[2::2] - values[1:-1:2], 0.5 * (at_ends[2::2] + at_ends[1:-1:2]))
@@ -210,7 +212,7 @@ class _Near:
         start, chord = np.abs(self.elements.start), np.abs(self.elements.end - self.elements.start)
         low = np.sqrt(start / chord)
         high = np.sqrt(start / chord + 0.5 * (1 + self.last))
-        points, weights = np.polynomial.legendre.leggauss(ON_ELEMENT)
+        points, weights = place_gauss(ON_ELEMENT)
         root = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * points
         s = 2 * (root**2 - (start / chord)[:, None]) - 1
         weight = 2 * root * (high - low)[:, None] * weights
@@ -234,9 +236,17 @@ class _Near:
         chord = (self.elements.end - self.elements.start)[:, None]
         return np.asarray(chord / np.abs(chord) * np.exp(2j * np.arctan(quarter * s)))
 
+    def _interpolate(self, s: Real) -> Real:
+        """The nodes' polynomials (e, q, j) at s (e, q)."""
+        return np.asarray(s[..., None] ** self._powers @ self._coefficients)
+
+    def _differentiate(self, s: Real) -> Real:
+        """Their derivatives by s."""
+        return np.asarray(self._powers * s[..., None] ** np.maximum(self._powers - 1, 0) @ self._coefficients)
+
     def _gather(self, weight: Complex, s: Real) -> Complex:
         """Weights of the nodes from weights of the points s (e, q)."""
-        return np.asarray(np.einsum("eq,eqj->ej", weight, interpolate(self.local, s)).ravel())
+        return np.asarray(np.einsum("eq,eqj->ej", weight, self._interpolate(s)).ravel())
 
     def _spread_over_nodes(self, shapes: Real, weight: Real) -> Real:
         """Matrix (e q, e j) of shapes (e, q, j) times weights (e, q)."""
@@ -247,7 +257,7 @@ class _Near:
 
     def _jumps(self, s: Real) -> Complex:
         """Rows of the jump at s (e, q) by the jumps at the nodes."""
-        shapes = interpolate(self.local, s)
+        shapes = self._interpolate(s)
         tips = np.flatnonzero(self.shape.tip[: len(s)])
         if len(tips):
             shapes[tips] = interpolate_tips(self.shape.tip[tips], self.local[tips], s[tips])

@@ -97,7 +97,7 @@ def _solve(
         if interior is not None:
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-        store_steps(march(problem, listener, start), model.output_every, interior, writer)
+        store_steps(march(problem, listener, start), model.output_every, interior, writer, listener)
     except BaseException as error:
         if writer:
             writer.__exit__(type(error), error, error.__traceback__)
@@ -108,7 +108,8 @@ def _solve(
 
 
 def store_steps(
-    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None
+    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
+    listener: Reporter | None = None,
 ) -> None:
     """Write the steps as they come, those that are stored with the field at the interior points."""
     waiting: Step | None = None
@@ -119,7 +120,11 @@ def store_steps(
             if interior is not None and stored:
                 step = replace(step, interior=interior.evaluate(step))
             # An error of the first rank is every rank's.
-            do_on_first(world, PbemError, lambda due=step: writer.append(due) if writer else None)  # type: ignore[misc]
+            notes = do_on_first(
+                world, PbemError, lambda due=step: writer.append(due) if writer else (),  # type: ignore[misc]
+            )
+            for note in notes:
+                (listener or SilentReporter()).note(note)
     except ConvergenceError:
         # All ranks are here together: the last step reached is stored as well.
         if interior is not None and waiting is not None:

@@ -16,6 +16,7 @@ from pbem.model.model import Model, Operator
 from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.output import check_output_path
 from pbem.results.reader import Results, open_results
+from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.fields import InteriorField
@@ -69,7 +70,10 @@ def run(
         options = {**model.solver.petsc, **(petsc or {})}
         with petsc_options(options):
             _solve(model, mesh, target, resume, options, listener)
-        return open_results(target)
+        results = open_results(target)
+        for note in compare_release(results):
+            listener.note(note)
+        return results
 
 
 def _solve(

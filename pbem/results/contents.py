@@ -52,14 +52,19 @@ class Elements:
 
 @dataclass(frozen=True)
 class Tips:
-    """Stress-intensity factors of a crack over the k stored steps: KI, KII (k, 2), at its start and at its end.
+    """At the start and at the end of a crack, over the k stored steps: KI, KII, J, T (k, 2). NaN where no tip is.
 
-    Stress times the root of length; NaN at an end that is no tip. KI >= 0 opens. KII > 0 if the face on the left of the
-    crack's direction moves along it, at both ends.
+    KI, KII: stress-intensity factors, stress times the root of length. KI >= 0 opens. KII > 0 if the face on the left
+    of the crack's direction moves along it, at both ends. J: J-integral, stress times length, the energy that growth
+    straight ahead would release per length; (KI^2 + KII^2)/E' if the mesh is good enough. T: T-stress, what stays
+    finite at the tip of the normal stress along the crack. plane_modulus: E', stress.
     """
 
     KI: Real
     KII: Real
+    J: Real
+    T: Real
+    plane_modulus: float
 
 
 @dataclass(frozen=True)

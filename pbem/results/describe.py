@@ -13,6 +13,7 @@ from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
 from pbem.results.contents import Tips
 from pbem.results.reader import Results
+from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.solve.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
@@ -258,15 +259,19 @@ def _describe_tips(results: Results) -> list[str]:
     shown = found
     if len(found) > MOST_TIPS:
         shown = sorted(found, key=lambda tip: np.hypot(tip[2], tip[3]), reverse=True)[:MOST_TIPS]
-    rows = [[name, end, _number(opening), _number(sliding)] for name, end, opening, sliding in shown]
+    rows = [[name, end, *map(_number, values)] for name, end, *values in shown]
     left_out = len(found) - len(shown)
-    return _table(["crack", "tip", "KI", "KII"], rows) + ([f"... and {left_out} smaller ones"] if left_out else [])
+    notes = [*compare_release(results), *explain_missing_factors(results)]
+    return [
+        *_table(["crack", "tip", "KI", "KII", "J", "T"], rows),
+        *([f"... and {left_out} smaller ones"] if left_out else []), *notes,
+    ]
 
 
-def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float]]:
-    """Crack, end, KI, KII of every end of a crack that is a tip."""
-    factors = zip(("start", "end"), tips.KI[-1], tips.KII[-1], strict=True)
-    return [(name, end, float(opening), float(sliding)) for end, opening, sliding in factors if not np.isnan(opening)]
+def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float, float, float]]:
+    """Crack, end, KI, KII, J, T of every tip; those of cracks along interfaces have J alone."""
+    values = zip(("start", "end"), *(each[-1].tolist() for each in (tips.KI, tips.KII, tips.J, tips.T)), strict=True)
+    return [(name, *each) for each in values if not (np.isnan(each[1]) and np.isnan(each[3]))]
 
 
 def _section(title: str, lines: Iterable[str]) -> str:

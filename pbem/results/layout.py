@@ -16,6 +16,7 @@ from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.configuration import dump_configuration
+from pbem.results.interface_tips import list_tip_curves
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
 
@@ -32,7 +33,7 @@ PAIR_DATASETS = {
 }
 # What an interface shows of them; the rest is for going on with a run.
 SHOWN = ("mode", "opening", "slip", "traction_n", "traction_s")
-FACTORS = ("KI", "KII")
+TIP_DATASETS = ("KI", "KII", "J", "T")
 ENERGIES = ("external", "elastic", "dissipated", "released")
 CHUNK_BYTES = 32768
 
@@ -89,7 +90,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     together = file.create_group("all")
     _write_reactions(file.create_group("reactions"), together, list(model.conditions))
     _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
-    _write_tips(file.create_group("tips"), together.create_group("tips"), list(model.crack_tips))
+    _write_tips(file.create_group("tips"), together.create_group("tips"), model, mesh)
     energy = file.create_group("energy")
     for name in ENERGIES:
         create_energy(energy, name)
@@ -133,15 +134,18 @@ def _write_reactions(group: h5py.Group, together: h5py.Group, names: list[str]) 
         source.create_view(group.id, name, number)
 
 
-def _write_tips(group: h5py.Group, together: h5py.Group, names: list[str]) -> None:
+def _write_tips(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
+    names = list(list_tip_curves(model, mesh))
     group.attrs["names"] = _text(names)
     if not names:
         return
-    sources = {factor: Columns(_create_growing(together, factor, (len(names), 2), "f8")) for factor in FACTORS}
+    of_crack = {name: region.material.plane_modulus for region in model.regions for name in region.cracks}
+    together["plane_modulus"] = np.array([of_crack.get(name, np.nan) for name in names])
+    sources = {kind: Columns(_create_growing(together, kind, (len(names), 2), "f8")) for kind in TIP_DATASETS}
     for number, name in enumerate(names):
         crack = create_group(group.id, name)
-        for factor, source in sources.items():
-            source.create_view(crack, factor, number)
+        for kind, source in sources.items():
+            source.create_view(crack, kind, number)
 
 
 def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:

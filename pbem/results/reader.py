@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbem.case.generation import Group
 from pbem.errors import ResultFileError
 from pbem.results.contents import Elements, Energies, Nodes, Steps, Tips, Units
-from pbem.results.layout import ENERGIES, FACTORS
+from pbem.results.layout import ENERGIES, TIP_DATASETS
 from pbem.results.lazy import AllPairs, Contact, Interfaces, Interior, freeze, open_quietly, read_names
 
 Real = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Results:
     """What a result file holds. k stored steps, n nodes.
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; pairs: all of them at
-    once; groups: interfaces that a table [[generate]] made; tips: per crack its stress-intensity factors; energy: the
+    once; groups: interfaces that a table [[generate]] made; tips: per crack what its tips carry; energy: the
     balance; interior: points inside, None if the case has none; convergence: one row per Newton iteration with the
     fields step, iteration, residual, changed, stick, slip, open, seconds.
     failure: why the run ended early (status "failed"), otherwise empty.
@@ -185,8 +185,14 @@ def _read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
     names = read_names(file["tips"])
     if not names:
         return {}
-    KI, KII = (freeze(file["all/tips"][kind][:steps]) for kind in FACTORS)
-    return {name: Tips(KI[:, number], KII[:, number]) for number, name in enumerate(names)}
+    group = file["all/tips"]
+    unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
+    values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
+    moduli = group["plane_modulus"][...] if "plane_modulus" in group else np.full(len(names), np.nan)
+    return {
+        name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
+        for number, name in enumerate(names)
+    }
 
 
 def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:

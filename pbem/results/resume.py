@@ -11,7 +11,16 @@ from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.energy import Energy
-from pbem.results.layout import ENERGIES, PAIR_DATASETS, STEP_DATASETS, create_energy, extend, join_pairs, to_columns
+from pbem.results.layout import (
+    ENERGIES,
+    PAIR_DATASETS,
+    STEP_DATASETS,
+    TIP_DATASETS,
+    create_energy,
+    extend,
+    join_pairs,
+    to_columns,
+)
 from pbem.solve.step import ContactState, Step
 
 
@@ -23,6 +32,8 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         raise ResultFileError(path, "holds the results of another case, or the case file was changed since; "
                                     "run without resuming, or name another output file")
     if "all" not in file:
+        raise ResultFileError(path, "was written by another version of pbem; run without resuming")
+    if model.crack_tips and not set(TIP_DATASETS) <= set(file["all/tips"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     position = to_columns(list_faces(mesh).position)
     stored = file["nodes/position"][...]

@@ -21,7 +21,6 @@ from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance, describe_runaway
 from pbem.results.layout import (
     ENERGIES,
-    FACTORS,
     ITERATION,
     PAIR_DATASETS,
     STEP_DATASETS,
@@ -183,9 +182,9 @@ class ResultWriter:
             append_row(together["reactions"], to_columns(self._sum_reactions(step.traction)))
         for quantity in PAIR_DATASETS if len(self._pairs) else ():
             append_row(together["contact"][quantity], getattr(step.contact, quantity)[self._pairs])
-        if self._model.crack_tips:
-            for kind, factors in zip(FACTORS, self._tip_rules.evaluate_all(step.contact), strict=True):
-                append_row(together["tips"][kind], factors)
+        if self._tip_rules.cracks:
+            for kind, at_tips in self._tip_rules.evaluate_all(step).items():
+                append_row(together["tips"][kind], at_tips)
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.

@@ -1,0 +1,159 @@
+"""The same model on other elements: fewer of them to compare with, or more where an error is large."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.model.curve import Curve, Leg
+from pbem.model.model import Model
+from pbem.model.shape import WIDEST_ARC
+
+Bool = NDArray[np.bool_]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# Per curve the fractions of the length at which the elements of each of its legs end.
+Fractions = Mapping[str, tuple[tuple[float, ...], ...]]
+
+# A model is coarse enough to be compared with if it has at most this part of the elements.
+COARSE = 0.8
+# Neighbours on a leg: the longer is at most this many times as long where elements are bisected.
+WIDEST_RATIO = 2.0
+
+
+@dataclass(frozen=True)
+class CoarseModel:
+    """A model with fewer unknowns, and how it was made: pairs of elements merged, or the order lowered by one."""
+
+    model: Model
+    kind: Literal["merged", "order"]
+
+
+def coarsen_model(model: Model) -> CoarseModel | None:
+    """The model with neighbouring elements of each leg merged in pairs; None if there is nothing to make coarser.
+
+    Where an arc would turn too far, or a crack with two tips would have one element, elements are kept. Where that
+    leaves too many of them, the order is lowered instead.
+    """
+    curves = {name: _merge_pairs(curve, _least_elements(model, name)) for name, curve in model.curves.items()}
+    before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
+    if after <= COARSE * before:
+        return CoarseModel(replace(model, curves=curves), "merged")
+    if model.analysis.order == 0:
+        return None
+    return CoarseModel(replace(model, analysis=replace(model.analysis, order=model.analysis.order - 1)), "order")
+
+
+def count_elements(curve: Curve) -> int:
+    """The number of elements on all legs of a curve."""
+    return sum(leg.elements for leg in curve.legs)
+
+
+def list_fractions(model: Model) -> Fractions:
+    """Where the elements of all legs end; see `impose_fractions`."""
+    return {
+        name: tuple(tuple(float(t) for t in leg.element_fractions()) for leg in curve.legs)
+        for name, curve in model.curves.items()
+    }
+
+
+def impose_fractions(model: Model, fractions: Fractions) -> Model:
+    """The model with the element ends of `list_fractions`.
+
+    Raises ValueError where they are not those of the model's curves and legs.
+    """
+    if list(fractions) != list(model.curves):
+        raise ValueError("element ends of other curves")
+    curves = {}
+    for name, curve in model.curves.items():
+        if len(fractions[name]) != len(curve.legs):
+            raise ValueError(f"element ends of other legs on curve {name}")
+        legs = [_divide_leg(leg, ends) for leg, ends in zip(curve.legs, fractions[name], strict=True)]
+        curves[name] = Curve(name, tuple(legs))
+    return replace(model, curves=curves)
+
+
+def bisect_elements(model: Model, marked: Mapping[str, Bool]) -> Model:
+    """The model with the marked elements halved, and neighbours on the same leg until no ratio is wide.
+
+    marked: per curve, whether each of its elements (along all legs) is to be halved; both sides of the curve follow.
+    A ratio of neighbours that is wide already is not made wider.
+    """
+    curves = {}
+    for name, curve in model.curves.items():
+        own = marked[name]
+        legs, first = [], 0
+        for leg in curve.legs:
+            legs.append(_bisect_leg(leg, own[first : first + leg.elements]))
+            first += leg.elements
+        curves[name] = Curve(name, tuple(legs))
+    return replace(model, curves=curves)
+
+
+def group_elements(fine: Curve, coarse: Curve) -> Integer:
+    """First element of the fine curve in each element of the coarse one, and the number of the fine (coarse + 1,).
+
+    The ends of the coarse elements have to be among those of the fine ones.
+    """
+    first, groups = 0, []
+    for one, other in zip(fine.legs, coarse.legs, strict=True):
+        groups.append(first + np.searchsorted(one.element_fractions(), other.element_fractions()[:-1]))
+        first += one.elements
+    return np.concatenate([*groups, [first]]).astype(np.int64)
+
+
+def _least_elements(model: Model, name: str) -> int:
+    """A crack with two tips needs an element for each."""
+    tips = model.crack_tips.get(name, (False, False))
+    return 2 if model.analysis.tips and all(tips) else 1
+
+
+def _merge_pairs(curve: Curve, least: int) -> Curve:
+    merged = Curve(curve.name, tuple(_merge_leg(leg) for leg in curve.legs))
+    return merged if count_elements(merged) >= least else curve
+
+
+def _merge_leg(leg: Leg) -> Leg:
+    """Pairs from both ends on; of an odd number one in the middle is kept."""
+    count = leg.elements
+    if count == 1:
+        return leg
+    middle = count // 2 // 2 * 2
+    kept = [*range(0, middle + 1, 2), *range(middle + count % 2, count + 1, 2)]
+    ends = leg.element_fractions()
+    merged = ends[sorted(set(kept))]
+    if leg.center is not None and math.degrees(abs(leg.sweep)) * np.diff(merged).max() > WIDEST_ARC * (1 + 1e-9):
+        return leg
+    return _divide_leg(leg, merged)
+
+
+def _divide_leg(leg: Leg, ends: Sequence[float] | Real) -> Leg:
+    return replace(leg, elements=len(ends) - 1, fractions=tuple(float(t) for t in ends))
+
+
+def _bisect_leg(leg: Leg, marked: Bool) -> Leg:
+    """Bisect the marked elements, and others where the ratio of neighbours would grow beyond the widest."""
+    if not marked.any():
+        return leg
+    ends = leg.element_fractions()
+    lengths = np.diff(ends)
+    # Of neighbours that differ more from the start, the ratio is kept.
+    allowed = WIDEST_RATIO * np.maximum(1.0, np.maximum(lengths[1:] / lengths[:-1], lengths[:-1] / lengths[1:]) / 2)
+    halved = marked.copy()
+    while True:
+        now = np.where(halved, 0.5, 1.0) * lengths
+        ratio = now[1:] / now[:-1]
+        more = halved.copy()
+        more[1:] |= ratio > allowed * (1 + 1e-9)
+        more[:-1] |= 1 / ratio > allowed * (1 + 1e-9)
+        if (more == halved).all():
+            break
+        halved = more
+    middles = 0.5 * (ends[1:] + ends[:-1])[halved]
+    return _divide_leg(leg, np.sort(np.concatenate([ends, middles])))

@@ -19,7 +19,7 @@ from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
 if TYPE_CHECKING:
-    from pbem.results.reader import Results, Steps
+    from pbem.results.reader import Results
     from pbem.solve.step import Reporter
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
@@ -316,7 +316,7 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     else:
         if world.rank == 0 and not options.quiet:
             _close(reporter)
-            _say_finished(results.steps, target, time.perf_counter() - begun)
+            _say_finished(results, target, time.perf_counter() - begun)
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code
@@ -353,8 +353,13 @@ def _say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
     return WRONG_INPUT
 
 
-def _say_finished(steps: Steps, target: Path, seconds: float) -> None:
+def _say_finished(results: Results, target: Path, seconds: float) -> None:
+    from pbem.results.describe import describe_errors
+
+    steps = results.steps
     number = int(steps.number[-1]) if len(steps) else 0
+    if number:
+        print(f"estimated discretisation errors: {describe_errors(results)[0]}")
     print(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}", flush=True)
 
 

@@ -1,4 +1,4 @@
-"""Values from one mesh at the nodes of another of the same model, whose elements are made of whole ones of the first."""
+"""Values from one mesh at the nodes of another, each of whose elements is made of whole elements of the first."""
 
 from __future__ import annotations
 

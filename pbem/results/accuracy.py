@@ -1,0 +1,133 @@
+"""Whether a run is as accurate as was asked for, and which elements to refine if it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.carry import list_curve_elements
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import count_elements
+from pbem.results.estimator import Estimator
+
+Bool = NDArray[np.bool_]
+Real = NDArray[np.float64]
+
+# What `analysis.accuracy` is asked of, and how it is called.
+ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"}
+# Below this all errors asked for are rounding, and those of the displacements are looked at in their place.
+ROUNDING = 1e-13
+
+# Passes at most, and unknowns at most over those of the first mesh.
+MOST_PASSES = 12
+MOST_GROWTH = 40.0
+
+# Part of the estimated energy of the error in the elements that are refined: near the goal, and far from it.
+PART, LARGE_PART = 0.7, 0.9
+FAR = 8.0
+# Of the largest error of a jump: elements beyond are refined.
+NEAR_WORST = 0.3
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The largest estimated relative errors over the steps, by the names in ASKED (or "displacements")."""
+
+    errors: Mapping[str, float]
+
+    @property
+    def worst(self) -> float:
+        """The largest of all; NaN if one is unknown."""
+        return float(np.max(list(self.errors.values())))
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {error:.1e}" for name, error in self.errors.items())
+
+
+def measure_reached(relative: Mapping[str, Real]) -> Reached:
+    """The accuracy of a run by its /estimates/relative_... (k,) over the steps.
+
+    Kinds of which the model has none, or whose errors are rounding, are left out; where all are, the displacements are
+    looked at.
+    """
+    errors = {text: float(np.max(relative[kind], initial=0.0)) for kind, text in ASKED.items()}
+    kept = {text: error for text, error in errors.items() if not error <= ROUNDING}
+    return Reached(kept or {"displacements": float(np.max(relative["displacement"], initial=0.0))})
+
+
+@dataclass(frozen=True)
+class Pass:
+    """The number of a pass, from 1 on, and the unknowns of the first one."""
+
+    number: int
+    first_unknowns: int
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What follows a pass: sentences for the log; the elements to be halved, None if there is no further pass; why the
+    accuracy cannot be reached, empty if it was or was not asked for."""
+
+    notes: tuple[str, ...] = ()
+    marked: Mapping[str, Bool] | None = None
+    failure: str = ""
+
+
+def decide(
+    model: Model, mesh: Mesh, relative: Mapping[str, Real], estimator: Estimator, one: Pass
+) -> Decision:
+    """Whether a pass has met `analysis.accuracy`; decided on one rank for all.
+
+    relative: the estimated relative errors (k,) of all stored steps, NaN where unknown.
+    """
+    accuracy = model.analysis.accuracy
+    if accuracy is None:
+        return Decision()
+    reached = measure_reached(relative)
+    unknowns = 2 * mesh.nodes
+    head = f"accuracy, pass {one.number}: {unknowns} unknowns"
+    says = f"{head}; estimated relative errors: {reached} (asked: {accuracy:g})"
+    if reached.worst <= accuracy:
+        return Decision((says,))
+    over = ", ".join(f"{name} {error:.1e}" for name, error in reached.errors.items() if not error <= accuracy)
+    failure = ""
+    if np.isnan(reached.worst):
+        failure = f"errors cannot be estimated ({estimator.missing}): whether {accuracy:g} is reached is not known"
+    elif one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns:
+        limit = f"{one.number} passes" if one.number >= MOST_PASSES else f"{MOST_GROWTH:g} times the first unknowns"
+        failure = (
+            f"{accuracy:g} is not reached within {limit} ({unknowns} unknowns): {over}; the file holds the last pass"
+        )
+    if failure:
+        return Decision((says,), failure=failure)
+    comparison = estimator.comparison
+    if not comparison.energy.any():  # gone on with after its last step: where errors are is not in the file
+        return Decision((says,), {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()})
+    return Decision((says,), mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst))
+
+
+def mark_elements(
+    model: Model, mesh: Mesh, energy: Real, jumps: Real, accuracy: float, worst: float
+) -> dict[str, Bool]:
+    """Per curve the elements (along all its legs) to be halved: those with most of the error's energy (Doerfler 1996),
+    and those whose jumps are too far off themselves.
+
+    energy, jumps (e,): of each element of the mesh, see `pbem.results.estimates.Comparison`; both sides of a curve
+    count together. accuracy, worst: the largest relative error asked for, and the one that is estimated.
+    """
+    by_curve = {name: np.zeros((2, count_elements(curve))) for name, curve in model.curves.items()}
+    for name, elements in list_curve_elements(model, mesh):
+        by_curve[name][0] += energy[elements]
+        by_curve[name][1] = np.maximum(by_curve[name][1], jumps[elements])
+    together, local = np.concatenate(list(by_curve.values()), axis=1)
+    order = np.argsort(-together, kind="stable")
+    part = LARGE_PART if worst > FAR * accuracy else PART
+    taken = np.searchsorted(np.cumsum(together[order]), part * together.sum()) + 1
+    chosen = local > max(accuracy, NEAR_WORST * local.max(initial=0.0))
+    chosen[order[:taken]] = True
+    ends = np.cumsum([each.shape[1] for each in by_curve.values()])[:-1]
+    return dict(zip(by_curve, np.split(chosen, ends), strict=True))

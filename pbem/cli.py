@@ -212,6 +212,7 @@ def make_parser() -> argparse.ArgumentParser:
     plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
     plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
+    plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
     plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
     return parser
 
@@ -260,10 +261,17 @@ def _plot(options: argparse.Namespace) -> int:
 
     results = open_results(options.file)
     source = Path(options.file)
-    beside = source.with_name(f"{source.stem}_{options.field}.png") if options.field else source.with_suffix(".png")
+    kind = "mesh" if options.mesh else options.field
+    beside = source.with_name(f"{source.stem}_{kind}.png") if kind else source.with_suffix(".png")
     target = check_picture_path(options.output or beside)
     step = -1 if options.step is None else results.find_step(options.step)
-    if options.field:
+    if options.mesh:
+        from pbem.results.level_plot import read_refined
+        from pbem.results.plots import plot_model
+
+        model, mesh, levels = read_refined(results)
+        plot_model(model, mesh, target, levels)
+    elif options.field:
         plot_field(results, options.field, target, step)
     else:
         plot_results(results, target, step, options.magnify)

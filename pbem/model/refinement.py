@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -23,7 +24,7 @@ Fractions = Mapping[str, tuple[tuple[float, ...], ...]]
 
 # A model is coarse enough to be compared with if it has at most this part of the elements.
 COARSE = 0.8
-# Neighbours on a leg: the longer is at most this many times as long where elements are bisected.
+# Of elements that meet the longer is at most so many times as long, where elements are halved.
 WIDEST_RATIO = 2.0
 
 
@@ -80,20 +81,67 @@ def impose_fractions(model: Model, fractions: Fractions) -> Model:
 
 
 def bisect_elements(model: Model, marked: Mapping[str, Bool]) -> Model:
-    """The model with the marked elements halved, and neighbours on the same leg until no ratio is wide.
+    """The model with the marked elements halved, and neighbours until no ratio of lengths is wide.
 
     marked: per curve, whether each of its elements (along all legs) is to be halved; both sides of the curve follow.
-    A ratio of neighbours that is wide already is not made wider.
+    Neighbours are elements that meet at a point, of the same curve or not; a ratio that is wide already is not made
+    wider. An element is halved at most once.
     """
-    curves = {}
-    for name, curve in model.curves.items():
-        own = marked[name]
-        legs, first = [], 0
-        for leg in curve.legs:
-            legs.append(_bisect_leg(leg, own[first : first + leg.elements]))
-            first += leg.elements
+    names = list(model.curves)
+    ends = [divide_ends(model.curves[name]) for name in names]
+    lengths = np.concatenate([length for _, length in ends])
+    halved = np.concatenate([marked[name] for name in names])
+    first, second = _find_neighbours([points for points, _ in ends])
+    # Of neighbours that differ more from the start, the ratio is kept.
+    allowed = np.maximum(WIDEST_RATIO, np.maximum(lengths[first] / lengths[second], lengths[second] / lengths[first]))
+    while halved.any():
+        now = np.where(halved, 0.5, 1.0) * lengths
+        more = halved.copy()
+        more[first[now[first] > allowed * (1 + 1e-9) * now[second]]] = True
+        more[second[now[second] > allowed * (1 + 1e-9) * now[first]]] = True
+        if (more == halved).all():
+            break
+        halved = more
+    curves, begin = {}, 0
+    for name in names:
+        legs = []
+        for leg in model.curves[name].legs:
+            legs.append(_halve(leg, halved[begin : begin + leg.elements]))
+            begin += leg.elements
         curves[name] = Curve(name, tuple(legs))
     return replace(model, curves=curves)
+
+
+def divide_ends(curve: Curve) -> tuple[list[tuple[complex, complex]], Real]:
+    """Start and end of each element of a curve (along all legs), and their lengths."""
+    points = [leg.element_ends() for leg in curve.legs]
+    ends = [(complex(a), complex(b)) for each in points for a, b in pairwise(each)]
+    return ends, np.concatenate([leg.length * np.diff(leg.element_fractions()) for leg in curve.legs])
+
+
+def _find_neighbours(curves: Sequence[Sequence[tuple[complex, complex]]]) -> tuple[Integer, Integer]:
+    """Numbers of the elements, of all curves together, that have a point in common: each pair once."""
+    at: dict[complex, list[int]] = {}
+    number = 0
+    for elements in curves:
+        for ends in elements:
+            for point in ends:
+                at.setdefault(point, []).append(number)
+            number += 1
+    pairs = [(a, b) for meeting in at.values() for k, a in enumerate(meeting) for b in meeting[:k] if a != b]
+    found = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return found[:, 0], found[:, 1]
+
+
+def count_levels(first: Curve, refined: Curve) -> Integer:
+    """How often each element (along all legs) of a refined curve was halved since it was the first one."""
+    levels = []
+    for leg, finer in zip(first.legs, refined.legs, strict=True):
+        before, after = leg.element_fractions(), finer.element_fractions()
+        middle = 0.5 * (after[1:] + after[:-1])
+        origin = np.clip(np.searchsorted(before, middle, side="right") - 1, 0, leg.elements - 1)
+        levels.append(np.rint(np.log2(np.diff(before)[origin] / np.diff(after))))
+    return np.concatenate(levels).astype(np.int64)
 
 
 def group_elements(fine: Curve, coarse: Curve) -> Integer:
@@ -137,23 +185,8 @@ def _divide_leg(leg: Leg, ends: Sequence[float] | Real) -> Leg:
     return replace(leg, elements=len(ends) - 1, fractions=tuple(float(t) for t in ends))
 
 
-def _bisect_leg(leg: Leg, marked: Bool) -> Leg:
-    """Bisect the marked elements, and others where the ratio of neighbours would grow beyond the widest."""
-    if not marked.any():
+def _halve(leg: Leg, halved: Bool) -> Leg:
+    if not halved.any():
         return leg
     ends = leg.element_fractions()
-    lengths = np.diff(ends)
-    # Of neighbours that differ more from the start, the ratio is kept.
-    allowed = WIDEST_RATIO * np.maximum(1.0, np.maximum(lengths[1:] / lengths[:-1], lengths[:-1] / lengths[1:]) / 2)
-    halved = marked.copy()
-    while True:
-        now = np.where(halved, 0.5, 1.0) * lengths
-        ratio = now[1:] / now[:-1]
-        more = halved.copy()
-        more[1:] |= ratio > allowed * (1 + 1e-9)
-        more[:-1] |= 1 / ratio > allowed * (1 + 1e-9)
-        if (more == halved).all():
-            break
-        halved = more
-    middles = 0.5 * (ends[1:] + ends[:-1])[halved]
-    return _divide_leg(leg, np.sort(np.concatenate([ends, middles])))
+    return _divide_leg(leg, np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])[halved]])))

@@ -27,7 +27,7 @@ MOST_PASSES = 12
 MOST_GROWTH = 40.0
 
 # Part of the estimated energy of the error in the elements that are refined: near the goal, and far from it.
-PART, LARGE_PART = 0.7, 0.9
+PART, LARGE_PART = 0.8, 0.95
 FAR = 8.0
 # Of the largest error of a jump: elements beyond are refined.
 NEAR_WORST = 0.3

@@ -183,13 +183,19 @@ class Comparison:
         return np.where(beside.seen, values, 0.0)
 
     def _locate_jumps(self, mine: ContactState, other: ContactState, beside: Beside) -> Real:
-        """Estimated error of the jumps on each element of the run (e,), over the largest jump so far."""
-        result = np.zeros(self._mesh.elements)
-        element = beside.carry.nearest[beside.mesh.pairs.first] // (self._mesh.order + 1)
+        """Estimated error of the jumps on each element of the run (e,), over the largest jump so far.
+
+        The mean over each coarse element is left out: it comes from elsewhere.
+        """
+        pairs, result = beside.mesh.pairs, np.zeros(self._mesh.elements)
+        element = beside.carry.nearest[pairs.first] // (self._mesh.order + 1)
+        own, of = np.unique(pairs.first // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             for name in ("opening", "slip"):
-                errors = np.abs(self._subtract_field(name, mine, other, beside)) / (self._divisor * self.scales.jumps)
-                np.maximum.at(result, element, errors)
+                errors = self._subtract_field(name, mine, other, beside) / (self._divisor * self.scales.jumps)
+                mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
+                errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
+                np.maximum.at(result, element, np.abs(errors))
         return result
 
     def relate_violations(self, violations: Violations) -> Violations:

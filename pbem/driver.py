@@ -26,9 +26,11 @@ from pbem.results.reader import Results, open_results
 from pbem.results.resume import read_mesh_fractions
 from pbem.results.writer import ResultWriter
 from pbem.solve.assembly import assemble_problem
+from pbem.solve.beside import NOTHING_COARSER, put_beside
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
+from pbem.solve.second import SecondSolution
 from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step
 
@@ -122,7 +124,7 @@ def _solve(
         if interior is not None:
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-        estimator = Estimator(model, mesh, world, last)
+        estimator = make_estimator(model, mesh, last)
         store_steps(march(problem, listener, start), model.output_every, interior, writer, estimator)
         estimator.destroy()
         if writer:
@@ -143,6 +145,17 @@ def _solve(
         writer.finish()
     world.Barrier()
     return decision.marked
+
+
+def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:
+    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
+    beside = put_beside(model, mesh)
+    second, missing = None, NOTHING_COARSER if beside is None else ""
+    try:
+        second = None if beside is None else SecondSolution(beside, world, start)
+    except ConvergenceError as error:
+        missing = f"the second solution cannot be computed ({error})"
+    return Estimator(model, mesh, beside, second, missing, world.rank == 0)
 
 
 def store_steps(

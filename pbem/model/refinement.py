@@ -24,6 +24,8 @@ Fractions = Mapping[str, tuple[tuple[float, ...], ...]]
 
 # A model is coarse enough to be compared with if it has at most this part of the elements.
 COARSE = 0.8
+# Errors on interfaces that stay as they are would not be seen: of their elements at most this part.
+KEPT = 0.05
 # Of elements that meet the longer is at most so many times as long, where elements are halved.
 WIDEST_RATIO = 2.0
 
@@ -40,11 +42,14 @@ def coarsen_model(model: Model) -> CoarseModel | None:
     """The model with neighbouring elements of each leg merged in pairs; None if there is nothing to make coarser.
 
     Where an arc would turn too far, or a crack with two tips would have one element, elements are kept. Where that
-    leaves too many of them, the order is lowered instead.
+    leaves too many of them, or whole interfaces, the order is lowered instead.
     """
     curves = {name: _merge_pairs(curve, _least_elements(model, name)) for name, curve in model.curves.items()}
     before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
-    if after <= COARSE * before:
+    faces = {*model.interfaces, *(name for each in model.contacts.values() for name in (each.first, each.second))}
+    numbers = {name: count_elements(model.curves[name]) for name in faces}
+    kept = sum(number for name, number in numbers.items() if count_elements(curves[name]) == number)
+    if after <= COARSE * before and kept <= KEPT * sum(numbers.values()):
         return CoarseModel(replace(model, curves=curves), "merged")
     if model.analysis.order == 0:
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import BetweenNodes
 from pbem.results.estimates import VIOLATIONS, Comparison, to_rows
-from pbem.solve.second import NOTHING_COARSER, SecondSolution, put_beside
+from pbem.solve.beside import Beside
 from pbem.solve.step import Step
 
 Real = NDArray[np.float64]
@@ -27,6 +27,16 @@ VIOLATED = {
 }
 
 
+class Follower(Protocol):
+    """What the second solution does: see `pbem.solve.second.SecondSolution`."""
+
+    def follow(self, step: Step) -> Step:
+        """The same load step on the coarser mesh; raises ConvergenceError."""
+
+    def destroy(self) -> None:
+        """Free the storage."""
+
+
 class Estimator:
     """Estimated errors of the steps of a run; made and asked by all ranks together.
 
@@ -34,23 +44,19 @@ class Estimator:
     the first rank.
     """
 
-    def __init__(self, model: Model, mesh: Mesh, comm: Any, start: Step | None = None) -> None:
-        """comm: the ranks' communicator. start: the step after which the run goes on, None from rest."""
-        self.missing = ""
-        self._first = comm.rank == 0
+    def __init__(
+        self, model: Model, mesh: Mesh, beside: Beside | None, second: Follower | None, missing: str = "",
+        first: bool = True,
+    ) -> None:
+        """second: the solution on the mesh beside, None where there is none, and `missing` says why. first: whether
+        this is the first rank, which alone compares."""
+        self.missing = missing
+        self._first = first
         self._names = list(sort_pairs(mesh))
         self._worst = {kind: (0.0, "", 0) for kind in VIOLATIONS}
-        beside = put_beside(model, mesh)
         self.comparison = Comparison(model, mesh, beside)
         self._between = BetweenNodes(model, mesh)
-        self._second: SecondSolution | None = None
-        if beside is None:
-            self.missing = NOTHING_COARSER
-            return
-        try:
-            self._second = SecondSolution(beside, comm, start)
-        except ConvergenceError as error:
-            self.missing = f"the second solution cannot be computed ({error})"
+        self._second = second
 
     def estimate(self, step: Step) -> Mapping[str, Real]:
         """The estimated errors of a step, on the first rank: see `pbem.results.estimates.to_rows`."""

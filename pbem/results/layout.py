@@ -173,7 +173,8 @@ def read_fractions(file: h5py.File) -> Fractions | None:
 def _write_estimates(group: h5py.Group, model: Model, mesh: Mesh) -> None:
     """Estimated errors: a dataset a quantity, its second axis the curves, interfaces or cracks of the attributes."""
     for name, shape in list_datasets(model, mesh).items():
-        _create_growing(group, name, shape, "f8")
+        if 0 not in shape:
+            _create_growing(group, name, shape, "f8")
     group.attrs["curves"] = _text(list(model.conditions))
     group.attrs["interfaces"] = _text(list(sort_pairs(mesh)))
     group.attrs["cracks"] = _text(list(model.crack_tips))

@@ -204,6 +204,8 @@ def _read_errors(file: h5py.File, steps: int) -> Errors:
     group = file["estimates"]
 
     def read(quantity: str, names: str) -> dict[str, Real]:
+        if quantity not in group:
+            return {}
         values = freeze(group[quantity][:steps])
         return {str(name): values[:, number] for number, name in enumerate(group.attrs[names])}
 

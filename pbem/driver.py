@@ -9,9 +9,6 @@ from itertools import count
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pbem.contact.strength import read_checked_model
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
 from pbem.mesh.generate import generate_mesh
@@ -96,16 +93,16 @@ def _refine_and_solve(
         for note in (*notes, *mesh.notes, *placement) if number == 1 else ():
             listener.note(note)
         first_unknowns = first_unknowns or 2 * mesh.nodes
-        marked = _solve(model, mesh, target, resume, options, listener, Pass(number, first_unknowns))
-        if marked is None:
+        decision = _solve(model, mesh, target, resume, options, listener, Pass(number, first_unknowns))
+        if decision.marked is None:
             return
-        model, resume = bisect_elements(model, marked), False
+        model, resume = bisect_elements(model, decision.marked, decision.gently), False
 
 
 def _solve(
     model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter, one: Pass
-) -> Mapping[str, NDArray[np.bool_]] | None:
-    """March through the load history; the first rank writes. Returns the elements to refine, None when all is well."""
+) -> Decision:
+    """March through the load history; the first rank writes. Returns what follows."""
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
 
@@ -144,7 +141,7 @@ def _solve(
     if writer:
         writer.finish()
     world.Barrier()
-    return decision.marked
+    return decision
 
 
 def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:

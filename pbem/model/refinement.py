@@ -28,6 +28,9 @@ COARSE = 0.8
 KEPT = 0.05
 # Of elements that meet the longer is at most so many times as long, where elements are halved.
 WIDEST_RATIO = 2.0
+# The jump follows the root of the distance over the elements next to a tip, which are halved together: with unequal
+# ones K and the jumps are off by far more.
+EQUAL_AT_TIPS = 3
 
 
 @dataclass(frozen=True)
@@ -85,12 +88,13 @@ def impose_fractions(model: Model, fractions: Fractions) -> Model:
     return replace(model, curves=curves)
 
 
-def bisect_elements(model: Model, marked: Mapping[str, Bool]) -> Model:
+def bisect_elements(model: Model, marked: Mapping[str, Bool], gently: bool = False) -> Model:
     """The model with the marked elements halved, and neighbours until no ratio of lengths is wide.
 
     marked: per curve, whether each of its elements (along all legs) is to be halved; both sides of the curve follow.
     Neighbours are elements that meet at a point, of the same curve or not; a ratio that is wide already is not made
-    wider. An element is halved at most once.
+    wider. Elements next to a crack tip are halved together, and any element once at most.
+    gently: two marked neighbours on a leg become three elements in place of four.
     """
     names = list(model.curves)
     ends = [divide_ends(model.curves[name]) for name in names]
@@ -98,7 +102,8 @@ def bisect_elements(model: Model, marked: Mapping[str, Bool]) -> Model:
     halved = np.concatenate([marked[name] for name in names])
     first, second = _find_neighbours([points for points, _ in ends])
     # Of neighbours that differ more from the start, the ratio is kept.
-    allowed = np.maximum(WIDEST_RATIO, np.maximum(lengths[first] / lengths[second], lengths[second] / lengths[first]))
+    widest = np.where(_mark_tips(model)[first] & _mark_tips(model)[second], 1.0, WIDEST_RATIO)
+    allowed = np.maximum(widest, np.maximum(lengths[first] / lengths[second], lengths[second] / lengths[first]))
     while halved.any():
         now = np.where(halved, 0.5, 1.0) * lengths
         more = halved.copy()
@@ -111,10 +116,22 @@ def bisect_elements(model: Model, marked: Mapping[str, Bool]) -> Model:
     for name in names:
         legs = []
         for leg in model.curves[name].legs:
-            legs.append(_halve(leg, halved[begin : begin + leg.elements]))
+            legs.append(_divide_marked(leg, halved[begin : begin + leg.elements], gently))
             begin += leg.elements
         curves[name] = Curve(name, tuple(legs))
     return replace(model, curves=curves)
+
+
+def _mark_tips(model: Model) -> Bool:
+    """Whether an element, of all curves together, is among the few next to the tip of a crack."""
+    marks = []
+    for name, curve in model.curves.items():
+        own = np.zeros(count_elements(curve), dtype=bool)
+        at_start, at_end = model.crack_tips.get(name, (False, False))
+        own[: EQUAL_AT_TIPS * at_start] = True
+        own[len(own) - min(len(own), EQUAL_AT_TIPS * at_end) :] = True
+        marks.append(own)
+    return np.concatenate(marks)
 
 
 def divide_ends(curve: Curve) -> tuple[list[tuple[complex, complex]], Real]:
@@ -190,8 +207,17 @@ def _divide_leg(leg: Leg, ends: Sequence[float] | Real) -> Leg:
     return replace(leg, elements=len(ends) - 1, fractions=tuple(float(t) for t in ends))
 
 
-def _halve(leg: Leg, halved: Bool) -> Leg:
-    if not halved.any():
+def _divide_marked(leg: Leg, marked: Bool, gently: bool) -> Leg:
+    if not marked.any():
         return leg
-    ends = leg.element_fractions()
-    return _divide_leg(leg, np.sort(np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])[halved]])))
+    at: list[float] = [0.0]  # new ends, in numbers of elements
+    number = 0
+    while number < leg.elements:
+        if gently and marked[number : number + 2].sum() == 2:
+            at += [number + 2 / 3, number + 4 / 3, number + 2.0]
+            number += 2
+            continue
+        at += [number + 0.5, number + 1.0] if marked[number] else [number + 1.0]
+        number += 1
+    ends = np.interp(at, np.arange(leg.elements + 1), leg.element_fractions())
+    return _divide_leg(leg, ends)

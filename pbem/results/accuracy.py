@@ -23,15 +23,26 @@ ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"
 ROUNDING = 1e-13
 
 # The estimates are to be so many times below the accuracy: they are within a factor, and too small more often.
-SAFETY = 2.0
+SAFETY = 1.5
 
 # Passes at most, and unknowns at most over those of the first mesh.
-MOST_PASSES = 12
+MOST_PASSES = 20
 MOST_GROWTH = 40.0
 
 # Part of the estimated energy of the error in the elements that are refined: near the goal, and far from it.
-PART, LARGE_PART = 0.8, 0.95
+PART, LARGE_PART = 0.7, 0.9
 FAR = 8.0
+# Elements with this part of the largest energy are refined in any case: where errors are spread evenly, to refine some
+# of them alone brings nothing.
+ALIKE = 0.1
+# Elements shorter by this factor bring the error below the accuracy if it falls with the power order + 1: then there is
+# no need to halve.
+NEAR = 1.5
+# With more than this part of its elements a whole leg is refined: lengths that change by leaps cost more than they
+# save.
+MOST_OF_LEG = 0.4
+# A kind of energy with less than this part of all is left out.
+SMALL_KIND = 1e-3
 # Of the largest error of a jump: elements beyond are refined.
 NEAR_WORST = 0.3
 
@@ -72,11 +83,12 @@ class Pass:
 
 @dataclass(frozen=True)
 class Decision:
-    """What follows a pass: sentences for the log; the elements to be halved, None if there is no further pass; why the
-    accuracy cannot be reached, empty if it was or was not asked for."""
+    """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`), None if
+    there is no further pass; why the accuracy cannot be reached, empty if it was or was not asked for."""
 
     notes: tuple[str, ...] = ()
     marked: Mapping[str, Bool] | None = None
+    gently: bool = False
     failure: str = ""
 
 
@@ -110,27 +122,33 @@ def decide(
     comparison = estimator.comparison
     if not comparison.energy.any():  # gone on with after its last step: where errors are is not in the file
         return Decision((says,), {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()})
-    return Decision((says,), mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst))
+    marked = mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst)
+    return Decision((says,), marked, gently=reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy)
 
 
 def mark_elements(
     model: Model, mesh: Mesh, energy: Real, jumps: Real, accuracy: float, worst: float
 ) -> dict[str, Bool]:
     """Per curve the elements (along all its legs) to be halved: those with most of the error's energy (Doerfler 1996),
-    and those whose jumps are too far off themselves.
+    of the displacements and of the tractions, and those whose jumps are too far off themselves.
 
-    energy, jumps (e,): of each element of the mesh, see `pbem.results.estimates.Comparison`; both sides of a curve
-    count together. accuracy, worst: the largest relative error asked for, and the one that is estimated.
+    energy (2, e), jumps (e,): of each element of the mesh, see `pbem.results.estimates.Comparison`; both sides of a
+    curve count together. accuracy, worst: the largest relative error asked for, and the one that is estimated.
     """
-    by_curve = {name: np.zeros((2, count_elements(curve))) for name, curve in model.curves.items()}
+    by_curve = {name: np.zeros((3, count_elements(curve))) for name, curve in model.curves.items()}
     for name, elements in list_curve_elements(model, mesh):
-        by_curve[name][0] += energy[elements]
-        by_curve[name][1] = np.maximum(by_curve[name][1], jumps[elements])
-    together, local = np.concatenate(list(by_curve.values()), axis=1)
-    order = np.argsort(-together, kind="stable")
+        by_curve[name][:2] += energy[:, elements]
+        by_curve[name][2] = np.maximum(by_curve[name][2], jumps[elements])
+    *kinds, local = np.concatenate(list(by_curve.values()), axis=1)
     part = LARGE_PART if worst > FAR * accuracy else PART
-    taken = np.searchsorted(np.cumsum(together[order]), part * together.sum()) + 1
     chosen = local > max(accuracy, NEAR_WORST * local.max(initial=0.0))
-    chosen[order[:taken]] = True
+    for each in kinds:
+        if each.sum() >= SMALL_KIND * energy.sum():
+            order = np.argsort(-each, kind="stable")
+            chosen[order[: np.searchsorted(np.cumsum(each[order]), part * each.sum()) + 1]] = True
+            chosen |= each >= ALIKE * each.max()
+    legs = [leg.elements for curve in model.curves.values() for leg in curve.legs]
+    leg = np.repeat(np.arange(len(legs)), legs)
+    chosen |= (np.bincount(leg, chosen) > MOST_OF_LEG * np.array(legs))[leg]
     ends = np.cumsum([each.shape[1] for each in by_curve.values()])[:-1]
     return dict(zip(by_curve, np.split(chosen, ends), strict=True))

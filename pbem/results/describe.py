@@ -92,13 +92,14 @@ def describe_errors(results: Results) -> list[str]:
     lines = [
         ", ".join(f"{name} {value:.1e}" for name, value in shown.items()) + " of the largest in the model so far"
     ]
+    if len(errors.slip) > MOST_ERRORS:
+        return lines
     worst = sorted(errors.slip, key=lambda name: -np.nan_to_num(max(errors.slip[name][-1], errors.opening[name][-1])))
     rows = [
         [name, *(f"{getattr(errors, kind)[name][-1]:.1e}" for kind in ("opening", "slip", "traction_n", "traction_s"))]
-        for name in worst[:MOST_ERRORS]
+        for name in worst
     ]
-    lines += _table(["interface", "opening", "slip", "traction n", "traction s"], rows)
-    return lines + ([f"... and {len(worst) - MOST_ERRORS} smaller ones"] if len(worst) > MOST_ERRORS else [])
+    return lines + _table(["interface", "opening", "slip", "traction n", "traction s"], rows)
 
 
 # Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by

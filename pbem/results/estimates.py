@@ -80,8 +80,9 @@ class Relative:
 class Comparison:
     """Compares the steps of a run with those of the second solution; on one rank.
 
-    Where to refine, the largest over the steps so far, on each element of the run's mesh (e,): energy of the difference
-    (stress times length squared); jumps: estimated error of opening and slip over the largest jump in the model.
+    Where to refine, the largest over the steps so far, on each element of the run's mesh: energy (2, e) of the
+    difference of displacements and of tractions (stress times length squared); jumps (e,): estimated error of opening
+    and slip over the largest jump in the model.
     """
 
     def __init__(self, model: Model, mesh: Mesh, beside: Beside | None) -> None:
@@ -89,7 +90,7 @@ class Comparison:
         self._interfaces = list(sort_pairs(mesh).values())
         self._rules = collect_tip_rules(model, mesh)
         self._gap = collect_laws(model, mesh).gap
-        self.energy, self.jumps = np.zeros(mesh.elements), np.zeros(mesh.elements)
+        self.energy, self.jumps = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
         self.scales = Scales()
         if beside is not None:
             self._others = list(sort_pairs(beside.mesh).items())
@@ -266,11 +267,11 @@ def subtract_displacements(mesh: Mesh, beside: Beside, step: Step, second: Step)
 
 
 def measure_energy(model: Model, mesh: Mesh, beside: Beside, step: Step, second: Step) -> Real:
-    """Energy (e,) of the difference on every element of the run's mesh: stress times length squared.
+    """Energies (2, e) of the differences on every element of the run's mesh: stress times length squared.
 
-    With h an element's length and E the plane modulus, E/h |du|^2 + h/E |dt|^2 over the element, the parts of the norms
-    of displacements (half a derivative) and tractions (minus half) in which the equations are elliptic. Of du the mean
-    over the element is left out: motions of what is far away are none of its own.
+    With h an element's length and E the plane modulus, E/h |du|^2 and h/E |dt|^2 over the element, the parts of the
+    norms of displacements (half a derivative) and tractions (minus half) in which the equations are elliptic. Of du the
+    mean over the element is left out: motions of what is far away are none of its own.
     """
     coarse = beside.mesh
     du = subtract_displacements(mesh, beside, step, second).reshape(coarse.elements, -1)
@@ -281,8 +282,11 @@ def measure_energy(model: Model, mesh: Mesh, beside: Beside, step: Step, second:
     du = du - mean[:, None]
     modulus = np.array([region.material.plane_modulus for region in model.regions])[coarse.region]
     dt = dt.reshape(coarse.elements, -1)
-    energy = weight * ((modulus / length)[:, None] * np.abs(du) ** 2 + (length / modulus)[:, None] * np.abs(dt) ** 2)
-    return np.bincount(beside.carry.nearest // (mesh.order + 1), energy.ravel(), mesh.elements).astype(float)
+    element = beside.carry.nearest // (mesh.order + 1)
+    return np.stack([
+        np.bincount(element, (weight * factor[:, None] * np.abs(field) ** 2).ravel(), mesh.elements).astype(float)
+        for factor, field in ((modulus / length, du), (length / modulus, dt))
+    ])  # fmt: skip
 
 
 def _largest(values: NDArray[np.floating]) -> float:

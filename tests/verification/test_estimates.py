@@ -103,7 +103,7 @@ def test_the_accuracy_asked_for_is_met_by_a_crack(accuracy: float, tmp_path: Pat
     middle = 4 * 2.0 * 1.3 * (1 - 0.2**2) / 1e3
     shape = np.sqrt(1 - (opening.position[:, 0] / 1.3) ** 2)
     assert np.abs(opening.opening[-1] / middle - shape).max() < accuracy
-    assert max(results.errors.relative["jumps"][-1], results.errors.relative["factors"][-1]) < accuracy / 2
+    assert max(results.errors.relative["jumps"][-1], results.errors.relative["factors"][-1]) < accuracy / 1.5
     assert results.status == "finished"
 
 

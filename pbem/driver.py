@@ -122,7 +122,7 @@ def _solve(
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
         estimator = make_estimator(model, mesh, last)
-        store_steps(march(problem, listener, start), model.output_every, interior, writer, estimator)
+        store_steps(march(problem, listener, start), model.output_every, interior, writer, listener, estimator)
         estimator.destroy()
         if writer:
             for note in estimator.list_notes():
@@ -157,6 +157,7 @@ def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estim
 
 def store_steps(
     steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
+    listener: Reporter | None = None,
     estimator: Estimator | None = None,
 ) -> None:
     """Write the steps as they come, those that are stored with the field at the interior points."""
@@ -169,10 +170,12 @@ def store_steps(
                 step = replace(step, interior=interior.evaluate(step))
             rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
-            do_on_first(
+            notes = do_on_first(
                 world, PbemError,
-                lambda due=step, rows=rows: writer.append(due, rows) if writer else None,  # type: ignore[misc]
+                lambda due=step, rows=rows: writer.append(due, rows) if writer else (),  # type: ignore[misc]
             )
+            for note in notes:
+                (listener or SilentReporter()).note(note)
             if writer and estimator is not None and estimator.missing:
                 writer.note_missing(estimator.missing)
     except ConvergenceError:

@@ -106,7 +106,7 @@ def measure_law_error(
     laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0
 ) -> float:
     """Largest distance of a slipping pair's p_s from its bound, relative to the largest traction or the floor."""
-    slips = modes.mode == SLIP
+    slips = (modes.mode == SLIP) & ~laws.follows
     admissible = np.minimum(state.p_n, tensile_limit(laws, memory) - pressure)
     path = slip_path(modes, memory, plastic_slip(laws, state))
     bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
@@ -178,6 +178,9 @@ def propose_modes(
     slips &= ~laws.bonded & ~opens & ~intact
     mode = np.where(opens, OPEN, np.where(slips, SLIP, STICK)).astype(np.int8)
     sign = np.where(slips & ~same_sign & (tangential != 0), np.sign(tangential), modes.sign)
+    # In the corner of a narrow wedge a pair's own values decide nothing.
+    led = laws.leader
+    mode, sign, slips, parting, excess = mode[led], sign[led], slips[led], parting[led], excess[led]
     changed = (mode != modes.mode) | (slips & (sign != modes.sign))
     crossing = (mode == OPEN) != is_open
     violation = np.where(changed, np.maximum(np.where(crossing, np.abs(parting), np.abs(excess)), 1e-300), 0.0)
@@ -198,10 +201,11 @@ FAIL_TOGETHER = 0.7
 
 
 def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0) -> Bool:
-    """The intact brittle bonds (m,) that fail next: those overloaded most."""
-    strength = evaluate_strength(laws, np.minimum(state.p_n, 0.0), memory.path, pressure, memory.broken)
+    """The intact brittle bonds (m,) that fail next: those overloaded most, and the pairs that they lead."""
+    limit = tensile_limit(laws, memory) - pressure
+    strength = evaluate_strength(laws, np.minimum(state.p_n, limit), memory.path, pressure, memory.broken)
     overload = np.maximum(state.p_n + pressure - laws.tensile_strength, np.abs(state.p_s) - strength.bound)
-    overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)
+    overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)[laws.leader]
     worst = overload.max(initial=0.0)
     if worst <= ROUNDING * max(_largest_traction(state), floor):
         return np.zeros(laws.count, dtype=bool)

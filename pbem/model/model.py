@@ -9,6 +9,7 @@ from typing import Literal
 from pbem.case.generation import Group
 from pbem.model.curve import Curve
 from pbem.model.material import Material
+from pbem.model.sliver import Tie
 
 Quantity = Literal["displacement", "traction"]
 
@@ -170,7 +171,8 @@ class Model:
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
-    groups: the curves that were generated together.
+    groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
+    follow the status of the pair next to them.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -194,3 +196,4 @@ class Model:
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
     groups: tuple[Group, ...] = ()
+    ties: tuple[Tie, ...] = ()

@@ -35,7 +35,7 @@ PAIR_DATASETS = {
 # What an interface shows of them; the rest is for going on with a run.
 SHOWN = ("mode", "opening", "slip", "traction_n", "traction_s")
 FACTORS = ("KI", "KII")
-ENERGIES = ("external", "elastic", "dissipated")
+ENERGIES = ("external", "elastic", "dissipated", "released")
 CHUNK_BYTES = 32768
 
 
@@ -94,7 +94,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     _write_tips(file.create_group("tips"), together.create_group("tips"), list(model.crack_tips))
     energy = file.create_group("energy")
     for name in ENERGIES:
-        _create_growing(energy, name, (), "f8")
+        create_energy(energy, name)
     _write_estimates(file.create_group("estimates"), model, mesh)
     if model.analysis.accuracy is not None:
         _write_fractions(file.create_group("mesh"), model)
@@ -228,6 +228,11 @@ def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: 
     row = max(1, int(np.prod(shape))) * np.dtype(kind).itemsize
     chunk = (max(1, min(64, CHUNK_BYTES // row)), *(max(1, length) for length in shape))
     return group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=chunk)
+
+
+def create_energy(group: h5py.Group, name: str) -> h5py.Dataset:
+    """An energy (k,) that grows with the steps."""
+    return _create_growing(group, name, (), "f8")
 
 
 def append_row(dataset: h5py.Dataset, row: NDArray[Any]) -> None:

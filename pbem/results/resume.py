@@ -17,6 +17,8 @@ from pbem.results.layout import (
     ENERGIES,
     PAIR_DATASETS,
     STEP_DATASETS,
+    create_energy,
+    extend,
     join_pairs,
     open_file,
     read_fractions,
@@ -73,7 +75,10 @@ def read_mesh_fractions(path: Path) -> Fractions | None:
 def read_last_energy(file: h5py.File) -> Energy:
     """The energies at the last step that was stored completely."""
     k = min(len(file["steps"][name]) for name in STEP_DATASETS)
-    return Energy(**{kind: float(file["energy"][kind][k - 1]) for kind in ENERGIES})
+    group = file["energy"]
+    if "released" not in group:  # a file of an earlier version
+        extend(create_energy(group, "released"), np.zeros(len(group["external"])))
+    return Energy(**{kind: float(group[kind][k - 1]) for kind in ENERGIES})
 
 
 def truncate(file: h5py.File, last_number: int) -> None:

@@ -17,7 +17,8 @@ from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.errors import ConvergenceError, ResultFileError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
-from pbem.results.energy import Energy, EnergyBalance
+from pbem.results.coverage import describe_sparse_contacts
+from pbem.results.energy import Energy, EnergyBalance, describe_runaway
 from pbem.results.layout import (
     ENERGIES,
     FACTORS,
@@ -131,8 +132,10 @@ class ResultWriter:
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         self._pending: Step | None = None
 
-    def append(self, step: Step, estimates: Mapping[str, NDArray[np.float64]] | None = None) -> None:
-        """Store the step if it is its turn, and its iterations in any case; flush.
+    def append(
+        self, step: Step, estimates: Mapping[str, NDArray[np.float64]] | None = None
+    ) -> tuple[str, ...]:
+        """Store the step if it is its turn, and its iterations in any case; flush. Gives what the user should know.
 
         estimates: its estimated errors, of `pbem.results.estimates.to_rows`; NaN is stored without.
         Raises StorageError if the disk has no room for it: HDF5 would leave a file that cannot be read.
@@ -147,6 +150,10 @@ class ResultWriter:
         else:
             self._pending = step
         self._file.flush()
+        notes = [] if self._balance.runaway is None else [describe_runaway(step, self._balance.runaway)]
+        if step.last_of_stage and step.stage == len(self._model.stages) - 1:
+            notes += describe_sparse_contacts(self._model, self._mesh, step.contact.mode)
+        return tuple(notes)
 
     def _require_room(self, step: Step) -> None:
         state = os.statvfs(self.path.parent)

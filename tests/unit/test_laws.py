@@ -49,7 +49,8 @@ def make_laws(count: int = 1, friction: object = FRICTION, cohesion: object = 0.
     }  # fmt: skip
     parameters = {"friction": np.full(count, friction), "cohesion": np.full(count, cohesion)}
     strengths = (StrengthGroup(coulomb, np.arange(count), parameters),)
-    return PairLaws(strengths, **{name: np.full(count, value) for name, value in (defaults | values).items()})
+    arrays = {name: np.full(count, value) for name, value in (defaults | values).items()}
+    return PairLaws(strengths, **arrays, leader=np.arange(count))
 
 
 def scale_cohesion(laws: PairLaws, factor: float) -> tuple[StrengthGroup, ...]:
@@ -415,6 +416,14 @@ def test_overloaded_brittle_bonds_fail_the_worst_first() -> None:
     assert not find_failures(laws, calm, remember(0.0, 5), np.zeros(5)).any()
     tough = replace(laws, brittle=np.zeros(5, dtype=bool))
     assert not find_failures(tough, state, remember(0.0, 5), np.zeros(5)).any()
+
+
+@pytest.mark.parametrize(("p_s", "fails"), [(0.22, False), (0.23, True), (-0.23, True)])
+def test_brittle_bonds_under_tension_carry_no_more_than_their_cone(p_s: float, fails: bool) -> None:
+    # 0.3 - 0.5 * 0.15 = 0.225, with fluid of the pressure 0.05 in the pair as well
+    laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3, friction=0.5)
+    assert find_failures(laws, make_state(0.15, p_s), remember(0.0), np.zeros(1)).tolist() == [fails]
+    assert find_failures(laws, make_state(0.15, p_s), remember(0.0), np.array([0.05])).tolist() == [fails]
 
 
 def test_broken_bonds_have_friction_left_but_no_cohesion_or_strength() -> None:

@@ -146,11 +146,12 @@ def _solve(
 
 def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:
     """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
-    beside = put_beside(model, mesh)
-    second, missing = None, NOTHING_COARSER if beside is None else ""
+    beside, second, missing = None, None, ""
     try:
+        beside = put_beside(model, mesh)
         second = None if beside is None else SecondSolution(beside, world, start)
-    except ConvergenceError as error:
+        missing = NOTHING_COARSER if beside is None else ""
+    except PbemError as error:
         missing = f"the second solution cannot be computed ({error})"
     return Estimator(model, mesh, beside, second, missing, world.rank == 0)
 

@@ -5,7 +5,8 @@
     .venv/bin/python scripts/bench_estimate.py --accuracy [--only NAME]  refinement against the best mesh by hand
 
 The first table has a line for every problem with a known answer whose error is of a kind that is estimated: unknowns,
-true error, estimated error, their ratio, part of the time that the estimate takes. Ratios from 0.3 to 10 are asked for;
+true error, estimated error, their ratio, part of the time of assembling and solving that the estimate takes (of a
+whole run, which reads and writes as well, it is less). Ratios from 0.3 to 10 are asked for;
 errors below 1e-12 are rounding. The second one refines from a coarse mesh until the estimate is below the accuracy, and
 compares with meshes of the same model with equal numbers of elements on all legs, refined towards singular ends by the
 powers 1 to 4: the smallest that has the accuracy in truth. Errors are those against a fine mesh of order 3.

@@ -111,7 +111,9 @@ def test_marked_elements_are_halved_and_neighbours_follow(plate: Model) -> None:
     first = [0.0625 / (2 / 7), (2 / 7) / 0.0625]
     assert max(ratio) <= max(2.0, *first) + 1e-9
     levels = count_levels(plate.curves["crack"], model.curves["crack"])
-    assert levels[0] == 4 and levels[-1] == 0
+    assert levels[0] == 4 and levels[-1] < 4
+    # Those next to a tip are equal; the other end, where the ratio did not ask for more, is longer.
+    assert np.allclose(lengths[:3], lengths[0]) and lengths[-1] > 3 * lengths[0]
 
 
 def test_two_neighbours_become_three_gently(plate: Model) -> None:

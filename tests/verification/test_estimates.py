@@ -169,7 +169,8 @@ def test_what_is_not_reached_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_where_nothing_is_coarser_there_is_no_estimate(tmp_path: Path) -> None:
-    text = BLOCK.format(accuracy=1e-3).replace("elements = 3", "elements = 1").replace("steps = 2", "order = 0")
+    text = BLOCK.format(accuracy=1e-3).replace("elements = 3", 'elements = 1, grading = "none"')
+    text = text.replace("steps = 2", "order = 0")
     (tmp_path / "block.toml").write_text(text.replace("accuracy = 0.001\n", ""))
     results = pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
     assert np.isnan(results.errors.relative["reactions"]).all()

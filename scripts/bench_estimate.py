@@ -193,7 +193,7 @@ def measure_error(solved: Solved, reference: Solved) -> float:
 def read_jump(solved: Solved, name: str, values: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Values (m,) of the pairs, read at arc lengths on an interface by the shapes of its elements."""
     mesh, pairs = solved.mesh, solved.pairs(name)
-    element = mesh.pairs.first[pairs] // (mesh.order + 1)
+    element = mesh.pairs.slot[pairs] // (mesh.order + 1)
     chain = element[:: mesh.order + 1]
     along = mesh.pairs.arc_length[pairs].reshape(len(chain), -1)
     # Each place belongs to the element whose nodes are nearest.

@@ -171,7 +171,9 @@ class Comparison:
                 float(np.sqrt((weight * difference[kind] ** 2)[pairs].sum() / max(weight[pairs].sum(), 1e-300)))
                 for kind in ("traction_n", "traction_s")
             ]
-            found.append([*largest, *mean] if len(pairs) else [np.nan] * 4)
+            # Where the second solution has its pairs on the other face nothing is known.
+            seen = float(weight[pairs] @ beside.seen[pairs]) >= 0.5 * float(weight[pairs].sum())
+            found.append([*largest, *mean] if len(pairs) and seen else [np.nan] * 4)
         table = np.array(found).reshape(-1, 4)
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
 
@@ -189,8 +191,8 @@ class Comparison:
         The mean over each coarse element is left out: it comes from elsewhere.
         """
         pairs, result = beside.mesh.pairs, np.zeros(self._mesh.elements)
-        element = beside.carry.nearest[pairs.first] // (self._mesh.order + 1)
-        own, of = np.unique(pairs.first // (beside.mesh.order + 1), return_inverse=True)
+        element = beside.carry.nearest[pairs.slot] // (self._mesh.order + 1)
+        own, of = np.unique(pairs.slot // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             for name in ("opening", "slip"):
                 errors = self._subtract_field(name, mine, other, beside) / (self._divisor * self.scales.jumps)

@@ -31,7 +31,7 @@ class Beside:
     """A coarser model and mesh beside those of a run, and how values of the run are read there.
 
     kind: how it was made, see `pbem.model.refinement`. carry: to the coarse mesh's nodes. seen (c,): of each of its
-    pairs, whether all fine pairs that it is compared with are there. pair_of_node (n,): the fine pair whose first node
+    pairs, whether all fine pairs that it is compared with are there. pair_of_node (n,): the fine pair whose slot node
     a fine node is, or -1. nearest (c,): the nearest fine pair, or -1.
     """
 
@@ -50,9 +50,9 @@ class Beside:
         jumps: on crack-tip elements with the shape of the square root.
         """
         at_nodes = np.zeros(self.fine.nodes)
-        at_nodes[self.fine.pairs.first] = values
+        at_nodes[self.fine.pairs.slot] = values
         matrix = self.carry.rooted if jumps else self.carry.plain
-        return np.asarray((matrix @ at_nodes)[self.mesh.pairs.first])
+        return np.asarray((matrix @ at_nodes)[self.mesh.pairs.slot])
 
 
 def put_beside(model: Model, mesh: Mesh) -> Beside | None:
@@ -64,10 +64,10 @@ def put_beside(model: Model, mesh: Mesh) -> Beside | None:
     second_mesh = generate_mesh(second)
     carry = carry_nodes(model, mesh, second, second_mesh)
     pair_of_node = np.full(mesh.nodes, -1)
-    pair_of_node[mesh.pairs.first] = np.arange(mesh.pairs.count)
-    first = second_mesh.pairs.first
-    lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[first]
-    nearest = pair_of_node[carry.nearest[first]]
+    pair_of_node[mesh.pairs.slot] = np.arange(mesh.pairs.count)
+    slot = second_mesh.pairs.slot
+    lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slot]
+    nearest = pair_of_node[carry.nearest[slot]]
     return Beside(coarse.kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, nearest)
 
 

@@ -73,6 +73,14 @@ def test_the_true_error_is_of_the_size_of_the_estimated_one(name: str, estimated
     assert 0.3 <= ratio <= 10
 
 
+@pytest.mark.parametrize("first", ["pin", "hole"])
+def test_contact_is_compared_whichever_face_carries_the_pairs(first: str, estimated: dict[str, float]) -> None:
+    (one,) = [one for one in PROOFS if one.name.startswith(f"pin in a hole, mesh ratio 5:1, {first} first")]
+    one.run()
+    assert 1e-5 < estimated["tractions"] < 1e-2
+    assert 1e-9 < estimated["jumps"] < 1e-2
+
+
 GRIFFITH = """
 [materials.rock]
 young = 1000.0

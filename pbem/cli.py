@@ -19,7 +19,7 @@ from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
 if TYPE_CHECKING:
-    from pbem.results.reader import Results, Steps
+    from pbem.results.reader import Results
     from pbem.solve.step import Reporter
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
@@ -212,6 +212,7 @@ def make_parser() -> argparse.ArgumentParser:
     plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
     plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
+    plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
     plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
     return parser
 
@@ -260,10 +261,17 @@ def _plot(options: argparse.Namespace) -> int:
 
     results = open_results(options.file)
     source = Path(options.file)
-    beside = source.with_name(f"{source.stem}_{options.field}.png") if options.field else source.with_suffix(".png")
+    kind = "mesh" if options.mesh else options.field
+    beside = source.with_name(f"{source.stem}_{kind}.png") if kind else source.with_suffix(".png")
     target = check_picture_path(options.output or beside)
     step = -1 if options.step is None else results.find_step(options.step)
-    if options.field:
+    if options.mesh:
+        from pbem.results.level_plot import read_refined
+        from pbem.results.plots import plot_model
+
+        model, mesh, levels = read_refined(results)
+        plot_model(model, mesh, target, levels)
+    elif options.field:
         plot_field(results, options.field, target, step)
     else:
         plot_results(results, target, step, options.magnify)
@@ -316,7 +324,7 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     else:
         if world.rank == 0 and not options.quiet:
             _close(reporter)
-            _say_finished(results.steps, target, time.perf_counter() - begun)
+            _say_finished(results, target, time.perf_counter() - begun)
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code
@@ -353,8 +361,13 @@ def _say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
     return WRONG_INPUT
 
 
-def _say_finished(steps: Steps, target: Path, seconds: float) -> None:
+def _say_finished(results: Results, target: Path, seconds: float) -> None:
+    from pbem.results.describe import describe_errors
+
+    steps = results.steps
     number = int(steps.number[-1]) if len(steps) else 0
+    if number:
+        print(f"estimated discretisation errors: {describe_errors(results)[0]}")
     print(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}", flush=True)
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import get_args
 
@@ -13,15 +14,21 @@ from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
+from pbem.model.refinement import bisect_elements, impose_fractions
 from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
+from pbem.results.accuracy import Decision, Pass, decide
+from pbem.results.estimator import Estimator
 from pbem.results.output import check_output_path
 from pbem.results.reader import Results, open_results
+from pbem.results.resume import read_mesh_fractions
 from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
 from pbem.solve.assembly import assemble_problem
+from pbem.solve.beside import NOTHING_COARSER, put_beside
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
+from pbem.solve.second import SecondSolution
 from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step
 
@@ -61,25 +68,45 @@ def run(
             model = replace(model, solver=replace(model.solver, operator=operator))
         target = Path(output) if output is not None else Path(path.stem + ".h5")
         do_on_first(world, PbemError, lambda: check_output_path(target))
-        mesh = generate_mesh(model)
-        check_shares(model, mesh, world.size)
         listener = reporter if reporter is not None and world.rank == 0 else SilentReporter()
-        listener.begin(model)
-        for note in (*model.notes, *mesh.notes, *placement):
-            listener.note(note)
         options = {**model.solver.petsc, **(petsc or {})}
         with petsc_options(options):
-            _solve(model, mesh, target, resume, options, listener)
+            _refine_and_solve(model, target, resume, options, listener, placement)
         results = open_results(target)
         for note in compare_release(results):
             listener.note(note)
         return results
 
 
-def _solve(
-    model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter
+def _refine_and_solve(
+    model: Model, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter, placement: Sequence[str]
 ) -> None:
-    """March through the load history; the first rank writes."""
+    """Solve, and where `analysis.accuracy` asks for it refine and solve again, from rest, until it is met.
+
+    Raises ConvergenceError ("accuracy") when passes or unknowns run out; the file then holds the last pass.
+    """
+    if resume and model.analysis.accuracy is not None:
+        fractions = do_on_first(world, PbemError, lambda: read_mesh_fractions(target))
+        model = model if fractions is None else impose_fractions(model, fractions)
+    first_unknowns = 0
+    notes: Sequence[str] = (*model.notes,)
+    for number in count(1):
+        mesh = generate_mesh(model)
+        check_shares(model, mesh, world.size)
+        listener.begin(model)
+        for note in (*notes, *mesh.notes, *placement) if number == 1 else ():
+            listener.note(note)
+        first_unknowns = first_unknowns or 2 * mesh.nodes
+        decision = _solve(model, mesh, target, resume, options, listener, Pass(number, first_unknowns))
+        if decision.marked is None:
+            return
+        model, resume = bisect_elements(model, decision.marked, decision.gently), False
+
+
+def _solve(
+    model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter, one: Pass
+) -> Decision:
+    """March through the load history; the first rank writes. Returns what follows."""
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
 
@@ -90,6 +117,7 @@ def _solve(
 
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)
+    decision: Decision | None = None
     try:
         problem = assemble_problem(model, mesh, world)
         for note in problem.notes:
@@ -97,7 +125,19 @@ def _solve(
         if interior is not None:
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-        store_steps(march(problem, listener, start), model.output_every, interior, writer, listener)
+        estimator = make_estimator(model, mesh, last)
+        store_steps(march(problem, listener, start), model.output_every, interior, writer, listener, estimator)
+        estimator.destroy()
+        if writer:
+            for note in estimator.list_notes():
+                listener.note(note)
+            decision = decide(model, mesh, writer.relative_errors, estimator, one)
+        decision = broadcast(world, decision)
+        assert decision is not None
+        for note in decision.notes:
+            listener.note(note)
+        if decision.failure:
+            raise ConvergenceError("accuracy", decision.failure)
     except BaseException as error:
         if writer:
             writer.__exit__(type(error), error, error.__traceback__)
@@ -105,11 +145,25 @@ def _solve(
     if writer:
         writer.finish()
     world.Barrier()
+    return decision
+
+
+def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:
+    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
+    beside, second, missing = None, None, ""
+    try:
+        beside = put_beside(model, mesh)
+        second = None if beside is None else SecondSolution(beside, world, start)
+        missing = NOTHING_COARSER if beside is None else ""
+    except PbemError as error:
+        missing = f"the second solution cannot be computed ({error})"
+    return Estimator(model, mesh, beside, second, missing, world.rank == 0)
 
 
 def store_steps(
     steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
     listener: Reporter | None = None,
+    estimator: Estimator | None = None,
 ) -> None:
     """Write the steps as they come, those that are stored with the field at the interior points."""
     waiting: Step | None = None
@@ -119,12 +173,16 @@ def store_steps(
             waiting = None if stored else step
             if interior is not None and stored:
                 step = replace(step, interior=interior.evaluate(step))
+            rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
             notes = do_on_first(
-                world, PbemError, lambda due=step: writer.append(due) if writer else (),  # type: ignore[misc]
+                world, PbemError,
+                lambda due=step, rows=rows: writer.append(due, rows) if writer else (),  # type: ignore[misc]
             )
             for note in notes:
                 (listener or SilentReporter()).note(note)
+            if writer and estimator is not None and estimator.missing:
+                writer.note_missing(estimator.missing)
     except ConvergenceError:
         # All ranks are here together: the last step reached is stored as well.
         if interior is not None and waiting is not None:

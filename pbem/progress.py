@@ -34,7 +34,7 @@ class LogReporter:
         self._number: int | None = None
 
     def begin(self, model: Model) -> None:
-        self._plan = Plan(model.stages)
+        self._plan, self._number = Plan(model.stages), None
 
     def note(self, text: str) -> None:
         self._say(f"note: {text}")

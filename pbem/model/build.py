@@ -174,7 +174,9 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source=case.text,
         regions=regions, curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
-        analysis=Analysis(case.analysis.scheme, case.analysis.order, case.analysis.tips),
+        analysis=Analysis(
+            case.analysis.scheme, case.analysis.order, case.analysis.tips, case.analysis.accuracy
+        ),
         solver=SolverOptions(
             linear=case.solver.linear, operator=case.solver.operator, tolerance=case.solver.tolerance,
             newton_tolerance=case.solver.newton_tolerance, newton_max_iterations=case.solver.newton_max_iterations,

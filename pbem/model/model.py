@@ -131,11 +131,15 @@ class Stage:
 
 @dataclass(frozen=True)
 class Analysis:
-    """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements."""
+    """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements.
+
+    accuracy: the mesh is refined until the estimated relative error is below it; None: it is taken as it is.
+    """
 
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: int = 2
     tips: bool = True
+    accuracy: float | None = None
 
 
 # How the operator of the integral equations is stored.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +80,28 @@ class Energies:
     elastic: Real
     dissipated: Real
     released: Real
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Estimated discretisation errors over the k stored steps; NaN where there is no estimate (`missing` says why).
+
+    reactions: per outer curve (k, 2), force. opening, slip: per interface (k,), largest error, length; traction_n,
+    traction_s: root of the mean square error along it, stress. KI, KII: per crack (k, 2), at start and end.
+    displacement (k,): largest error. relative: `reactions`, `jumps`, `tractions`, `factors`, `displacement` (k,), the
+    largest of each kind over the largest value in the model so far.
+    """
+
+    reactions: Mapping[str, Real]
+    opening: Mapping[str, Real]
+    slip: Mapping[str, Real]
+    traction_n: Mapping[str, Real]
+    traction_s: Mapping[str, Real]
+    KI: Mapping[str, Real]
+    KII: Mapping[str, Real]
+    displacement: Real
+    relative: Mapping[str, Real]
+    missing: str
 
 
 @dataclass(frozen=True)

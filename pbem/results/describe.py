@@ -18,6 +18,7 @@ from pbem.solve.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
 MOST_TIPS = 10
+MOST_ERRORS = 10
 
 
 def describe_model(model: Model, mesh: Mesh) -> str:
@@ -65,10 +66,41 @@ def describe_results(results: Results) -> str:
             _contact_rows(results))))
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
+        parts.append(_section("estimated discretisation errors at the last step", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
     return "\n\n".join(part for part in parts if part)
+
+
+# Kinds of estimated errors as they are called.
+ERROR_NAMES = {"reactions": "reactions", "jumps": "slips and openings", "tractions": "tractions", "factors": "K"}
+
+
+def describe_errors(results: Results) -> list[str]:
+    """The estimated errors of the last stored step: relative ones in a line, then the largest of each interface."""
+    errors = results.errors
+    relative = {name: errors.relative[kind][-1] for kind, name in ERROR_NAMES.items() if kind in errors.relative}
+    present = {
+        "reactions": bool(errors.reactions), "slips and openings": bool(errors.slip),
+        "tractions": bool(errors.traction_n), "K": bool(errors.KI),
+    }  # fmt: skip
+    shown = {name: value for name, value in relative.items() if present[name]}
+    if not shown and "displacement" in errors.relative:
+        shown = {"displacements": errors.relative["displacement"][-1]}
+    if errors.missing and not any(np.isfinite(value) for value in shown.values()):
+        return [f"none: {errors.missing}"]
+    lines = [
+        ", ".join(f"{name} {value:.1e}" for name, value in shown.items()) + " of the largest in the model so far"
+    ]
+    if len(errors.slip) > MOST_ERRORS:
+        return lines
+    worst = sorted(errors.slip, key=lambda name: -np.nan_to_num(max(errors.slip[name][-1], errors.opening[name][-1])))
+    rows = [
+        [name, *(f"{getattr(errors, kind)[name][-1]:.1e}" for kind in ("opening", "slip", "traction_n", "traction_s"))]
+        for name in worst
+    ]
+    return lines + _table(["interface", "opening", "slip", "traction n", "traction s"], rows)
 
 
 # Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.model.refinement import Fractions
 from pbem.results.configuration import dump_configuration
+from pbem.results.estimates import list_datasets
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
@@ -94,6 +96,9 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     energy = file.create_group("energy")
     for name in ENERGIES:
         create_energy(energy, name)
+    _write_estimates(file.create_group("estimates"), model, mesh)
+    if model.analysis.accuracy is not None:
+        _write_fractions(file.create_group("mesh"), model)
     if model.interior_points:
         interior = file.create_group("interior")
         interior["position"] = to_columns(np.array(model.interior_points))
@@ -146,6 +151,38 @@ def _write_tips(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mes
         crack = create_group(group.id, name)
         for kind, source in sources.items():
             source.create_view(crack, kind, number)
+
+
+def _write_fractions(group: h5py.Group, model: Model) -> None:
+    """Where the elements of all legs end, as the mesh may have been refined: leg after leg, curve after curve."""
+    legs = [(number, leg) for number, curve in enumerate(model.curves.values()) for leg in curve.legs]
+    group["curve"] = np.array([number for number, _ in legs], dtype="i4")
+    group["elements"] = np.array([leg.elements for _, leg in legs], dtype="i4")
+    group["fractions"] = np.concatenate([leg.element_fractions() for _, leg in legs])
+
+
+def read_fractions(file: h5py.File) -> Fractions | None:
+    """The element ends that the mesh of a result file was made with, if it may have been refined."""
+    if "mesh" not in file:
+        return None
+    group, names = file["mesh"], file["nodes/curve"].attrs["names"]
+    counts = group["elements"][...] + 1
+    parts = np.split(group["fractions"][...], np.cumsum(counts)[:-1])
+    ends: dict[str, list[tuple[float, ...]]] = {str(name): [] for name in names}
+    for number, part in zip(group["curve"][...], parts, strict=True):
+        ends[str(names[number])].append(tuple(float(t) for t in part))
+    return {name: tuple(legs) for name, legs in ends.items()}
+
+
+def _write_estimates(group: h5py.Group, model: Model, mesh: Mesh) -> None:
+    """Estimated errors: a dataset a quantity, its second axis the curves, interfaces or cracks of the attributes."""
+    for name, shape in list_datasets(model, mesh).items():
+        if 0 not in shape:
+            _create_growing(group, name, shape, "f8")
+    group.attrs["curves"] = _text(list(model.conditions))
+    group.attrs["interfaces"] = _text(list(sort_pairs(mesh)))
+    group.attrs["cracks"] = _text(list(model.crack_tips))
+    group.attrs["missing"] = ""
 
 
 def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:

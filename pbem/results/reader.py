@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from pbem.case.generation import Group
 from pbem.errors import ResultFileError
-from pbem.results.contents import Elements, Energies, Nodes, Steps, Tips, Units
-from pbem.results.layout import ENERGIES, TIP_DATASETS
+from pbem.model.refinement import Fractions
+from pbem.results.contents import Elements, Energies, Errors, Nodes, Steps, Tips, Units
+from pbem.results.layout import ENERGIES, TIP_DATASETS, read_fractions
 from pbem.results.lazy import AllPairs, Contact, Interfaces, Interior, freeze, open_quietly, read_names
 
 Real = NDArray[np.float64]
@@ -73,6 +74,18 @@ class Results:
     def hoop_stress(self) -> Real:
         """(k, n) normal stress along the boundary, at the nodes, in units of stress."""
         return self._load("fields/hoop_stress")
+
+    @cached_property
+    def fractions(self) -> Fractions | None:
+        """Where the elements of each curve's legs end, if the mesh may have been refined (`analysis.accuracy`)."""
+        with open_quietly(self.path) as file:
+            return read_fractions(file)
+
+    @cached_property
+    def errors(self) -> Errors:
+        """Estimated discretisation errors."""
+        with open_quietly(self.path) as file:
+            return _read_errors(file, len(self.steps))
 
     def displacement_at(self, step: int) -> Real:
         """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
@@ -193,6 +206,30 @@ def _read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
         name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
         for number, name in enumerate(names)
     }
+
+
+def _read_errors(file: h5py.File, steps: int) -> Errors:
+    """Empty where the file has none."""
+    nothing = np.full(steps, np.nan)
+    if "estimates" not in file:
+        return Errors({}, {}, {}, {}, {}, {}, {}, nothing, {}, "written by a version that estimates no errors")
+    group = file["estimates"]
+
+    def read(quantity: str, names: str) -> dict[str, Real]:
+        if quantity not in group:
+            return {}
+        values = freeze(group[quantity][:steps])
+        return {str(name): values[:, number] for number, name in enumerate(group.attrs[names])}
+
+    return Errors(
+        reactions=read("reactions", "curves"),
+        **{name: read(name, "interfaces") for name in ("opening", "slip", "traction_n", "traction_s")},
+        **{name: read(name, "cracks") for name in ("KI", "KII")},
+        displacement=freeze(group["displacement"][:steps]),
+        relative={name.removeprefix("relative_"): freeze(data[:steps]) for name, data in group.items()
+                  if name.startswith("relative_")},
+        missing=str(group.attrs["missing"]),
+    )  # fmt: skip
 
 
 def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -10,6 +11,7 @@ import numpy as np
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.model.refinement import Fractions
 from pbem.results.energy import Energy
 from pbem.results.layout import (
     ENERGIES,
@@ -19,6 +21,8 @@ from pbem.results.layout import (
     create_energy,
     extend,
     join_pairs,
+    open_file,
+    read_fractions,
     to_columns,
 )
 from pbem.solve.step import ContactState, Step
@@ -59,6 +63,18 @@ def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
     )
 
 
+def read_mesh_fractions(path: Path) -> Fractions | None:
+    """Where the elements end in a result file that is to be gone on with; None if it does not say.
+
+    Raises ResultFileError if it cannot be read.
+    """
+    try:
+        with open_file(path, "r") as file:
+            return read_fractions(file)
+    except (OSError, KeyError, ValueError) as error:
+        raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
+
+
 def read_last_energy(file: h5py.File) -> Energy:
     """The energies at the last step that was stored completely."""
     k = min(len(file["steps"][name]) for name in STEP_DATASETS)
@@ -77,7 +93,7 @@ def truncate(file: h5py.File, last_number: int) -> None:
             item.resize(k, axis=0)
 
     # What is in other groups are views of these.
-    for group in ("steps", "fields", "all", "energy", *(["interior"] if "interior" in file else [])):
+    for group in ("steps", "fields", "all", "energy", "estimates", *(["interior"] if "interior" in file else [])):
         file[group].visititems(cut)
     convergence = file["convergence"]
     convergence.resize(int(np.searchsorted(convergence["step"], last_number, side="right")), axis=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -131,15 +131,19 @@ class ResultWriter:
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         self._pending: Step | None = None
 
-    def append(self, step: Step) -> tuple[str, ...]:
+    def append(
+        self, step: Step, estimates: Mapping[str, NDArray[np.float64]] | None = None
+    ) -> tuple[str, ...]:
         """Store the step if it is its turn, and its iterations in any case; flush. Gives what the user should know.
 
+        estimates: its estimated errors, of `pbem.results.estimates.to_rows`; NaN is stored without.
         Raises StorageError if the disk has no room for it: HDF5 would leave a file that cannot be read.
         """
         self._require_room(step)
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
         self._energy = self._balance.add(step)
+        self._estimates = estimates or {}
         if step.is_due(self._every):
             self._store(step)
         else:
@@ -185,12 +189,27 @@ class ResultWriter:
         if self._tip_rules.cracks:
             for kind, at_tips in self._tip_rules.evaluate_all(step).items():
                 append_row(together["tips"][kind], at_tips)
+        for name, dataset in file["estimates"].items():
+            unknown = np.full(dataset.shape[1:], np.nan)
+            append_row(dataset, np.asarray(self._estimates.get(name, unknown)))
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
             append_row(file["steps"][quantity], np.array(value))
+
+    def note_missing(self, reason: str) -> None:
+        """Say in the file why errors are not estimated."""
+        self._file["estimates"].attrs["missing"] = reason
+
+    @property
+    def relative_errors(self) -> dict[str, NDArray[np.float64]]:
+        """The estimated relative errors (k,) of the steps stored so far, by kind."""
+        if self._pending is not None:
+            self._store(self._pending)
+        group = self._file["estimates"]
+        return {name.removeprefix("relative_"): group[name][...] for name in group if name.startswith("relative_")}
 
     def _evaluate_hoop_stress(self, step: Step) -> NDArray[np.float64]:
         """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""

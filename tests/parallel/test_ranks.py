@@ -30,6 +30,9 @@ SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
     "KI": "intensity", "KII": "intensity", "reactions": "force",
+    # Estimated errors that are parts of the largest value.
+    **dict.fromkeys(("penetration", "tension", "cone"), "part"),
+    **{f"relative_{kind}": "part" for kind in ("reactions", "jumps", "tractions", "factors", "displacement")},
 }  # fmt: skip
 GROUPS = {"reactions": "force", "energy": "energy"}
 
@@ -59,7 +62,7 @@ def read_results(path: Path) -> dict[str, Array]:
 
 def measure_scales(results: dict[str, Array]) -> dict[str, float]:
     """The largest magnitude of each kind of field."""
-    scales: dict[str, float] = {}
+    scales: dict[str, float] = {"part": 1.0}
     for name, values in results.items():
         kind = find_kind(name)
         if kind:

@@ -1,4 +1,8 @@
-"""Bodies that only the balance of their loads keeps at rest: their mean displacement and rotation are set to zero."""
+"""Bodies that only the balance of their loads keeps at rest: their mean displacement and rotation are set to zero.
+
+Anchors are for the motions that are free at the start. Where contact comes to hold such a motion its anchor has to be
+taken off, or it would carry a part of the load: see pbem.contact.support and pbem.solve.release.
+"""
 
 from __future__ import annotations
 
@@ -35,10 +39,25 @@ def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, .
     numbers = {name: number for number, name in enumerate(mesh.region_names)}
     bounds = np.searchsorted(mesh.region, np.arange(len(numbers) + 1)) * (mesh.order + 1)
     nodes = _Nodes(mesh, numbers, bounds, mesh.node_crack)
-    return tuple(anchor for group in _group_motions(motions) for anchor in _anchor_group(nodes, group))
+    return tuple(anchor for group in group_motions(motions) for anchor in _anchor_group(nodes, group))
 
 
-def _group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
+def see_motions(mesh: Mesh, anchors: Sequence[Anchor], motions: Sequence[FreeMotion]) -> Real:
+    """Values (a, c) of the anchors' functionals for free motions."""
+    seen = np.zeros((len(anchors), len(motions)))
+    for row, anchor in enumerate(anchors):
+        name, conjugate = mesh.region_names[anchor.region], np.conj(anchor.functional)
+        points = mesh.position[anchor.nodes]
+        # About a point of the body: far from the origin the parts of a rotation would cancel.
+        total, turned = complex(conjugate.sum()), complex((conjugate * 1j * (points - points[0])).sum())
+        for column, motion in enumerate(motions):
+            if name in motion.velocities:
+                shift, spin = motion.velocities[name]
+                seen[row, column] = (total * (shift + 1j * spin * points[0])).real + spin * turned.real
+    return seen
+
+
+def group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
     """Motions that have regions in common, directly or by way of others."""
     members: dict[int, list[int]] = {}
     group_of: dict[str, int] = {}

@@ -26,10 +26,15 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class ConstraintMap:
-    """matrix (4 nodes, 2 nodes), offset (4 nodes,): displacements and tractions from the unknowns."""
+    """matrix (4 nodes, 2 nodes), offset (4 nodes,): displacements and tractions from the unknowns.
+
+    released (a, r): orthonormal combinations of the a anchors that do not act, as the pairs hold what they would hold;
+    None if all act.
+    """
 
     matrix: sparse.csr_matrix
     offset: Real
+    released: Real | None = None
 
     def evaluate(self, unknowns: Real) -> Real:
         """v (4 nodes,) from x (2 nodes,)."""

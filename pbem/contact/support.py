@@ -2,33 +2,116 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.anchor import Anchor, see_motions
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, resists_slip
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.support import Tie, find_free_motions
+from pbem.model.support import FreeMotion, PairTie, Tie, find_free_motions
+
+Real = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+# Two sticking pairs that are further apart than this part of the model's size hold all three motions.
+APART = 1e-6
+# A motion is one of those that are anchored if it differs by less than this part of itself.
+ANCHORED = 1e-6
 
 
-def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie]:
-    """What every interface of two regions holds: sticking pairs both components of the jump, slipping ones one."""
-    count = len(mesh.interface_names)
-    sticks = np.bincount(mesh.pairs.interface[modes.mode == STICK], minlength=count) > 0
-    closed = np.bincount(mesh.pairs.interface[modes.mode != OPEN], minlength=count) > 0
-    ties: dict[str, Tie] = {}
-    for number, name in enumerate(mesh.interface_names):
-        if name not in model.interfaces or model.interfaces[name].second is not None:
-            ties[name] = "both" if sticks[number] else "normal" if closed[number] else "none"
+def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie | PairTie]:
+    """What the closed pairs of every interface of two regions hold.
+
+    "both" where two pairs stick, which leave no motion, "none" where all are open, else the pairs one by one.
+    """
+    pairs, names = mesh.pairs, mesh.interface_names
+    closed = np.flatnonzero((modes.mode != OPEN) & ~pairs.crack)
+    closed = closed[np.argsort(pairs.interface[closed], kind="stable")]
+    bounds = np.searchsorted(pairs.interface[closed], np.arange(len(names) + 1))
+    held = _measure_span(mesh, closed[modes.mode[closed] == STICK]) > APART * model.size
+    ties: dict[str, Tie | PairTie] = {}
+    for number, name in enumerate(names):
+        if name in model.interfaces and model.interfaces[name].second is None:
+            continue
+        own = closed[bounds[number] : bounds[number + 1]]
+        if held[number] or not len(own):
+            ties[name] = "both" if held[number] else "none"
+        else:
+            ties[name] = PairTie(pairs.position[own], pairs.normal[own], modes.mode[own] == STICK)
     return ties
 
 
-def describe_free_motions(model: Model, ties: dict[str, Tie], anchored: int) -> str | None:
-    """The rigid motions that come free with these ties, in words; None if there are no more than were anchored."""
+def _measure_span(mesh: Mesh, chosen: NDArray[np.int64]) -> Real:
+    """Largest distance (interfaces,) of chosen pairs from the first of them on the same interface."""
+    of, first = np.unique(mesh.pairs.interface[chosen], return_index=True)
+    start = np.zeros(len(mesh.interface_names), dtype=complex)
+    start[of] = mesh.pairs.position[chosen[first]]
+    span = np.zeros(len(mesh.interface_names))
+    own = mesh.pairs.interface[chosen]
+    np.maximum.at(span, own, np.abs(mesh.pairs.position[chosen] - start[own]))
+    return span
+
+
+@dataclass(frozen=True)
+class Support:
+    """What holds the bodies in the present modes.
+
+    motions: that the pairs leave free. unheld: those that no anchor holds either, in words; None if there are none.
+    acting (a, c): orthonormal combinations of the a anchors that hold the c free motions; released (a, a - c): those
+    that would carry a part of what the pairs carry, and are taken off.
+    """
+
+    motions: tuple[FreeMotion, ...]
+    unheld: str | None
+    acting: Real
+    released: Real
+
+    @property
+    def text(self) -> str:
+        """The free motions in words."""
+        return "; ".join(motion.text for motion in self.motions)
+
+
+def find_support(
+    model: Model, mesh: Mesh, anchors: tuple[Anchor, ...], anchored: tuple[FreeMotion, ...],
+    ties: Mapping[str, Tie | PairTie],
+) -> Support:
+    """Which rigid motions are free with these ties, and which of the anchors, made for `anchored`, hold them."""
     motions = find_free_motions(model, ties)
-    return "; ".join(motion.text for motion in motions) if len(motions) > anchored else None
+    whole = np.eye(len(anchors))
+    if not motions:
+        return Support((), None, whole[:, :0], whole)
+    if len(motions) > len(anchors) or not _is_spanned(mesh, anchors, anchored, motions):
+        return Support(motions, "; ".join(motion.text for motion in motions), whole, whole[:, :0])
+    seen = see_motions(mesh, anchors, motions)
+    basis = np.linalg.qr(seen / np.linalg.norm(seen, axis=0), mode="complete")[0]
+    return Support(motions, None, basis[:, : len(motions)], basis[:, len(motions) :])
+
+
+def _is_spanned(
+    mesh: Mesh, anchors: tuple[Anchor, ...], anchored: tuple[FreeMotion, ...], motions: tuple[FreeMotion, ...]
+) -> bool:
+    """Whether all motions are combinations of the anchored ones; the anchors tell which."""
+    parts = np.linalg.solve(see_motions(mesh, anchors, anchored), see_motions(mesh, anchors, motions))
+    whole, known = _list_velocities(mesh, motions), _list_velocities(mesh, anchored)
+    return bool((np.abs(whole - known @ parts).max(axis=0) <= ANCHORED * np.abs(whole).max(axis=0)).all())
+
+
+def _list_velocities(mesh: Mesh, motions: tuple[FreeMotion, ...]) -> NDArray[np.complex128]:
+    """Velocities of a point of every region, and of another one against it, (2 regions, motions)."""
+    first = np.searchsorted(mesh.region, np.arange(len(mesh.region_names)))
+    size = float(np.abs(mesh.start - mesh.start.mean()).max())
+    result = np.zeros((2 * len(first), len(motions)), dtype=complex)
+    numbers = {name: number for number, name in enumerate(mesh.region_names)}
+    for column, motion in enumerate(motions):
+        for name, (shift, spin) in motion.velocities.items():
+            row = 2 * numbers[name]
+            result[row : row + 2, column] = shift + 1j * spin * mesh.start[first[numbers[name]]], spin * size
+    return result
 
 
 # Pairs of each parted interface that are closed to hold a body that would be free.
@@ -36,7 +119,7 @@ CLOSED_AT_LEAST = 3
 
 
 def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: NDArray[np.float64]) -> ModeState:
-    """Modes with the nearest pairs of every wholly open interface closed, for a body that is free otherwise.
+    """Modes with the nearest pairs of every interface on which fewer are closed, for a body that is free otherwise.
 
     A body that is pressed against another one by forces alone has no equilibrium until they touch somewhere; opening
     (m,): the present openings.
@@ -45,12 +128,12 @@ def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: N
     closed = np.where(resists_slip(laws), STICK, SLIP)
     may_close = np.flatnonzero(~laws.parted & ~mesh.pairs.crack)
     of = mesh.pairs.interface[may_close]
-    partly_closed = np.bincount(of[mode[may_close] != OPEN], minlength=len(mesh.interface_names)) > 0
-    own = may_close[~partly_closed[of]]
+    count = np.bincount(of[mode[may_close] != OPEN], minlength=len(mesh.interface_names))
+    own = may_close[(mode[may_close] == OPEN) & (count[of] < CLOSED_AT_LEAST)]
     # By interface, then by opening: the first few of each interface are its nearest pairs.
     own = own[np.lexsort((opening[own], mesh.pairs.interface[own]))]
     of = mesh.pairs.interface[own]
-    nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < CLOSED_AT_LEAST]
+    nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < CLOSED_AT_LEAST - count[of]]
     mode[nearest] = closed[nearest]
     return ModeState(mode, modes.sign)
 

@@ -26,6 +26,19 @@ ROUNDINGS = 64
 
 
 @dataclass(frozen=True)
+class PairTie:
+    """What single contact pairs (k,) of an interface hold of the relative motion of its two regions.
+
+    position, normal (k,): complex, normal is outward of the first region; sticks (k,): pairs that hold both components
+    of the jump there, others hold the one along the normal.
+    """
+
+    position: NDArray[np.complex128]
+    normal: NDArray[np.complex128]
+    sticks: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
 class FreeMotion:
     """A rigid motion that nothing prevents.
 
@@ -47,11 +60,11 @@ def default_tie(law: Law, touches: bool) -> Tie:
     return "both" if law.friction > 0 or law.cohesion > 0 or law.kind == "custom" else "normal"
 
 
-def find_free_motions(model: Model, ties: Mapping[str, Tie] | None = None) -> tuple[FreeMotion, ...]:
+def find_free_motions(model: Model, ties: Mapping[str, Tie | PairTie] | None = None) -> tuple[FreeMotion, ...]:
     """A basis of the rigid motions of the regions that no prescribed displacement, spring and interface prevents.
 
-    ties: name of an interface or contact to what it holds: "both" relative displacements, the "normal" one, or "none";
-    those that are not named hold what their law gives (`default_tie`).
+    ties: name of an interface or contact to what it holds: "both" relative displacements, the "normal" one, or "none",
+    all along it, or what single pairs of it hold; those that are not named hold what their law gives (`default_tie`).
     """
     names = [region.name for region in model.regions]
     center, scale = _frame(model)
@@ -98,7 +111,7 @@ def _link_to_ground(model: Model, center: complex, scale: float) -> Iterator[Lin
 
 
 def _link_regions(
-    model: Model, names: list[str], ties: Mapping[str, Tie], center: complex, scale: float
+    model: Model, names: list[str], ties: Mapping[str, Tie | PairTie], center: complex, scale: float
 ) -> Iterator[Link]:
     """What interfaces and contacts demand of the difference of two regions' motions, on the (first) curve's points."""
     numbers = {name: number for number, name in enumerate(names)}
@@ -111,10 +124,22 @@ def _link_regions(
     joints += [(one, one.first, bounded[one.first], bounded[one.second]) for one in model.contacts.values()]
     for joint, curve, first, second in joints:
         tie = ties.get(joint.name) or default_tie(joint.law, _touches(model, joint))
-        if tie != "none" and first != second:
+        if first == second or tie == "none":
+            continue
+        if isinstance(tie, PairTie):
+            yield numbers[first], numbers[second], _constrain_at_pairs(tie, center, scale)
+        else:
             points, normals = sample_side(model.curves, Side(curve, True))
             directions = [normals] if tie == "normal" else [normals, 1j * normals]
             yield numbers[first], numbers[second], _constrain(_motions(points, center, scale), directions)
+
+
+def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> NDArray[np.float64]:
+    """At most 3 rows of 3: one pair that sticks leaves the rotation about it, pairs that slip leave what is along s."""
+    motions = _motions(tie.position, center, scale)
+    along = np.concatenate([tie.normal, 1j * tie.normal[tie.sticks]])
+    rows = (np.concatenate([motions, motions[tie.sticks]]) * np.conj(along)[:, None]).real
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def _touches(model: Model, joint: Interface | Contact) -> bool:

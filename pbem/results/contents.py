@@ -105,6 +105,22 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class Balances:
+    """What is left over of the forces on r regions, over the k stored steps.
+
+    names: of the regions. resultant (k, r, 3): force along x and y (stress times length) and moment about the region's
+    centre, the mean of its boundary; of weight and in-situ stress too. relative (k, r): the larger of force and moment,
+    to the sums of their parts without signs; 0 for infinite regions, which may carry a resultant. carried (k, r): of
+    what keeps the mean motion of bodies at zero that nothing else holds; 0 where nothing has to. NaN where not known.
+    """
+
+    names: tuple[str, ...]
+    resultant: Real
+    relative: Real
+    carried: Real
+
+
+@dataclass(frozen=True)
 class Steps:
     """Of every stored step (k,): its number (from 1), stage (index), factor in (0, 1], Newton iterations, residual."""
 

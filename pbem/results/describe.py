@@ -11,6 +11,7 @@ from pbem.case.generation import Group
 from pbem.mesh.mesh import Mesh
 from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
+from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
 from pbem.results.reader import Results
 from pbem.results.tip_notes import compare_release, explain_missing_factors
@@ -66,6 +67,7 @@ def describe_results(results: Results) -> str:
             _contact_rows(results))))
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
+        parts.append(_section("balance at the last step", describe_balance(results.balance)))
         parts.append(_section("estimated discretisation errors at the last step", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],

@@ -133,10 +133,8 @@ class Comparison:
         by = 1.0 / self._divisor
         forces = by * (sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second))
         errors = self._subtract_pairs(step.contact, second.contact, beside)
-        factors = [
-            by * np.abs(mine - other)[: len(self._model.crack_tips)] for mine, other in
-            zip(self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact), strict=True)
-        ]
+        both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
+        factors = [by * np.abs(mine - other)[: len(self._model.crack_tips)] for mine, other in zip(*both, strict=True)]
         moved = subtract_displacements(self._mesh, beside, step, second)
         opening, slip, traction_n, traction_s = (by * each for each in errors)
         least = self._bound_factors(step.contact, np.fmax(opening, slip))

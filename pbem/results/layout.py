@@ -16,6 +16,7 @@ from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions
+from pbem.results.balance import create_balance
 from pbem.results.configuration import dump_configuration
 from pbem.results.estimates import list_datasets
 from pbem.results.interface_tips import list_tip_curves
@@ -96,6 +97,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     energy = file.create_group("energy")
     for name in ENERGIES:
         create_energy(energy, name)
+    create_balance(file, mesh)
     _write_estimates(file.create_group("estimates"), model, mesh)
     if model.analysis.accuracy is not None:
         _write_fractions(file.create_group("mesh"), model)

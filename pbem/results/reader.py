@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from pbem.case.generation import Group
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
-from pbem.results.contents import Elements, Energies, Errors, Nodes, Steps, Tips, Units
+from pbem.results.balance import read_balance
+from pbem.results.contents import Balances, Elements, Energies, Errors, Nodes, Steps, Tips, Units
 from pbem.results.layout import ENERGIES, TIP_DATASETS, read_fractions
 from pbem.results.lazy import AllPairs, Contact, Interfaces, Interior, freeze, open_quietly, read_names
 
@@ -33,8 +34,9 @@ class Results:
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; pairs: all of them at
     once; groups: interfaces that a table [[generate]] made; tips: per crack what its tips carry; energy: the
-    balance; interior: points inside, None if the case has none; convergence: one row per Newton iteration with the
-    fields step, iteration, residual, changed, stick, slip, open, seconds.
+    energies; balance: of the forces on every region, None in files of earlier versions; interior: points inside, None
+    if the case has none; convergence: one row per Newton iteration with the fields step, iteration, residual, changed,
+    stick, slip, open, seconds.
     failure: why the run ended early (status "failed"), otherwise empty.
     """
 
@@ -57,6 +59,7 @@ class Results:
     groups: tuple[Group, ...]
     tips: Mapping[str, Tips]
     energy: Energies
+    balance: Balances | None
     interior: Interior | None
     convergence: NDArray[Any] = field(repr=False)
 
@@ -159,6 +162,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         groups=tuple(Group(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
         tips=_read_tips(file, k),
         energy=Energies(*(freeze(_read_energy(file, kind, k)) for kind in ENERGIES)),
+        balance=read_balance(file, k),
         interior=_read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
     )

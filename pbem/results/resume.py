@@ -93,7 +93,7 @@ def truncate(file: h5py.File, last_number: int) -> None:
             item.resize(k, axis=0)
 
     # What is in other groups are views of these.
-    for group in ("steps", "fields", "all", "energy", "estimates", *(["interior"] if "interior" in file else [])):
+    for group in ("steps", "fields", "all", "energy", *(n for n in ("estimates", "interior", "balance") if n in file)):
         file[group].visititems(cut)
     convergence = file["convergence"]
     convergence.resize(int(np.searchsorted(convergence["step"], last_number, side="right")), axis=0)

@@ -17,6 +17,7 @@ from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.errors import ConvergenceError, ResultFileError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance, describe_runaway
 from pbem.results.layout import (
@@ -194,6 +195,7 @@ class ResultWriter:
             append_row(dataset, np.asarray(self._estimates.get(name, unknown)))
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
+        append_balance(file, step)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):

@@ -55,7 +55,8 @@ def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     costs = np.bincount(node_region, minlength=len(materials)).astype(float)[node_region]
     offsets = share_nodes(costs, comm.size)
     first, last = int(offsets[comm.rank]), int(offsets[comm.rank + 1])
-    anchors = anchor_motions(mesh, find_free_motions(model))
+    anchored = find_free_motions(model)
+    anchors = anchor_motions(mesh, anchored)
     operator = assemble_rows(mesh, materials, first, last, needed, model.size)
     for anchor in anchors:
         add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
@@ -73,6 +74,7 @@ def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
         traction_scale=_scale_tractions(model),
         equation_scale=scale_equations(mesh, materials, model.size),
         anchors=anchors,
+        anchored=anchored,
         block_columns=tuple(unknowns[block.region] for block in operator.blocks),
     )
 
@@ -86,7 +88,8 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
     first, last = share_groups(mesh, groups, comm.rank, comm.size)
     elements = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups[first:last]]))
     operator, error = _reach_tolerance(comm, model, mesh, needed, list_nodes(mesh, elements))
-    anchors = anchor_motions(mesh, find_free_motions(model))
+    anchored = find_free_motions(model)
+    anchors = anchor_motions(mesh, anchored)
     for anchor in anchors:
         operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
     own_cracks = _share_equally(np.flatnonzero(mesh.node_crack), comm)
@@ -104,6 +107,7 @@ def _assemble_hierarchical(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Pro
         equation_scale=scale_equations(mesh, materials, model.size),
         block_columns=(),
         anchors=anchors,
+        anchored=anchored,
         crack_points=points,
         groups=surround_groups(mesh, groups, first, last),
         widen_groups=lambda widening: surround_groups(mesh, groups, first, last, widening),

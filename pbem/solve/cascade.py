@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, propose_modes
@@ -42,8 +43,8 @@ class Cascade:
 
 
 def run_cascade(
-    problem: Problem, tangent: AnyTangent, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
-    solved: Solved, failing: Bool, floor: float, most: int,
+    problem: Problem, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
+    law: Linearisation, solved: Solved, failing: Bool, floor: float, most: int,
 ) -> Cascade:
     """Let bonds fail, the worst first, until no other fails; all ranks together.
 
@@ -55,7 +56,7 @@ def run_cascade(
     pairs = np.flatnonzero(problem.laws.brittle & ~problem.laws.follows)
     if len(pairs) > most:
         return Cascade(broken, None)
-    response = find_response(problem, tangent, load, law, solved, pairs)
+    response = find_response(problem, tangent, constraints, load, law, solved, pairs)
     scale = problem.traction_scale
     start = replace(memory, broken=broken)
     subset = take_subset(problem.laws, start, load.pressure, modes, pairs)

@@ -210,6 +210,10 @@ class CondensedTangent:
         assert found is not None
         return found
 
+    def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
+        """See AnyTangent."""
+        return self._condense(self._solve_system(forces), self._split(law).drop_offsets())[0]
+
     def destroy(self) -> None:
         """See AnyTangent."""
         self.reference.destroy()

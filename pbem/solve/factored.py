@@ -78,6 +78,11 @@ class FactoredTangent:
         forces = (self.problem.operator.apply(-states[:, k]) for k in range(states.shape[1]))
         return np.stack([self._solve_by_any(constraints, each)[unknowns] for each in forces], axis=1)
 
+    def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
+        """See AnyTangent."""
+        self.reference.present = constraints.matrix
+        return self._solve_by_any(constraints, forces)
+
     def solve_system(self, rhs: Real) -> Real:
         """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side, by the factors."""
         return gather_parts(self.problem.comm, self.reference.solve_columns(rhs[:, None])[:, 0])

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import SLIP, STICK, ModeState
-from pbem.contact.support import close_nearest_pairs, find_ties, stick_calmest_pairs
+from pbem.contact.loads import Load
+from pbem.contact.support import close_nearest_pairs, stick_calmest_pairs
 from pbem.errors import ConvergenceError
+from pbem.parallel import broadcast
+from pbem.solve.balance import DRIVEN, measure_balance
 from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]
@@ -15,6 +21,8 @@ Integer = NDArray[np.int64]
 
 # A body that slips on all its contacts is held by single pairs at most so often in one step.
 MOST_HELD = 12
+# The same modes come back so often before pairs that hold a body are given up.
+MOST_REPEATED = 3
 
 
 class Hold:
@@ -24,29 +32,63 @@ class Hold:
     whose closed pairs all slip can still be in balance, by friction that acts in both senses: then there is a place
     between where slip changes its sense, and a pair there that sticks holds the body and carries what is left of the
     balance. If that is more than its bound, the place is further on against the sense of what it carries.
+
+    Free motions that were so at the start have anchors, which do where the loads balance. Where they do not, as single
+    pairs push the body, it moves until its contacts hold it: from then on (driven) no free motion is left to anchors.
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.pairs: Integer = np.zeros(0, dtype=np.int64)
         self.count = 0
+        self.driven = False
+        self.repeated = 0
+
+    def release(self, constraints: ConstraintMap, modes: ModeState) -> ConstraintMap:
+        """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
+        if not self.problem.anchors:
+            return constraints
+        released = broadcast(self.problem.comm, self.problem.find_support(modes).released)
+        return replace(constraints, released=released)
+
+    def is_driven(self, modes: ModeState, v: Real, load: Load) -> bool:
+        """Whether anchors carry what the loads do not balance: for v (4 nodes,), by the first rank.
+
+        Once so, `apply` holds the bodies by pairs, and what they cannot hold is refused.
+        """
+        if self.driven or not self.problem.anchors:
+            return False
+        support = self.problem.find_support(modes)
+        carried = measure_balance(self.problem, v, load, support).carried.max(initial=0.0) > DRIVEN
+        self.driven = broadcast(self.problem.comm, bool(carried))
+        return self.driven
 
     def apply(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None = None) -> ModeState:
         """The modes, with pairs closed or sticking where a body would be free to move.
 
         opening, slip (m,): as they are, the slip of this step alone; before: the modes that led to them.
+        Raises ConvergenceError ("free motion") if the pairs that hold a body do not stay closed.
         """
-        if not _find_free(self.problem, modes):
+        held = self._choose(modes, opening, slip, before)
+        # Pairs that hold a body only by pulling open again each time: there is no state in which they hold it.
+        same = before is not None and held is not modes and held.fingerprint() == before.fingerprint()
+        self.repeated = self.repeated + 1 if same else 0
+        if self.repeated == MOST_REPEATED:
+            self.refuse_free_motion(modes)
+        return held
+
+    def _choose(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
         closed = close_nearest_pairs(mesh, laws, modes, opening)
-        if before is None or self.count >= MOST_HELD or not _find_free(self.problem, closed):
+        if before is None or self.count >= MOST_HELD or not self.find_free(closed):
             return closed
         # Pairs that stuck until now and are overloaded say in which sense the body goes on to move.
         overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
         overloaded = np.intersect1d(overloaded, self.pairs)
         held, pairs = stick_calmest_pairs(
-            mesh, laws, closed, slip, overloaded, lambda trial: not _find_free(self.problem, trial)
+            mesh, laws, closed, slip, overloaded, lambda trial: not self.find_free(trial)
         )
         self.count += 1
         self.pairs = np.union1d(self.pairs, pairs)
@@ -59,7 +101,7 @@ class Hold:
             return ()
         released = ModeState(modes.mode.copy(), modes.sign)
         released.mode[held] = SLIP
-        free = _find_free(self.problem, released)
+        free = self.find_free(released)
         if not free:
             return ()
         mesh = self.problem.mesh
@@ -70,22 +112,22 @@ class Hold:
             "of its neighbours.",
         )
 
+    def find_free(self, modes: ModeState) -> str | None:
+        """The motions that neither pairs nor anchors hold, in words; None if there are none."""
+        support = self.problem.find_support(modes)
+        return (support.text or None) if self.driven else support.unheld
 
-def _find_free(problem: Problem, modes: ModeState) -> str | None:
-    return problem.free_motions(tuple(find_ties(problem.model, problem.mesh, modes).items()))
+    def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:
+        """The error that names what can move freely in the present contact; None if nothing can."""
+        free = self.find_free(modes)
+        if not free:
+            return None
+        advice = "hold it by a condition, or use shorter elements where it touches"
+        detail = f"nothing in the present contact prevents a {free}; {advice}"
+        return ConvergenceError("free motion", detail)
 
-
-def describe_free_motion(problem: Problem, modes: ModeState) -> ConvergenceError | None:
-    """The error that names what can move freely in the present contact; None if nothing can."""
-    free = _find_free(problem, modes)
-    if not free:
-        return None
-    detail = f"nothing in the present contact prevents a {free}; hold it by a condition"
-    return ConvergenceError("free motion", detail)
-
-
-def refuse_free_motion(problem: Problem, modes: ModeState) -> None:
-    """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
-    error = describe_free_motion(problem, modes)
-    if error:
-        raise error
+    def refuse_free_motion(self, modes: ModeState) -> None:
+        """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
+        error = self.describe_free_motion(modes)
+        if error:
+            raise error

@@ -82,7 +82,8 @@ class KrylovTangent:
         problem = self.problem
         self.preconditioner.update(constraints)
         self.constraints = constraints
-        forced = problem.apply(constraints.offset, load)
+        released = constraints.released
+        forced = problem.apply(constraints.offset, load, released)
         scale = problem.measure(forced)
         if scale == 0.0:
             unknowns = np.zeros(problem.unknowns)
@@ -97,7 +98,7 @@ class KrylovTangent:
             count += self.iterations[-1]
             unknowns = self.gather(np.array(self._left.getArray()))
             v = constraints.evaluate(unknowns)
-            residual = problem.measure(problem.apply(v, load)) / size_residual(scale, unknowns)
+            residual = problem.measure(problem.apply(v, load, released)) / size_residual(scale, unknowns)
             solved = residual <= tolerance
             widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
             if solved:
@@ -145,7 +146,7 @@ class KrylovTangent:
         usual = self._solver.getTolerances()
         self._solver.setTolerances(rtol=RESPONSE)
         for k in range(states.shape[1]):
-            self._right.setArray(-self.problem.operator.apply(states[:, k]))
+            self._right.setArray(-self._apply(np.asarray(states[:, k])))
             self._left.set(0.0)
             self._solver.solve(self._right, self._left)
             result[:, k] = self.gather(np.array(self._left.getArray()))[unknowns]
@@ -174,7 +175,20 @@ class KrylovTangent:
     def multiply(self, unknowns: Real) -> Real:
         """This rank's rows of B M x."""
         assert self.constraints is not None
-        return self.problem.operator.apply(self.constraints.matrix @ unknowns)
+        return self._apply(self.constraints.matrix @ unknowns)
+
+    def _apply(self, v: Real) -> Real:
+        """This rank's rows of B v, without the anchors that do not act."""
+        assert self.constraints is not None
+        return self.problem.operator.apply(v) - self.problem.find_released(v, self.constraints.released)
+
+    def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
+        """See AnyTangent; without the anchors that the constraint map releases."""
+        self.constraints = constraints
+        self._left.set(0.0)
+        self._right.setArray(forces)
+        self._solver.solve(self._right, self._left)
+        return self.gather(np.array(self._left.getArray()))
 
     def destroy(self) -> None:
         for item in (self._solver, self._matrix, self._right, self._left):

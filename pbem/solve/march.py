@@ -9,6 +9,8 @@ import numpy as np
 
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.errors import ConvergenceError
+from pbem.parallel import do_on_first
+from pbem.solve.balance import describe_imbalance, measure_balance
 from pbem.solve.krylov import make_tangent
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
@@ -45,11 +47,11 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
 
     A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction;
     the factors of a stage's own steps are always met. Raises ConvergenceError with the reason of the last failure, or
-    "limit load", after the steps before it were yielded.
+    "limit load" or "not in balance", after the steps before it were yielded.
     """
     begin = start or start_from_rest(problem)
     tangent = make_tangent(problem)
-    number, memory = begin.number, begin.memory
+    number, memory, noted = begin.number, begin.memory, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
@@ -60,6 +62,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
                 number += 1
                 step = describe_step(problem, solution, memory, number, stage, reached)
+                noted = _note_imbalance(problem, step, noted, reporter)
                 reporter.accept(step)
                 yield step
     except (ConvergenceError, GeneratorExit):
@@ -67,6 +70,25 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
         tangent.destroy()
         raise
     tangent.destroy()
+
+
+def _note_imbalance(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
+    """Note what is left over if it is twice as much as was noted before; returns what has been noted now.
+
+    Raises ConvergenceError ("not in balance") where it makes the result wrong; a smaller step would not mend it.
+    """
+    assert step.balance is not None
+    balance, name = step.balance, problem.model.stages[step.stage].name
+    try:
+        text = do_on_first(problem.comm, ConvergenceError, lambda: describe_imbalance(problem, balance))
+    except ConvergenceError as error:
+        detail = f"the step to the fraction {step.factor:.6g} of stage {name!r} is wrong: {error.detail}"
+        raise ConvergenceError(error.reason, detail) from error
+    amount = float(balance.relative.max(initial=0.0))
+    if text is None or amount <= 2 * noted:
+        return noted
+    reporter.note(f"Step {step.number}: {text}.")
+    return amount
 
 
 def _advance(
@@ -128,7 +150,8 @@ def describe_step(
     displacement, traction = values[: mesh.nodes].copy(), values[mesh.nodes :]
     cracks = problem.all_crack_nodes
     jump = displacement[cracks]
-    mean = problem.recover_crack_displacement(solution.v, problem.evaluate_load(stage, factor))
+    load = problem.evaluate_load(stage, factor)
+    mean = problem.recover_crack_displacement(solution.v, load)
     displacement[cracks] = mean + jump / 2
     opposite = np.zeros(mesh.nodes, dtype=complex)
     opposite[cracks] = mean - jump / 2
@@ -151,4 +174,5 @@ def describe_step(
             slip_path=memory.path,
             broken=memory.broken,
         ),
+        balance=measure_balance(problem, solution.v, load, problem.find_support(solution.modes)),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
-from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
@@ -26,7 +26,7 @@ from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast, do_on_first
 from pbem.solve.cascade import run_cascade
-from pbem.solve.hold import Hold, describe_free_motion, refuse_free_motion
+from pbem.solve.hold import Hold
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.search import Caution, Search
@@ -82,7 +82,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         law = linearise(
             laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale, search.caution.frozen
         )
-        constraints = problem.constrain(law, load)
+        constraints = hold.release(problem.constrain(law, load), modes)
         try:
             solved = tangent.solve(constraints, load, law)
             outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
@@ -90,48 +90,54 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
                 solved = tangent.check(solved, constraints, load, law)
                 outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
         except ConvergenceError:
-            refuse_free_motion(problem, modes)
+            hold.refuse_free_motion(modes)
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
         fails, cascade = outcome.settled and bool(outcome.failing.any()), None
         if fails:
             floor = _find_floor(problem, solved)
             cascade = run_cascade(
-                problem, tangent, modes, memory, load, law, solved, outcome.failing, floor, search.most_pivoted
+                problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
+                search.most_pivoted,
             )
             memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
         reporter.iterate(iterations[-1])
-        if outcome.settled and not fails:
-            refuse_free_motion(problem, modes)
+        driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
+        if driven:
+            search.restart()
+        elif outcome.settled and not fails:
+            hold.refuse_free_motion(modes)
             for note in hold.describe(modes):
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         search.note(proposal)
         if len(search.counts) == problem.model.solver.newton_max_iterations:
-            raise _end(problem, "iteration limit", proposal, search)
-        chosen = cascade.modes if cascade else _pivot(problem, tangent, modes, memory, load, law, solved, search)
+            raise _end(hold, "iteration limit", proposal, search)
+        chosen = cascade.modes if cascade else _pivot(
+            hold, tangent, constraints, modes, memory, load, law, solved, search
+        )
         if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
-            raise _end(problem, "mode cycle", proposal, search)
+            raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
-                raise _end(problem, "mode cycle", proposal, search)
+                raise _end(hold, "mode cycle", proposal, search)
         modes = broadcast(problem.comm, hold.apply(chosen, pairs.g_n, plastic_slip(laws, pairs) - memory.slip, modes))
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
 
 
-def _end(problem: Problem, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
+def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
     """The error of a search that does not settle, with the truest reason that is known."""
-    free = describe_free_motion(problem, proposal.modes)
-    return free or describe_unsettled(problem, reason, proposal, search.failed_group, search.failed)
+    free = hold.describe_free_motion(proposal.modes)
+    return free or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)
 
 
 def _pivot(
-    problem: Problem, tangent: AnyTangent, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
-    solved: Solved, search: Search,
+    hold: Hold, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
+    law: Linearisation, solved: Solved, search: Search,
 ) -> ModeState | None:
     """The modes with those of the search's group solved by pivoting; None if it has none or they have no solution.
 
@@ -140,7 +146,8 @@ def _pivot(
     group = search.choose_group()
     if not len(group):
         return None
-    response = find_response(problem, tangent, load, law, solved, group)
+    problem = hold.problem
+    response = find_response(problem, tangent, constraints, load, law, solved, group)
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
     judge = _make_judge(problem, solved, search.caution)
 
@@ -149,7 +156,7 @@ def _pivot(
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
     if search.conclude(found):
-        raise _end(problem, "no admissible modes", search.proposal, search)
+        raise _end(hold, "no admissible modes", search.proposal, search)
     if found.modes is None:
         return None
     mode, sign = modes.mode.copy(), modes.sign.copy()

@@ -9,19 +9,21 @@ from functools import cached_property, lru_cache
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy import sparse
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.operator import Block, RowOperator
 from pbem.bem.pointwise import PointRows
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap, build_constraints
-from pbem.contact.laws import PairLaws
+from pbem.contact.laws import ModeState, PairLaws
 from pbem.contact.loads import Load, OuterNodes, evaluate_load
 from pbem.contact.modes import Linearisation
-from pbem.contact.support import describe_free_motions
+from pbem.contact.support import Support, find_support, find_ties
 from pbem.mesh.mesh import Mesh, second_face_nodes
+from pbem.mesh.numbering import number_components, split_components
 from pbem.model.model import Model
-from pbem.model.support import Tie
+from pbem.model.support import FreeMotion
 from pbem.parallel import gather_parts, norm_of_parts
 from pbem.solve.groups import Group
 
@@ -37,6 +39,7 @@ class Problem:
     traction_scale: modulus/length, the unit of traction unknowns. equation_scale (nodes,): factors of the equations.
     crack_rows, crack_nodes: this rank's share of the rows that recover the mean displacement of crack faces; of the
     hierarchical operator crack_points take their place.
+    anchors: in the operator, for good; anchored: the free motions for which they were made.
     block_columns: for every block of a dense operator, the unknowns on which its region depends.
     groups: this rank's groups of elements, of the hierarchical operator; widen_groups makes them with so many
     times as many around them. notes: what the user should know of it.
@@ -54,6 +57,7 @@ class Problem:
     equation_scale: Real
     block_columns: tuple[Integer, ...]
     anchors: tuple[Anchor, ...]
+    anchored: tuple[FreeMotion, ...]
     crack_points: PointRows | None = None
     groups: tuple[Group, ...] = ()
     widen_groups: Callable[[int], tuple[Group, ...]] | None = None
@@ -73,21 +77,60 @@ class Problem:
         """Nodes of the cracks' second faces in the order in which results append them."""
         return second_face_nodes(self.mesh)
 
+    def find_support(self, modes: ModeState) -> Support:
+        """What holds the bodies in given modes; remembered, as modes are asked of several times."""
+        return self._supports(modes.mode.tobytes())
+
     @cached_property
-    def free_motions(self) -> Callable[[tuple[tuple[str, Tie], ...]], str | None]:
-        """What moves freely for given ties of the interfaces (name and tie); remembered, as modes rarely change it."""
-        return lru_cache(lambda ties: describe_free_motions(self.model, dict(ties), len(self.anchors)))
+    def _supports(self) -> Callable[[bytes], Support]:
+        sign = np.ones(self.mesh.pairs.count)
+
+        def find(mode: bytes) -> Support:
+            ties = find_ties(self.model, self.mesh, ModeState(np.frombuffer(mode, dtype=np.int8), sign))
+            key = str(sorted(ties.items())) if all(isinstance(tie, str) for tie in ties.values()) else None
+            if key is None or key not in known:
+                support = find_support(self.model, self.mesh, self.anchors, self.anchored, ties)
+                if key is None:
+                    return support
+                known[key] = support
+            return known[key]
+
+        known: dict[str, Support] = {}
+        return lru_cache(maxsize=64)(find)
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
         """The constraint map for linearised laws and a load."""
         return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale)
 
-    def apply(self, v: Real, load: Load) -> Real:
-        """This rank's rows of the integral equations, less the part that comes from far away; lengths."""
+    def apply(self, v: Real, load: Load, released: Real | None = None) -> Real:
+        """This rank's rows of the integral equations, less the part that comes from far away; lengths.
+
+        released (a, r): combinations of the anchors that do not act.
+        """
         own = self.operator.nodes
         far = np.where(self.mesh.traction_equation[own], load.far[1, own], load.far[0, own]) * self.equation_scale[own]
         result: Real = self.operator.apply(v - load.known) - np.stack([far.real, far.imag], axis=1).ravel()
+        return result - self.find_released(v - load.known, released)
+
+    def find_released(self, v: Real, released: Real | None) -> Real | float:
+        """This rank's rows of what released combinations (a, r) of the anchors add to B v."""
+        if released is None or not released.shape[1]:
+            return 0.0
+        pattern, functional = self.anchor_parts
+        result: Real = pattern @ (released @ (released.T @ (functional @ v)))
         return result
+
+    @cached_property
+    def anchor_parts(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+        """Patterns (this rank's rows, a) and functionals (a, 4 nodes) of the anchors: B contains their product."""
+        count, own = len(self.anchors), self.operator.nodes
+        pattern = sparse.lil_matrix((2 * len(own), count))
+        functional = sparse.lil_matrix((count, 4 * self.mesh.nodes))
+        for number, anchor in enumerate(self.anchors):
+            _, row, at = np.intersect1d(own, anchor.nodes, assume_unique=True, return_indices=True)
+            pattern[number_components(row), number] = split_components(anchor.pattern[at])
+            functional[number, number_components(anchor.nodes)] = split_components(anchor.functional)
+        return pattern.tocsr(), functional.tocsr()
 
     def evaluate_load(self, stage: int, factor: float) -> Load:
         return evaluate_load(self.model, self.mesh, self.outer, stage, factor)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.contact.subset import Response
@@ -17,7 +17,8 @@ Integer = NDArray[np.int64]
 
 
 def find_response(
-    problem: Problem, tangent: AnyTangent, load: Load, law: Linearisation, solved: Solved, pairs: Integer
+    problem: Problem, tangent: AnyTangent, constraints: ConstraintMap, load: Load, law: Linearisation,
+    solved: Solved, pairs: Integer,
 ) -> Response:
     """The response of pairs (s,) to all that their own laws could demand; all ranks together.
 
@@ -25,7 +26,7 @@ def find_response(
     q = T (x + dx) + o + C d, where K dx = -B E C d answers to the offsets d: two solutions for each pair.
     """
     complement = complete_states(law.tangent[pairs], problem.traction_scale)
-    effect = tangent.respond(problem.constrain(law, load), load, law, pairs, complement)
+    effect = tangent.respond(constraints, load, law, pairs, complement)
     count = len(pairs)
     change = np.einsum("mij,mjk->mik", law.tangent[pairs], effect.reshape(count, 2, 2 * count))
     own = np.arange(count)

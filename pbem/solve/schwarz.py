@@ -58,6 +58,7 @@ class SchwarzPreconditioner:
         # The mesh makes these anew at every call, for all nodes.
         self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
         self._formed: sparse.csr_matrix | None = None
+        self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
         self.singular = 0  # groups without an inverse, of those formed last
         self.inverses = [self._place(group) for group in groups]
 
@@ -76,6 +77,7 @@ class SchwarzPreconditioner:
         matrix = constraints.matrix
         changed = _find_changes(self._formed, matrix)
         self._formed = matrix
+        changed |= self._find_anchored(constraints)
         by_column = matrix.tocsc()
         free = (self._free @ matrix).tocsr()
         count, self.singular = 0, 0
@@ -148,18 +150,30 @@ class SchwarzPreconditioner:
                 parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
                 values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
         values *= -np.repeat(self._scale[nodes], 2)[:, None]
-        for anchor in self._anchors:
-            if anchor.region == region:
-                self._anchor(values, nodes, seen, anchor)
+        own_anchors = [number for number, anchor in enumerate(self._anchors) if anchor.region == region]
+        for one in own_anchors:
+            for other in own_anchors:
+                if self._acting[one, other]:
+                    self._anchor(values, nodes, seen, one, other)
         return values, columns
 
-    @staticmethod
-    def _anchor(values: Real, nodes: Integer, seen: Integer, anchor: Anchor) -> None:
-        """Add an anchor's part in the equations of nodes and the displacements of those seen."""
-        at, pattern = _look_up(anchor.nodes, anchor.pattern, nodes)
-        on, functional = _look_up(anchor.nodes, anchor.functional, seen)
+    def _find_anchored(self, constraints: ConstraintMap) -> Bool:
+        """Unknowns of the regions on which other anchors act than before."""
+        released = constraints.released
+        acting = np.eye(len(self._anchors))
+        if released is not None:
+            acting -= released @ released.T
+        moved = np.flatnonzero(np.abs(acting - self._acting).max(axis=1, initial=0.0) > 0)
+        self._acting = acting
+        regions = [self._anchors[number].region for number in moved]
+        return np.repeat(np.isin(self._node_region, regions), 2)
+
+    def _anchor(self, values: Real, nodes: Integer, seen: Integer, one: int, other: int) -> None:
+        """Add the pattern of one anchor in the equations of nodes, by the functional of another of the same region."""
+        at, pattern = _look_up(self._anchors[one].nodes, self._anchors[one].pattern, nodes)
+        on, functional = _look_up(self._anchors[other].nodes, self._anchors[other].functional, seen)
         where = np.ix_(number_components(at), number_components(on))
-        values[where] += np.outer(split_components(pattern), split_components(functional))
+        values[where] += self._acting[one, other] * np.outer(split_components(pattern), split_components(functional))
 
 
 def _look_up(

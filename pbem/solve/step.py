@@ -49,6 +49,20 @@ class ContactState:
 
 
 @dataclass(frozen=True)
+class Balance:
+    """What is left over on r regions.
+
+    resultant (r, 3): force along x and y (stress times length) and moment about the region's centre, the mean of its
+    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; 0 for infinite
+    regions, which may carry a resultant. carried (r,): as relative, of what the acting anchors carry; 0 without any.
+    """
+
+    resultant: NDArray[np.float64]
+    relative: NDArray[np.float64]
+    carried: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class Interior:
     """At the model's interior points (q,): displacement (q,) complex; stress sxx, syy, sxy (q, 3). NaN outside."""
 
@@ -62,7 +76,8 @@ class Step:
 
     number: from 1 on, sub-steps counted; stage: index; factor: fraction of the stage reached, in (0, 1].
     displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
-    interior: at the interior points, once evaluated. last_of_stage: True at factor 1.
+    interior: at the interior points, once evaluated. balance: of the forces; None where it is not told.
+    last_of_stage: True at factor 1.
     """
 
     number: int
@@ -74,6 +89,7 @@ class Step:
     traction: NDArray[np.complex128]
     contact: ContactState
     interior: Interior | None = None
+    balance: Balance | None = None
 
     @property
     def last_of_stage(self) -> bool:

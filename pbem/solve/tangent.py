@@ -57,6 +57,12 @@ class AnyTangent(Protocol):
         After `solve` with the same constraints. Raises ConvergenceError: "singular tangent", "linear solver".
         """
 
+    def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
+        """The unknowns (2 nodes,), on every rank, for this rank's part of a right-hand side; all anchors act.
+
+        After `solve` with the same constraints. Raises ConvergenceError: "singular tangent", "linear solver".
+        """
+
     def destroy(self) -> None:
         """Free the storage."""
 

@@ -29,9 +29,9 @@ ROUNDING = 1e-9
 SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
-    "KI": "intensity", "KII": "intensity", "reactions": "force",
-    # Estimated errors that are parts of the largest value.
-    **dict.fromkeys(("penetration", "tension", "cone"), "part"),
+    "KI": "intensity", "KII": "intensity", "reactions": "force", "resultant": "force",
+    # Parts of the largest value, and of the sums of forces.
+    **dict.fromkeys(("penetration", "tension", "cone", "relative", "carried"), "part"),
     **{f"relative_{kind}": "part" for kind in ("reactions", "jumps", "tractions", "factors", "displacement")},
 }  # fmt: skip
 GROUPS = {"reactions": "force", "energy": "energy"}

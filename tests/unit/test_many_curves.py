@@ -13,7 +13,7 @@ from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, find_ties
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
-from pbem.model.support import find_free_motions
+from pbem.model.support import PairTie, find_free_motions
 from pbem.results.describe import describe_model, describe_results
 from pbem.results.model_plot import draw_model
 from pbem.results.plots import draw_results
@@ -158,8 +158,15 @@ def test_ties_and_nearest_pairs_of_many_interfaces() -> None:
     for number, name in enumerate(mesh.interface_names):
         own = np.flatnonzero(mesh.pairs.interface == number)
         mode = modes.mode[own]
-        assert ties[name] == ("both" if (mode == STICK).any() else "none" if (mode == OPEN).all() else "normal")
-        nearest = own[np.argsort(opening[own])[:CLOSED_AT_LEAST]] if (mode == OPEN).all() else []
+        tie = ties[name]
+        if (mode == STICK).sum() > 1 or (mode == OPEN).all():
+            assert tie == ("both" if (mode == STICK).any() else "none")
+        else:
+            assert isinstance(tie, PairTie)
+            np.testing.assert_array_equal(tie.position, mesh.pairs.position[own[mode != OPEN]])
+            np.testing.assert_array_equal(tie.sticks, mode[mode != OPEN] == STICK)
+        opened, missing = own[mode == OPEN], max(0, CLOSED_AT_LEAST - int((mode != OPEN).sum()))
+        nearest = opened[np.argsort(opening[opened])[:missing]]
         assert set(own[closed[own] != mode]) == set(nearest)
 
 

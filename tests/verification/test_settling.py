@@ -184,7 +184,7 @@ half_length = 1.0
 density = 0.15
 distance = 0.05
 elements = 4
-seed = 37
+seed = 33
 region = "host"
 friction = 0.1
 cohesion = 0.2
@@ -193,7 +193,7 @@ cohesion_lost = {str(lost).lower()}
 
 
 def test_cohesion_without_admissible_modes_is_named_and_the_advice_works() -> None:
-    with pytest.raises(ConvergenceError, match=r"of these 2: on crack_5 at .*cohesion_lost = true") as caught:
+    with pytest.raises(ConvergenceError, match=r"of these 5: on crack_1 at .*cohesion_lost = true") as caught:
         run(write_cohesive_field(False))
     assert caught.value.reason == "no admissible modes"
     (step,) = run(write_cohesive_field(True))

@@ -1,0 +1,127 @@
+"""Balance of the forces on every region: what the collocated equations fulfil only as well as the mesh is fine.
+
+The elastic part of a region's tractions - all but those of the fields that stand for weight and in-situ stress - has no
+resultant and no moment. What is left over is a measure of the error; and it is what anchors carry where bodies would
+move freely.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.hierarchical import HierarchicalOperator
+from pbem.contact.anchor import group_motions
+from pbem.contact.loads import Load
+from pbem.contact.support import Support
+from pbem.errors import ConvergenceError
+from pbem.model.support import FreeMotion
+from pbem.solve.problem import Problem
+from pbem.solve.step import Balance
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
+# anchors hold it, and that make a result wrong.
+NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
+# Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
+ROUNDING, FAINT = 1e-9, 1e-6
+# Motions that differ by less than this part of their size are one.
+SAME = 1e-9
+
+
+def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
+    """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted."""
+    mesh, count = problem.mesh, len(problem.mesh.region_names)
+    of, weight = mesh.node_region, np.where(mesh.node_crack, 0.0, mesh.weight)
+
+    def add(values: Real) -> Real:
+        return np.bincount(of, weight * values, count).astype(float)
+
+    def add_vectors(values: Complex) -> Complex:
+        return add(values.real) + 1j * add(values.imag)
+
+    length = add(np.ones(mesh.nodes))
+    # About a node of the region first, as coordinates can be large.
+    start = mesh.position[np.searchsorted(of, np.arange(count))]
+    # Of a plane with nothing but cracks in it there is no boundary.
+    middle = start + add_vectors(mesh.position - start[of]) / np.where(length > 0, length, 1.0)
+    lever = mesh.position - middle[of]
+    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    elastic = whole - known
+    force, moment = add_vectors(elastic), add((np.conj(lever) * elastic).imag)
+    least = _find_least_traction(problem, v, np.abs(whole[weight > 0]).max(initial=0.0))
+    forces = np.maximum(add(np.abs(whole)), least * length) + np.abs(add_vectors(known))
+    moments = np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever))) + np.abs(
+        add((np.conj(lever) * known).imag)
+    )
+    finite = np.array([not region.infinite for region in problem.model.regions])
+    relative = np.where(finite, np.maximum(_divide(np.abs(force), forces), _divide(np.abs(moment), moments)), 0.0)
+    carried = np.zeros(count)
+    if support.acting.shape[1]:
+        for motions in group_motions(support.motions):
+            own, part = _measure_carried(problem, motions, middle, (force, moment), (forces, moments))
+            carried[own] = np.maximum(carried[own], part)
+    return Balance(np.stack([force.real, force.imag, moment], axis=1), relative, carried)
+
+
+def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
+    """Tractions that are smaller are taken to be as large as this."""
+    rounding = ROUNDING
+    if isinstance(problem.operator, HierarchicalOperator):
+        rounding = max(rounding, problem.model.solver.tolerance)
+    moved = float(np.abs(v[: 2 * problem.mesh.nodes]).max(initial=0.0))
+    return max(FAINT * largest, rounding * problem.traction_scale * moved)
+
+
+def _measure_carried(
+    problem: Problem, motions: list[FreeMotion], middle: Complex, left: tuple[Complex, Real], whole: tuple[Real, Real]
+) -> tuple[list[int], float]:
+    """The regions of motions that have some in common, and the part of what is left over that works on the motions.
+
+    Whatever motions span the same space, the part is the same; of one body it is that of its own forces.
+    """
+    numbers = {name: number for number, name in enumerate(problem.mesh.region_names)}
+    own = sorted({numbers[name] for motion in motions for name in motion.velocities})
+    # A lever makes moments forces, and turns velocities.
+    lever = _divide(whole[1][own], whole[0][own])
+    moves = np.zeros((len(own), 3, len(motions)))
+    for column, motion in enumerate(motions):
+        for name, (shift, spin) in motion.velocities.items():
+            at = own.index(numbers[name])
+            velocity = shift + 1j * spin * middle[own[at]]
+            moves[at, :, column] = velocity.real, velocity.imag, spin * lever[at]
+    directions, sizes, _ = np.linalg.svd(moves.reshape(3 * len(own), -1), full_matrices=False)
+    directions = directions[:, sizes > SAME * sizes.max(initial=0.0)]
+    moment = _divide(left[1][own], lever)
+    power = np.stack([left[0][own].real, left[0][own].imag, moment], axis=1).ravel() @ directions
+    scale = whole[0][own] @ np.linalg.norm(directions.reshape(len(own), 3, -1), axis=1)
+    return own, float(np.linalg.norm(_divide(power, scale)))
+
+
+def _divide(part: Real, whole: Real) -> Real:
+    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
+
+
+def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
+    """What is left over on the worst region, where that is worth a note; None if all regions are in balance.
+
+    Raises ConvergenceError ("not in balance") where it makes the result wrong.
+    """
+    worst = int(np.argmax(balance.relative))
+    amount = float(balance.relative[worst])
+    if amount <= NOTED:
+        return None
+    name = problem.mesh.region_names[worst]
+    x, y, moment = balance.resultant[worst]
+    left = (
+        f"the forces on region '{name}' do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
+        f"{100 * amount:.2g} % of their sum without signs"
+    )
+    held = float(balance.carried[worst])
+    if held > NOTED:
+        left += ", which nothing but the condition on its mean motion carries"
+    if amount > NOT_IN_BALANCE:
+        raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
+    return left

@@ -1,0 +1,137 @@
+"""Bodies that are free until contact holds them: no force is left on them, wherever the anchors were before.
+
+A loose block between two others, pressed until both gaps are closed, carries what the gapless stack carries when it is
+pressed by as much less: with gaps of the same size everywhere the two problems are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.errors import ConvergenceError
+from pbem.results.reader import Results
+from tests.parallel.launch import launch_snippet
+
+GAP, PRESSED = 1e-3, 1e-2
+
+
+def write_stack(path: Path, gap: float, pressed: float, turn: float = 0.0, size: float = 1.0, more: str = "") -> Path:
+    """Three blocks of 2 x 1 on each other, with gaps between them; size: of a unit; turn: of the stack (radians)."""
+
+    def place(*points: complex) -> str:
+        turned = [size * np.exp(1j * turn) * point for point in points]
+        return f"{{ points = {[[z.real, z.imag] for z in turned]}, elements = 4 }}"
+
+    curves = {f"j{k}": place(1j * k, 2 + 1j * k) for k in range(4)}
+    curves |= {f"r{k}": place(2 + 1j * k, 2 + 1j * (k + 1)) for k in range(3)}
+    curves |= {f"l{k}": place(1j * (k + 1), 1j * k) for k in range(3)}
+    down = -1j * pressed * size * np.exp(1j * turn)
+    lines = ["materials.m = { young = 1000.0, poisson = 0.2 }"]
+    lines += [f"curves.{name} = {text}" for name, text in curves.items()]
+    for k in range(3):
+        lines.append(f'regions.b{k} = {{ material = "m", boundary = ["j{k}", "r{k}", "j{k + 1}", "l{k}"] }}')
+    lines += ["boundary.j0 = { ux = 0.0, uy = 0.0 }", f"boundary.j3 = {{ ux = {down.real!r}, uy = {down.imag!r} }}"]
+    lines += [f'interfaces.j{k} = {{ law = "coulomb", friction = 0.3, gap = {gap * size!r} }}' for k in (1, 2)]
+    path.write_text("\n".join([*lines, "analysis.steps = 1", more, ""]), encoding="utf-8")
+    return path
+
+
+def take_reactions(results: Results, names: Sequence[str] = ("j0", "j3")) -> np.ndarray:
+    return np.array([results.reactions[name][-1] for name in names])
+
+
+@pytest.mark.parametrize(
+    ("more", "operator"),
+    [("", "dense"), ('solver.linear = "gmres"', "dense"), ("", "hierarchical")],
+    ids=["condensed", "factored", "hierarchical"],
+)
+def test_a_loose_block_carries_what_the_gapless_stack_does(more: str, operator: str, tmp_path: Path) -> None:
+    loose = write_stack(tmp_path / "loose.toml", GAP, PRESSED, more=more)
+    tight = write_stack(tmp_path / "tight.toml", 0.0, PRESSED - 2 * GAP)
+    given = pbem.run(loose, tmp_path / "loose.h5", operator=operator)  # type: ignore[arg-type]
+    expected = take_reactions(pbem.run(tight, tmp_path / "tight.h5"))
+    np.testing.assert_allclose(take_reactions(given), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert np.abs(expected.sum(axis=0)).max() < 1e-10 * np.abs(expected).max()
+    assert given.balance is not None
+    assert given.balance.relative.max() < 1e-4 and not given.balance.carried.any()
+
+
+@pytest.mark.parametrize(("turn", "size"), [(0.7, 1e-6), (2.5, 1e7)])
+def test_neither_units_nor_the_orientation_matter(turn: float, size: float, tmp_path: Path) -> None:
+    plain = pbem.run(write_stack(tmp_path / "plain.toml", GAP, PRESSED), tmp_path / "plain.h5")
+    other = pbem.run(write_stack(tmp_path / "other.toml", GAP, PRESSED, turn, size), tmp_path / "other.h5")
+    force = take_reactions(other) @ np.array([1, 1j]) * np.exp(-1j * turn) / size
+    expected = take_reactions(plain) @ np.array([1, 1j])
+    np.testing.assert_allclose(force, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert other.steps.iterations.tolist() == plain.steps.iterations.tolist()
+
+
+def test_ranks_agree_on_a_loose_block(tmp_path: Path) -> None:
+    case = write_stack(tmp_path / "loose.toml", GAP, PRESSED)
+    run = launch_snippet(2, f"import pbem; pbem.run({str(case)!r}, {str(tmp_path / 'two.h5')!r})")
+    assert run.returncode == 0, run.stderr
+    one, two = pbem.run(case, tmp_path / "one.h5"), pbem.open_results(tmp_path / "two.h5")
+    np.testing.assert_allclose(take_reactions(two), take_reactions(one), rtol=0, atol=1e-9)
+
+
+PIN = """
+materials.m = {{ young = 1000.0, poisson = 0.2 }}
+materials.g = {{ young = 10000.0, poisson = 0.2 }}
+curves.i = {{ center = [0, 0], radius = 1.0, elements = 16 }}
+curves.h = {{ center = [2.0, 0.7], radius = 0.8, elements = 16 }}
+regions.p = {{ material = "m", boundary = ["i", "h"], infinite = true }}
+regions.g = {{ material = "g", boundary = ["i"] }}
+interfaces.i = {{ law = {law}, gap = {gap} }}
+remote = {{ sxx = -0.3, syy = -1.0, sxy = 0.0 }}
+analysis.steps = 1
+"""
+
+
+@pytest.mark.parametrize("gap", [1e-5, 5e-4])
+@pytest.mark.parametrize("law", ['"coulomb", friction = 0.3', '"frictionless"'], ids=["friction", "frictionless"])
+def test_no_force_is_left_on_a_loose_pin(gap: float, law: str, tmp_path: Path) -> None:
+    case = tmp_path / "pin.toml"
+    case.write_text(PIN.format(gap=gap, law=law), encoding="utf-8")
+    results = pbem.run(case, tmp_path / "pin.h5")
+    assert results.balance is not None
+    pin = results.balance.names.index("g")
+    assert (results.contact["i"].mode[-1] != 2).sum() > 2
+    # Without friction the rotation stays free, and nothing turns the pin.
+    assert results.balance.relative[-1, pin] < 1e-4
+
+
+def test_a_body_that_stays_free_is_anchored(tmp_path: Path) -> None:
+    case = write_stack(tmp_path / "loose.toml", 1.0, PRESSED)
+    results = pbem.run(case, tmp_path / "loose.h5")
+    assert (results.contact["j1"].mode[-1] == 2).all() and (results.contact["j2"].mode[-1] == 2).all()
+    middle = np.flatnonzero(results.nodes.region == results.nodes.region_names.index("b1"))
+    assert np.abs(results.displacement[-1, middle]).max() < 1e-12
+
+
+def test_a_disc_on_one_pair_is_told_to_be_free(tmp_path: Path) -> None:
+    # Its contact is shorter than an element: nothing keeps the disc from rolling, and no rotation is its answer.
+    text = """
+materials.m = { young = 1000.0, poisson = 0.3 }
+curves.bottom = { points = [[-2, -1], [2, -1]], elements = 4 }
+curves.right = { points = [[2, -1], [2, 0]], elements = 2 }
+curves.floor = { points = [[2, 0], [-2, 0]], elements = 8 }
+curves.left = { points = [[-2, 0], [-2, -1]], elements = 2 }
+curves.lower = { center = [0, 1], radius = 1, angles = [180, 360], elements = 12 }
+curves.upper = { center = [0, 1], radius = 1, angles = [0, 180], elements = 12 }
+regions.table = { material = "m", boundary = ["bottom", "right", "floor", "left"] }
+regions.disc = { material = "m", boundary = ["lower", "upper"] }
+boundary.bottom = { ux = 0.0, uy = 0.0 }
+boundary.upper = { ty = -1e-6 }
+contacts.seat = { between = ["floor", "lower"], law = "coulomb", friction = 0.3 }
+analysis.steps = 1
+"""
+    case = tmp_path / "disc.toml"
+    case.write_text(text, encoding="utf-8")
+    with pytest.raises(ConvergenceError, match=r"rotation about .* of 'disc'") as caught:
+        pbem.run(case, tmp_path / "disc.h5")
+    assert caught.value.reason == "free motion"

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbem.environment import find_launch
-from pbem.errors import CaseError, ConvergenceError, Fault, LaunchError, PbemError, StorageError
+from pbem.errors import CaseError, ConvergenceError, Fault, LaunchError, LawError, PbemError, StopError, StorageError
 from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
@@ -202,6 +202,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("case", metavar="CASE")
     run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
     run.add_argument("--resume", action="store_true", help="go on after the last step that the result file holds")
+    run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
     info = add("info", _info, "tell what a result file holds")
@@ -276,7 +277,7 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     target = Path(options.output or case.stem + ".h5")
 
     run = _load_driver()
-    from pbem.parallel import abort_if_unexpected, world
+    from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
     from pbem.progress import make_reporter
 
     reporter: Reporter | None = None
@@ -285,34 +286,22 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     try:
         with abort_if_unexpected(world, PbemError):
             reporter = make_reporter(options.quiet) if world.rank == 0 else None
-        results = run(
-            case, target, resume=options.resume, petsc=petsc, operator=options.operator, reporter=reporter
-        )
+        results = run(case, target, resume=options.resume, force=options.force, petsc=petsc,
+                      operator=options.operator, reporter=reporter)
     except LaunchError as error:
         _close(reporter)
         code = _say_wrong_launch(error, world.rank, world.size)
-    except ConvergenceError as error:
+    except (Exception, KeyboardInterrupt) as error:
         _close(reporter)
-        _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)
-        code = NOT_CONVERGED
-    except StorageError as error:
-        _close(reporter)
-        _say(f"pbem: {error}; it holds every step before", world.rank)
-        code = UNEXPECTED
-    except KeyboardInterrupt:
-        _close(reporter)
-        _say(f"pbem: interrupted; if {target} was begun, --resume goes on after its last step", world.rank)
-        return INTERRUPTED
-    except BrokenPipeError:
-        # Only of one rank: several have been ended. The run is not finished, whatever has become of its reader.
-        _discard_output()
-        _say(f"pbem: nobody reads the progress any more; if {target} was begun, --resume goes on after its last step",
-             world.rank)
-        code = UNEXPECTED
-    except PbemError as error:
-        _close(reporter)
-        _say(f"pbem: {error}", world.rank)
-        code = WRONG_INPUT
+        if isinstance(error, PbemError | KeyboardInterrupt):
+            text, code = _describe_end(error, target)
+        elif lacks_memory(error):
+            text, code = f"{describe_lack(error)}; {_describe_rest(target)}", UNEXPECTED
+        else:
+            raise
+        _say(f"pbem: {text}", world.rank)
+        if isinstance(error, StopError) and error.reason == "reader":
+            _discard_output()
     else:
         if world.rank == 0 and not options.quiet:
             _close(reporter)
@@ -320,6 +309,24 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code
+
+
+def _describe_end(error: BaseException, target: Path) -> tuple[str, int]:
+    """What is said of a run that has ended early, and the exit code."""
+    if isinstance(error, ConvergenceError):
+        return f"not converged: {error}\n{target} holds every step reached", NOT_CONVERGED
+    if isinstance(error, StorageError | LawError):
+        return f"{error}; {_describe_rest(target)}", UNEXPECTED
+    if isinstance(error, StopError):
+        return f"{error.detail}; {_describe_rest(target)}", error.code
+    if isinstance(error, KeyboardInterrupt):
+        return f"interrupted; {_describe_rest(target)}", INTERRUPTED
+    return str(error), WRONG_INPUT
+
+
+def _describe_rest(target: Path) -> str:
+    """What is left of it."""
+    return f"if {target} was begun, it holds every step before, and --resume goes on after them"
 
 
 def _load_driver() -> Callable[..., Results]:
@@ -361,11 +368,14 @@ def _say_finished(steps: Steps, target: Path, seconds: float) -> None:
 def _close(reporter: Reporter | None) -> None:
     close = getattr(reporter, "close", None)
     if close is not None:
-        close()
+        with contextlib.suppress(OSError):
+            close()
 
 
 def _say(text: str, rank: int) -> None:
     """Print to standard error, on the first rank."""
     if rank == 0:
-        sys.stdout.flush()
-        print(text, file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):  # of a pipe or terminal that has been closed
+            sys.stdout.flush()
+        with contextlib.suppress(OSError):
+            print(text, file=sys.stderr, flush=True)

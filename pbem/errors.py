@@ -53,6 +53,30 @@ class ConvergenceError(PbemError):
         super().__init__(f"{reason}: {detail}")
 
 
+class StopError(PbemError):
+    """A run was told to stop, or cannot go on here; a later one can go on from its file.
+
+    reason: a short name, e.g. "SIGTERM"; detail: a sentence; code: the exit code of the program.
+    """
+
+    def __init__(self, reason: str, detail: str, code: int = 1) -> None:
+        self.reason = reason
+        self.detail = detail
+        self.code = code
+        super().__init__(f"{reason}: {detail}")
+
+
+class LawError(PbemError):
+    """A custom law failed, or gave something else than a strength, while it was computed with.
+
+    reason: a sentence that names the law's file.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)
+
+
 class ResultFileError(PbemError):
     """A result file cannot be written, is not one of pbem's, or does not belong to the case.
 

@@ -166,7 +166,8 @@ class Model:
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
-    groups: the curves that were generated together.
+    groups: the curves that were generated together. law_texts: contents of the files of custom laws, by their paths,
+    as they were when the case was read.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -190,3 +191,4 @@ class Model:
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
     groups: tuple[Group, ...] = ()
+    law_texts: Mapping[str, str] = field(default_factory=dict)

@@ -39,8 +39,8 @@ def test_a_sound_law_is_accepted(tmp_path: Path) -> None:
         ("x = 1", "no function named strength"),
         ("def strength(p_n, slip): return p_n", "unexpected keyword argument"),
         ("def strength(p_n, slip, friction): return -friction * p_n", "bound"),
-        (GOOD.replace("-friction * p_n,", "-0.3,"), "at two pairs"),
-        (GOOD.replace("-friction * p_n,", "0 * p_n + float('nan'),"), "at two pairs"),
+        (GOOD.replace("-friction * p_n,", "-0.3,"), "a bound of shape () for a p_n of shape (2,)"),
+        (GOOD.replace("-friction * p_n,", "0 * p_n + float('nan'),"), "gives bound = nan at p_n = -1"),
     ],
 )
 def test_a_law_that_fails_is_a_fault_with_its_place(tmp_path: Path, law: str, text: str) -> None:

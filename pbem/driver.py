@@ -103,6 +103,7 @@ def _solve(
             return ResultWriter.resume(target, model, mesh, world.size, petsc_version(), flat, region)
         return ResultWriter(target, model, mesh, world.size, petsc_version(), flat, region, force=force)
 
+    watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)

@@ -54,7 +54,7 @@ class CustomLaw:
         try:
             answer = self._function(_protect(p_n), _protect(slip),  # type: ignore[misc]
                                     **{name: _protect(values) for name, values in parameters.items()})
-            parts = {name: np.array(getattr(answer, name), dtype=float) for name in PARTS}
+            parts = {name: _read_part(getattr(answer, name)) for name in PARTS}
         except (Exception, SystemExit) as error:  # a user's file may raise anything
             self.fault = f"the law {self.file} fails ({type(error).__name__}: {error}); expected {EXPECTED}"
             return None
@@ -81,6 +81,12 @@ def _protect(values: Real) -> Real:
     own = np.array(values, dtype=float)
     own.setflags(write=False)
     return own
+
+
+def _read_part(values: Any) -> Real:
+    if np.iscomplexobj(values):
+        raise TypeError("complex numbers")
+    return np.array(values, dtype=float)
 
 
 def _judge(name: str, values: Real, p_n: Real, slip: Real) -> str:

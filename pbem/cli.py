@@ -5,16 +5,27 @@ from __future__ import annotations
 import argparse
 import contextlib
 import difflib
+import io
 import os
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pbem.environment import find_launch
-from pbem.errors import CaseError, ConvergenceError, Fault, LaunchError, LawError, PbemError, StopError, StorageError
+from pbem.environment import PREFIX, find_launch, split_petsc_options
+from pbem.errors import (
+    CaseError,
+    ConvergenceError,
+    Fault,
+    LaunchError,
+    LawError,
+    PbemError,
+    StopError,
+    StorageError,
+    printable,
+)
 from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
@@ -25,7 +36,6 @@ if TYPE_CHECKING:
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.
 
-PREFIX = "-pbem_"
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 COMMANDS = ("make", "check", "run", "info", "plot")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
@@ -65,6 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if rank > 0:
         # What all ranks would say alike is said by the first.
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a title may have characters that the terminal's encoding has not
+            stream.reconfigure(errors="backslashreplace")
     petsc, plain = split_petsc_options(sys.argv[1:] if arguments is None else arguments)
     code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank)
     if code and rank > 0:
@@ -98,32 +111,6 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
 def _discard_output() -> None:
     """Send the rest of standard output nowhere: flushing it into a closed pipe at the end would fail once more."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def split_petsc_options(arguments: Sequence[str]) -> tuple[dict[str, str], list[str]]:
-    """PETSc options without their prefix, and the other arguments.
-
-    An option's value is the next argument unless that is an option itself (a negative number is none) or a case file.
-    """
-    petsc: dict[str, str] = {}
-    plain: list[str] = []
-    waiting = list(arguments)
-    while waiting:
-        argument = waiting.pop(0)
-        if not argument.startswith(PREFIX):
-            plain.append(argument)
-            continue
-        name, equals, value = argument.removeprefix(PREFIX).partition("=")
-        if not equals and waiting and not _starts_an_option(waiting[0]):
-            value = waiting.pop(0)
-        petsc[name] = value
-    return petsc, plain
-
-
-def _starts_an_option(argument: str) -> bool:
-    if argument.endswith(".toml"):
-        return True
-    return argument.startswith("-") and not argument[1:2].isdigit() and argument[1:2] != "."
 
 
 def find_case(name: str) -> Path:
@@ -178,9 +165,16 @@ def _names_a_case(argument: str) -> bool:
     return Path(argument).exists() or not difflib.get_close_matches(argument, COMMANDS, cutoff=0.7)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that repeats no control characters of its arguments."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        super()._print_message(printable(message, keep="\n"), file)
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line, without the options of PETSc."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="pbem", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=f"pbem {__version__}")
@@ -219,9 +213,9 @@ def make_parser() -> argparse.ArgumentParser:
 
 def _make(options: argparse.Namespace) -> int:
     try:
-        print(f"case file: {make(options)}")
+        _tell(f"case file: {make(options)}")
     except (OSError, ValueError) as error:
-        print(f"pbem make: {error}", file=sys.stderr)
+        _say(f"pbem make: {error}", 0)
         return WRONG_INPUT
     return 0
 
@@ -236,12 +230,12 @@ def _check(options: argparse.Namespace) -> int:
     if options.plot:
         check_picture_path(options.plot)
     mesh = generate_mesh(model)
-    print(describe_model(model, mesh))
+    _tell(describe_model(model, mesh))
     if options.plot:
         from pbem.results.plots import plot_model
 
         plot_model(model, mesh, options.plot)
-        print(f"\npicture: {options.plot}")
+        _tell(f"\npicture: {options.plot}")
     return 0
 
 
@@ -249,7 +243,7 @@ def _info(options: argparse.Namespace) -> int:
     from pbem.results.describe import describe_results
     from pbem.results.reader import open_results
 
-    print(describe_results(open_results(options.file)))
+    _tell(describe_results(open_results(options.file)))
     return 0
 
 
@@ -268,7 +262,7 @@ def _plot(options: argparse.Namespace) -> int:
         plot_field(results, options.field, target, step)
     else:
         plot_results(results, target, step, options.magnify)
-    print(f"picture: {target}")
+    _tell(f"picture: {target}")
     return 0
 
 
@@ -315,8 +309,10 @@ def _describe_end(error: BaseException, target: Path) -> tuple[str, int]:
     """What is said of a run that has ended early, and the exit code."""
     if isinstance(error, ConvergenceError):
         return f"not converged: {error}\n{target} holds every step reached", NOT_CONVERGED
-    if isinstance(error, StorageError | LawError):
+    if isinstance(error, StorageError):
         return f"{error}; {_describe_rest(target)}", UNEXPECTED
+    if isinstance(error, LawError):
+        return f"{error}; {target} holds every step before", UNEXPECTED
     if isinstance(error, StopError):
         return f"{error.detail}; {_describe_rest(target)}", error.code
     if isinstance(error, KeyboardInterrupt):
@@ -362,7 +358,12 @@ def _say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
 
 def _say_finished(steps: Steps, target: Path, seconds: float) -> None:
     number = int(steps.number[-1]) if len(steps) else 0
-    print(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}", flush=True)
+    _tell(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}")
+
+
+def _tell(text: str) -> None:
+    """Print to standard output; names and titles from files must not steer the terminal."""
+    print(printable(text, keep="\n"), flush=True)
 
 
 def _close(reporter: Reporter | None) -> None:
@@ -378,4 +379,4 @@ def _say(text: str, rank: int) -> None:
         with contextlib.suppress(OSError):  # of a pipe or terminal that has been closed
             sys.stdout.flush()
         with contextlib.suppress(OSError):
-            print(text, file=sys.stderr, flush=True)
+            print(printable(text, keep="\n"), file=sys.stderr, flush=True)

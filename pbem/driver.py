@@ -21,6 +21,7 @@ from pbem.solve.assembly import assemble_problem
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
+from pbem.solve.options import check_options
 from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step
 from pbem.solve.watch import Watch
@@ -63,6 +64,7 @@ def run(
             inputs = [path, *map(Path, model.law_texts)]
             do_on_first(world, PbemError, lambda: check_output_path(
                 target, resume=resume, force=force, source=model.source, inputs=inputs))
+            do_on_first(world, PbemError, lambda: check_options(str(path), model.solver.petsc, petsc or {}))
             mesh = generate_mesh(model)
             check_shares(model, mesh, world.size)
             watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)

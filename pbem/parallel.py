@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from pbem.errors import LaunchError, StopError
+from pbem.errors import LaunchError, StopError, printable
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -50,7 +50,7 @@ def abort_if_unexpected(comm: MPI.Intracomm, expected: type[Exception]) -> Itera
             text = f"{where} failed, all ranks end\n{traceback.format_exc()}"
         with suppress(OSError):
             sys.stdout.flush()
-            sys.stderr.write(text)
+            sys.stderr.write(printable(text, keep="\n"))
             sys.stderr.flush()
         comm.Abort(1)
 

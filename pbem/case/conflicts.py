@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -208,11 +210,39 @@ def _check_solver(raw: Mapping[str, Any]) -> list[Finding]:
     return [Finding(("solver", "linear"), found, "\"auto\" or \"gmres\", or operator = \"dense\"")]
 
 
+# Options of the iterations that PETSc refuses outside of these bounds, when it solves the first system: least, most,
+# and whether they count something.
+OPTION_BOUNDS: Mapping[str, tuple[float, float, bool]] = {
+    "ksp_rtol": (0.0, 1.0, False), "ksp_atol": (0.0, math.inf, False), "ksp_divtol": (0.0, math.inf, False),
+    "ksp_max_it": (0, 2**31 - 1, True), "ksp_gmres_restart": (1, 2**31 - 1, True),
+}  # fmt: skip
+
+
 def _check_options(raw: Mapping[str, Any]) -> list[Finding]:
     options = raw.get("petsc")
-    expected = "the option's name without the leading dash, without spaces"
-    names: Sequence[str] = list(options) if isinstance(options, dict) else []
-    return [
-        Finding(("petsc", name), f"the option {show(name)}", expected)
-        for name in names if name.startswith("-") or not name or any(c.isspace() for c in name)
-    ]
+    if not isinstance(options, dict):
+        return []
+    findings = []
+    for name, value in options.items():
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+            expected = "the option's name without the leading dash, of letters, digits and _"
+            findings.append(Finding(("petsc", name), f"the option {show(name)}", expected))
+        elif name in OPTION_BOUNDS and isinstance(value, str | int | float):
+            findings += _check_bounds(name, value)
+    return findings
+
+
+def _check_bounds(name: str, value: str | int | float) -> list[Finding]:
+    least, most, whole = OPTION_BOUNDS[name]
+    if isinstance(value, str) and value.lower().removeprefix("petsc_") in ("default", "decide"):
+        return []
+    try:
+        number = int(str(value)) if whole else float(value)
+        right = least <= number <= most and not (name == "ksp_rtol" and number == most)
+    except (ValueError, OverflowError):
+        right = False
+    if right and not isinstance(value, bool):
+        return []
+    kind = "whole number" if whole else "number"
+    below = {"ksp_rtol": " and < 1"}.get(name, "")
+    return [Finding(("petsc", name), show(value), f"a {kind} >= {least:g}{below}")]

@@ -241,6 +241,8 @@ def _check_bounds(name: str, value: str | int | float) -> list[Finding]:
         right = least <= number <= most and not (name == "ksp_rtol" and number == most)
     except (ValueError, OverflowError):
         right = False
+    if isinstance(value, float) and not math.isfinite(value):
+        return []  # the schema reports it
     if right and not isinstance(value, bool):
         return []
     kind = "whole number" if whole else "number"

@@ -117,8 +117,8 @@ def test_what_is_printed_cannot_steer_a_terminal() -> None:
     text = "a\x1b[2J\n\r\x9b\u202e\u2028\udc80ä\u00a0\t"
     assert printable(text) == "a\\x1b[2J\\n\\r\\x9b\\u202e\\u2028\\udc80ä\u00a0\\t"
     assert printable("a\nb\tc", keep="\n") == "a\nb\\tc"
-    for said in (str(Fault("a\x1b", "b\n", "c")), str(ResultFileError("a\x1b.h5", "is none")), str(CaseError("\x07", ()))):
-        assert not any(map(is_control, said))
+    for error in (Fault("a\x1b", "b\n", "c"), ResultFileError("a\x1b.h5", "is none"), CaseError("\x07", ())):
+        assert not any(map(is_control, str(error)))
     stream = io.StringIO()
     LogReporter(stream).note("\x1b]0;title\x07")
     assert stream.getvalue() == "note: \\x1b]0;title\\x07\n"
@@ -129,8 +129,8 @@ def test_file_names_do_not_steer_the_terminal(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad\x1b[2J.toml").write_text(BLOCKS.replace("young", "yuong"))
-    for command in (["check", "bad\x1b[2J.toml"], ["info", "\x1b[2J.h5"], ["plot", "\udc80.h5"], ["info", "a.h5", "\x1b[2J"],
-                    ["check", "a", "--\x1b[2J"], ["run", "bad\x1b[2J.toml"]):
+    for command in (["check", "bad\x1b[2J.toml"], ["info", "\x1b[2J.h5"], ["plot", "\udc80.h5"],
+                    ["info", "a.h5", "\x1b[2J"], ["check", "a", "--\x1b[2J"], ["run", "bad\x1b[2J.toml"]):
         assert main(command) == 2
         out, err = capsys.readouterr()
         assert "\\x1b[2J" in err or "\\udc80" in err

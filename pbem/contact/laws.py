@@ -43,6 +43,7 @@ class PairLaws:
     bonded pairs always stick without plastic slip; parted pairs ("open") never touch. brittle pairs lose cohesion and
     tensile strength for good. fluid_inside: the fluid pressure also acts in closed parts. compliance_n, compliance_s:
     length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length.
+    leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
     """
 
     strengths: tuple[StrengthGroup, ...]
@@ -55,10 +56,16 @@ class PairLaws:
     compliance_n: Real
     compliance_s: Real
     stiffness: Real
+    leader: Integer
 
     @property
     def count(self) -> int:
         return len(self.gap)
+
+    @property
+    def follows(self) -> Bool:
+        """Pairs (m,) that take the mode of another one."""
+        return self.leader != np.arange(self.count)
 
 
 @dataclass(frozen=True)
@@ -129,7 +136,28 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         compliance_n=spread([1 / law.normal_stiffness if law.normal_stiffness else 0.0 for law in laws]),
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
         stiffness=SOFTNESS * modulus / length,
+        leader=_find_leaders(model, mesh),
     )
+
+
+def _find_leaders(model: Model, mesh: Mesh) -> Integer:
+    """For every pair itself, or the nearest pair of its curve outside of the tied bits, if it lies in one."""
+    pairs = mesh.pairs
+    leader = np.arange(pairs.count)
+    tied = np.zeros(pairs.count, dtype=bool)
+    curves = [joint.first if isinstance(joint, Contact) else joint.name
+              for joint in (find_joint(model, name) for name in mesh.interface_names)]
+    numbers = {curve: number for number, curve in enumerate(curves)}
+    bounds = np.searchsorted(pairs.interface, np.arange(len(curves) + 1))
+    own = [(np.arange(*bounds[numbers[tie.curve]:][:2]), tie) for tie in model.ties if tie.curve in numbers]
+    for at, tie in own:
+        tied[at] |= (pairs.arc_length[at] > tie.start) & (pairs.arc_length[at] < tie.end)
+    for at, _ in own:
+        free, bound = at[~tied[at]], at[tied[at]]
+        if len(free):
+            away = np.abs(pairs.arc_length[bound][:, None] - pairs.arc_length[free])
+            leader[bound] = free[np.argmin(away, axis=1)]
+    return leader
 
 
 def _group_strengths(laws: list[Law], interface: Integer, texts: Mapping[str, str]) -> tuple[StrengthGroup, ...]:

@@ -106,7 +106,7 @@ def measure_law_error(
     laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0
 ) -> float:
     """Largest distance of a slipping pair's p_s from its bound, relative to the largest traction or the floor."""
-    slips = modes.mode == SLIP
+    slips = (modes.mode == SLIP) & ~laws.follows
     admissible = np.minimum(state.p_n, tensile_limit(laws, memory) - pressure)
     path = slip_path(modes, memory, plastic_slip(laws, state))
     bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
@@ -178,6 +178,9 @@ def propose_modes(
     slips &= ~laws.bonded & ~opens & ~intact
     mode = np.where(opens, OPEN, np.where(slips, SLIP, STICK)).astype(np.int8)
     sign = np.where(slips & ~same_sign & (tangential != 0), np.sign(tangential), modes.sign)
+    # In the corner of a narrow wedge a pair's own values decide nothing.
+    led = laws.leader
+    mode, sign, slips, parting, excess = mode[led], sign[led], slips[led], parting[led], excess[led]
     changed = (mode != modes.mode) | (slips & (sign != modes.sign))
     crossing = (mode == OPEN) != is_open
     violation = np.where(changed, np.maximum(np.where(crossing, np.abs(parting), np.abs(excess)), 1e-300), 0.0)

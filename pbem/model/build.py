@@ -13,6 +13,7 @@ from pbem.errors import CaseError, Fault
 from pbem.model.balance import describe_unbalance
 from pbem.model.crack import check_closing, check_inside, check_near_misses, check_tip_elements, find_tips
 from pbem.model.curve import Curve
+from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
 from pbem.model.junction import find_crossings, split_at_junctions
@@ -88,8 +89,9 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
     faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
         return None, faults
-    model = replace(_compose(case, roles, loading, topology), interior_points=interior)
-    faults = check_turning(case, model.curves)
+    model, faults = _compose(case, roles, loading, topology)
+    model = replace(model, interior_points=interior)
+    faults += check_turning(case, model.curves)
     gaps = [
         fault for name, interface in model.interfaces.items()
         for fault in check_gap(case, ("interfaces", name), interface.law, model.curves[name])
@@ -132,7 +134,7 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     return _Topology(curves, split.breaks, loops, tips, shapes.size, tuple(notes), tuple(faults))
 
 
-def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> Model:
+def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
     behaviour: dict[str, Hashable] = {
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness)
         for name, condition in loading.conditions.items()
@@ -152,9 +154,12 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         Region(name, materials[table.material], topology.loops[name], tuple(table.cracks), table.infinite)
         for name, table in case.regions.items()
     )
-    return Model(
+    fitted = fit_curves(
+        case, curves, regions, topology.tips, frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    )
+    model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source=case.text,
-        regions=regions, curves=curves, interfaces=loading.interfaces, conditions=loading.conditions,
+        regions=regions, curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
         analysis=Analysis(case.analysis.scheme, case.analysis.order, case.analysis.tips),
         solver=SolverOptions(
@@ -164,11 +169,13 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         ),
         output_every=case.output.every, size=topology.size,
         interior_grid=case.output.interior.shape if case.output.interior else None,
-        notes=(*topology.notes, *grading, *_note_choices(case)),
+        notes=(*topology.notes, *grading, *fitted.notes, *_note_choices(case)),
         initial_stress=loading.initial_stress,
         contacts=loading.contacts,
         groups=case.groups,
+        ties=fitted.ties,
     )
+    return model, list(fitted.faults)
 
 
 def _note_choices(case: Case) -> list[str]:

@@ -69,12 +69,16 @@ class Leg:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
         if self.fractions is not None:
             return np.array(self.fractions)
-        t = np.linspace(0.0, 1.0, self.elements + 1)
-        if self.refine_start and self.refine_end:
+        return self.divide(self.elements, self.refine_start, self.refine_end)
+
+    def divide(self, elements: int, refine_start: bool, refine_end: bool) -> NDArray[np.float64]:
+        """Fractions (elements + 1,) at t^power from every refined end, whatever elements the leg has."""
+        t = np.linspace(0.0, 1.0, elements + 1)
+        if refine_start and refine_end:
             t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)
-        elif self.refine_start:
+        elif refine_start:
             t = t**self.power
-        elif self.refine_end:
+        elif refine_end:
             t = 1 - (1 - t) ** self.power
         return t
 

@@ -9,6 +9,7 @@ from typing import Literal
 from pbem.case.generation import Group
 from pbem.model.curve import Curve
 from pbem.model.material import Material
+from pbem.model.sliver import Tie
 
 Quantity = Literal["displacement", "traction"]
 
@@ -166,8 +167,9 @@ class Model:
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
-    groups: the curves that were generated together. law_texts: contents of the files of custom laws, by their paths,
-    as they were when the case was read.
+    groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
+    follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
+    were when the case was read.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -191,4 +193,5 @@ class Model:
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
     groups: tuple[Group, ...] = ()
+    ties: tuple[Tie, ...] = ()
     law_texts: Mapping[str, str] = field(default_factory=dict)

@@ -49,7 +49,8 @@ def make_laws(count: int = 1, friction: object = FRICTION, cohesion: object = 0.
     }  # fmt: skip
     parameters = {"friction": np.full(count, friction), "cohesion": np.full(count, cohesion)}
     strengths = (StrengthGroup(coulomb, np.arange(count), parameters),)
-    return PairLaws(strengths, **{name: np.full(count, value) for name, value in (defaults | values).items()})
+    arrays = {name: np.full(count, value) for name, value in (defaults | values).items()}
+    return PairLaws(strengths, **arrays, leader=np.arange(count))
 
 
 def scale_cohesion(laws: PairLaws, factor: float) -> tuple[StrengthGroup, ...]:

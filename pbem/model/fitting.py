@@ -1,0 +1,99 @@
+"""The rule of lengths applied to a case's curves, and what the user is told of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pbem.case import Case
+from pbem.case.finding import list_names
+from pbem.errors import Fault
+from pbem.model.curve import Curve
+from pbem.model.junction import format_point
+from pbem.model.lengths import count_elements
+from pbem.model.model import Region
+from pbem.model.sizing import Excess, LongElement, fit_lengths
+from pbem.model.sliver import Tie
+
+# Curves and corners that are named in one note.
+MOST_NAMED = 8
+
+
+@dataclass(frozen=True)
+class FittedCurves:
+    """curves: with elements that other faces and tips allow; ties: bits of interfaces and cracks in the corners of
+    narrow wedges that follow the pairs next to them; notes, faults: for the user."""
+
+    curves: Mapping[str, Curve]
+    ties: tuple[Tie, ...]
+    notes: tuple[str, ...]
+    faults: tuple[Fault, ...]
+
+
+def fit_curves(
+    case: Case, curves: Mapping[str, Curve], regions: Sequence[Region], tips: Mapping[str, tuple[bool, bool]],
+    jointed: frozenset[str],
+) -> FittedCurves:
+    """Divide curves anew where their elements are too long for the faces around them.
+
+    tips: per crack whether its ends are tips; jointed: curves with contact pairs.
+    """
+    kept = frozenset(name for name, table in case.curves.items() if table.grading != "auto")
+    with_elements = tips if case.analysis.tips else {}
+    names = [[side.curve for loop in region.loops for side in loop.sides] + [*region.cracks] for region in regions]
+    sizes = fit_lengths(curves, names, with_elements, kept, case.analysis.order)
+    if sizes.excess is not None:
+        return FittedCurves(curves, (), (), (_refuse(case, sizes.excess),))
+    ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
+    notes = [*_note_added(curves, sizes.curves), *_note_ties(ties), *_note_long(sizes.long)]
+    return FittedCurves(sizes.curves, ties, tuple(notes), ())
+
+
+def _refuse(case: Case, excess: Excess) -> Fault:
+    found = (
+        f"curves '{excess.curve}' and '{excess.other}' at a distance of {excess.distance:.3g}, which would need "
+        f"elements of {excess.length:.3g} and far more of them than were asked for"
+    )
+    return case.fault(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
+
+
+def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list[str]:
+    old, new = count_elements(before), count_elements(after)
+    added = sorted((name for name in new if new[name] != old[name]), key=lambda name: old[name] - new[name])
+    if not added:
+        return []
+    named = [f"'{name}' {old[name]} to {new[name]}" for name in added]
+    return [
+        f"Elements added near other faces, in narrow wedges or beside crack tips, {sum(old.values())} to "
+        f"{sum(new.values())} in all: {list_names(named, MOST_NAMED)}."
+    ]
+
+
+def _note_ties(ties: Sequence[Tie]) -> list[str]:
+    if not ties:
+        return []
+    corners: dict[complex, list[Tie]] = {}
+    for tie in ties:
+        corners.setdefault(tie.corner, []).append(tie)
+    named = [
+        f"{own[0].end - own[0].start:.3g} of {list_names([repr(tie.curve) for tie in own], 3)} "
+        f"at {format_point(corner)} ({own[0].angle:.3g} degrees from '{own[0].other}')"
+        for corner, own in corners.items()
+    ]
+    return [
+        "Tied to the contact status of the pairs next to them, as no mesh resolves the last bit of a narrow wedge: "
+        f"{list_names(named, MOST_NAMED)}."
+    ]
+
+
+def _note_long(long: Sequence[LongElement]) -> list[str]:
+    worst = sorted(long, key=lambda each: each.allowed / each.length)
+    named = [
+        f"'{each.curve}' up to {each.length / each.allowed:.2g} times near {format_point(each.point)}" for each in worst
+    ]
+    if not named:
+        return []
+    return [
+        "Elements are longer than the distance to other faces allows, as their grading was given: "
+        f"{list_names(named, MOST_NAMED)}. Results may be wrong there; grading = \"auto\" adds elements."
+    ]

@@ -1,0 +1,221 @@
+"""The length of element that is allowed at every place of every leg, found on parts that are halved where it varies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.model.boxes import Boxes
+from pbem.model.curve import Curve
+from pbem.model.nearness import Surroundings
+from pbem.model.sliver import Wedges
+
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Bool = NDArray[np.bool_]
+
+# Longest element, as a multiple of the distance to the next face, by the order of the polynomials. Measured by pairs
+# that open when they are pressed: none at order 2 up to 2.5; order 1 needs half of that.
+REACH = (1.0, 1.0, 2.0, 2.0)
+# Growth of lengths per distance from a crack tip: neighbours of the tip's element are at most 1.5 times as long.
+SLOPE = 0.5
+# Least length of a tip's element on a leg that is graded towards the tip, as a part of the leg.
+LEAST_TIP = 5e-3
+# Where other faces are near, lengths towards a graded end fall with the distance from it to this part of the distance
+# of the faces: the boundary layer at the end of a thin body is as long as the body is thick.
+FIRST, GROWTH = 0.01, 1.0
+# A part of a leg is small enough when it is shorter than this part of the length that is allowed there.
+FINENESS = 0.25
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Parts (k,) of legs: number of the leg, fractions at both ends, length of the element of which each is a part as
+    the leg had it (given) and as it is wanted where nothing is near."""
+
+    leg: Integer
+    low: Real
+    high: Real
+    given: Real
+    wanted: Real
+
+    def lengths(self, length: Real) -> Real:
+        """Lengths (k,) from those of the legs."""
+        return np.asarray((self.high - self.low) * length[self.leg])
+
+    def select(self, which: Bool) -> Cells:
+        return Cells(*(getattr(self, each.name)[which] for each in fields(self)))
+
+    def halve(self) -> Cells:
+        middle = 0.5 * (self.low + self.high)
+        return Cells(
+            np.tile(self.leg, 2), np.concatenate([self.low, middle]), np.concatenate([middle, self.high]),
+            np.tile(self.given, 2), np.tile(self.wanted, 2),
+        )  # fmt: skip
+
+    @staticmethod
+    def join(parts: Sequence[Cells]) -> Cells:
+        return Cells(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Cells)))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Of each cell (k,): allowed length, whether it needs no halving, distance of the nearest face and its leg."""
+
+    allowed: Real
+    final: Bool
+    distance: Real
+    nearest: Integer
+
+
+@dataclass(frozen=True)
+class _Tips:
+    """Crack tips (k,): points, lengths of their elements, and number of the connected set of cracks of each."""
+
+    point: Complex
+    length: Real
+    component: Integer
+
+
+class LengthField:
+    """See the module. length, kept (legs,): lengths of the legs, and whether their grading is the user's."""
+
+    def __init__(
+        self, surroundings: Surroundings, wedges: Wedges, tips: Mapping[str, tuple[bool, bool]], kept: frozenset[str],
+        order: int,
+    ) -> None:
+        legs = surroundings.legs
+        self.surroundings, self.wedges, self.reach = surroundings, wedges, REACH[order]
+        self.length = np.array([leg.length for leg in legs])
+        self.kept = np.array([name in kept for name in surroundings.curve], dtype=bool)
+        self.kept_legs = frozenset(np.flatnonzero(self.kept).tolist())
+        self.refined = np.array([(leg.refine_start, leg.refine_end) for leg in legs], dtype=bool).reshape(-1, 2)
+        self._mean = self.length / np.array([leg.elements for leg in legs])
+        self._ends = [leg.element_fractions() for leg in legs]
+        # Elements in a wedge are graded for it, not as for an ordinary corner.
+        self._floor, self._growth = wedges.tabulate(len(legs), self.reach)
+        self._floor[self.kept] = 0.0
+        for number, leg in enumerate(legs):
+            if (self._floor[number] > 0).any() and self.refined[number].any():
+                self.refined[number] &= self._floor[number] == 0
+                self._ends[number] = leg.divide(leg.elements, *self.refined[number])
+        self._component = _connect(surroundings, tips)
+        self._tips, self._at_tip = self._collect_tips(tips)
+
+    def list_elements(self) -> Cells:
+        """The elements of all legs."""
+        ends = self._ends
+        leg = np.repeat(np.arange(len(ends)), [len(each) - 1 for each in ends])
+        low, high = np.concatenate([each[:-1] for each in ends]), np.concatenate([each[1:] for each in ends])
+        given = (high - low) * self.length[leg]
+        wanted = given.copy()
+        for k, from_end in ((0, low), (1, 1 - high)):
+            least = self._at_tip[leg, k]
+            wanted = np.where(from_end * self.length[leg] < 4 * least, np.maximum(wanted, least), wanted)
+        return Cells(leg, low, high, given, wanted)
+
+    def measure(self, cells: Cells) -> Measured:
+        """The lengths that are allowed in the middle of cells, and whether they hold for the cells as a whole."""
+        legs, length = cells.leg, cells.lengths(self.length)
+        t = 0.5 * (cells.low + cells.high)
+        points = self.place(cells)
+        graded = self.refined[legs].any(axis=1)
+        sight = np.where(graded, np.maximum(cells.wanted, self._mean[legs]), cells.wanted) / self.reach + length
+        distance, nearest = self.surroundings.find_distances(legs, t, points, sight)
+        allowed = self.reach * distance
+        thin = np.isfinite(distance)
+        corner = np.zeros(len(t), dtype=bool)
+        for k, (r, touches) in enumerate(((t, cells.low == 0), (1 - t, cells.high == 1))):
+            from_end, floor = r * self.length[legs], self._floor[legs, k]
+            falling = np.full(len(t), np.inf)
+            falling[thin] = FIRST * distance[thin] + GROWTH * from_end[thin]
+            allowed = np.where(self.refined[legs, k], np.minimum(allowed, falling), allowed)
+            allowed = np.where(floor > 0, np.minimum(allowed, self._growth[legs, k] * from_end), allowed)
+            corner |= touches & (floor > 0) & (length <= floor)
+        allowed = np.where(self.kept[legs], np.inf, np.where(corner, length, allowed))
+        beside_tips = self._measure_from_tips(points, cells, length)
+        steepest = max(self.reach, GROWTH, SLOPE)
+        allowed = np.minimum(allowed, beside_tips)
+        final = (length <= FINENESS * allowed) | (allowed - 0.5 * steepest * length >= cells.wanted) | corner
+        return Measured(allowed, final, distance, nearest)
+
+    def measure_by_distance(self, cells: Cells) -> Real:
+        """Lengths (k,) that the distance of other faces allows in the middle of cells, whosever their grading is."""
+        sight = cells.wanted / self.reach * (1 + 1e-9)
+        t = 0.5 * (cells.low + cells.high)
+        return self.reach * self.surroundings.find_distances(cells.leg, t, self.place(cells), sight)[0]
+
+    def place(self, cells: Cells) -> Complex:
+        """The middles (k,) of cells."""
+        legs, t = self.surroundings.legs, 0.5 * (cells.low + cells.high)
+        start, end, center = (
+            np.array([complex(getattr(leg, name) or 0j) for leg in legs])[cells.leg]
+            for name in ("start", "end", "center")
+        )
+        sweep = np.array([leg.sweep for leg in legs])[cells.leg]
+        return np.where(sweep == 0, start + (end - start) * t, center + (start - center) * np.exp(1j * sweep * t))
+
+    def _measure_from_tips(self, points: Complex, cells: Cells, length: Real) -> Real:
+        """What the tips of the same set of connected cracks allow."""
+        allowed = np.full(len(points), np.inf)
+        own = np.flatnonzero(self._component[cells.leg] >= 0)
+        if not len(self._tips.point) or not len(own):
+            return allowed
+        reach = (cells.wanted / SLOPE + length)[own, None]
+        low = np.stack([points[own].real, points[own].imag], axis=1) - reach
+        at = np.stack([self._tips.point.real, self._tips.point.imag], axis=1)
+        which, tip = Boxes(at, at).find_meeting(Boxes(low, low + 2 * reach))
+        which = own[which]
+        same = self._component[cells.leg[which]] == self._tips.component[tip]
+        which, tip = which[same], tip[same]
+        np.minimum.at(allowed, which, self._tips.length[tip] + SLOPE * np.abs(points[which] - self._tips.point[tip]))
+        return allowed
+
+    def _collect_tips(self, tips: Mapping[str, tuple[bool, bool]]) -> tuple[_Tips, Real]:
+        """All tips, and per end of a leg (legs, 2) the least length of its elements, if it is a tip (else 0)."""
+        names, legs = self.surroundings.curve, self.surroundings.legs
+        last = {name: number for number, name in enumerate(names)}
+        first = {name: number for number, name in reversed(list(enumerate(names)))}
+        at_tip = np.zeros((len(legs), 2))
+        point, length, component = [], [], []
+        for name, is_tip in tips.items():
+            for k, number in enumerate((first[name], last[name])):
+                if is_tip[k]:
+                    ends = self._ends[number]
+                    own = float(np.diff(ends)[-k]) * self.length[number]
+                    if self.refined[number, k]:
+                        own = at_tip[number, k] = max(own, LEAST_TIP * self.length[number])
+                    point.append(legs[number].end if k else legs[number].start)
+                    length.append(own)
+                    component.append(self._component[number])
+        return _Tips(np.array(point, dtype=complex), np.array(length), np.array(component, dtype=np.int64)), at_tip
+
+
+def _connect(surroundings: Surroundings, tips: Mapping[str, tuple[bool, bool]]) -> Integer:
+    """Per leg the number of the connected set of cracks that it belongs to, -1 if it is no crack."""
+    parent: dict[complex, complex] = {}
+
+    def find(point: complex) -> complex:
+        parent.setdefault(point, point)
+        while parent[point] != point:
+            parent[point] = parent[parent[point]]
+            point = parent[point]
+        return point
+
+    joined = list(zip(surroundings.legs, surroundings.curve, strict=True))
+    for leg, name in joined:
+        if name in tips:
+            parent[find(leg.start)] = find(leg.end)
+    numbers: dict[complex, int] = {}
+    return np.array([
+        numbers.setdefault(find(leg.start), len(numbers)) if name in tips else -1 for leg, name in joined
+    ], dtype=np.int64)  # fmt: skip
+
+
+def count_elements(curves: Mapping[str, Curve]) -> dict[str, int]:
+    """Number of elements on every curve."""
+    return {name: sum(leg.elements for leg in curve.legs) for name, curve in curves.items()}

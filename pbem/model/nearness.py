@@ -1,0 +1,194 @@
+"""How far points are from the other faces of their region: faces are pieces of legs, found by boxes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.model.boxes import Boxes
+from pbem.model.curve import Curve, Leg
+
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# Two legs that meet at less than this angle (degrees) enclose a wedge, in which lengths fall with the distance from
+# its corner; wider corners are ordinary ones, towards which legs are graded.
+WEDGE = 50.0
+# An arc is seen in pieces that turn by no more than this, so that a piece does not face itself.
+WIDEST_PIECE = math.radians(60.0)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Straight and circular pieces (n,) of legs: ends, centre and signed angle (zeros if straight), number of the leg,
+    and number of the piece on its leg."""
+
+    start: Complex
+    end: Complex
+    center: Complex
+    sweep: Real
+    leg: Integer
+    number: Integer
+
+    def select(self, numbers: Integer) -> Pieces:
+        return Pieces(*(getattr(self, name)[numbers] for name in self.__dataclass_fields__))
+
+
+def cut_legs(legs: Sequence[Leg]) -> Pieces:
+    """The pieces of legs."""
+    start: list[complex] = []
+    end: list[complex] = []
+    center: list[complex] = []
+    sweep: list[float] = []
+    number: list[int] = []
+    order: list[int] = []
+    for at, leg in enumerate(legs):
+        count = count_pieces(leg)
+        ends = leg.point(np.linspace(0.0, 1.0, count + 1))
+        start += ends[:-1].tolist()
+        end += ends[1:].tolist()
+        center += [leg.center or 0j] * count
+        sweep += [leg.sweep / count] * count
+        number += [at] * count
+        order += range(count)
+    return Pieces(
+        np.array(start, dtype=complex), np.array(end, dtype=complex), np.array(center, dtype=complex),
+        np.array(sweep, dtype=float), np.array(number, dtype=np.int64), np.array(order, dtype=np.int64),
+    )  # fmt: skip
+
+
+def count_pieces(leg: Leg) -> int:
+    """Number of pieces of one leg."""
+    return max(1, math.ceil(abs(leg.sweep) / WIDEST_PIECE - 1e-9)) if leg.center is not None else 1
+
+
+def measure_nearness(points: Complex, pieces: Pieces) -> Real:
+    """Distance of each point (k,) from the piece (k,) with the same number."""
+    ends = np.minimum(np.abs(points - pieces.start), np.abs(points - pieces.end))
+    curved = pieces.sweep != 0
+    along = np.where(curved, 1.0, pieces.end - pieces.start)
+    local = (points - pieces.start) / along
+    beside = np.where((local.real > 0) & (local.real < 1), np.abs(local.imag * along), ends)
+    radius = np.where(curved, pieces.start - pieces.center, 1.0)
+    angle = np.angle((points - pieces.center) / radius) * np.sign(pieces.sweep)
+    off_circle = np.abs(np.abs(points - pieces.center) - np.abs(radius))
+    around = np.where(angle % (2 * np.pi) < np.abs(pieces.sweep), off_circle, ends)
+    return np.minimum(np.where(curved, around, beside), ends)
+
+
+class Surroundings:
+    """The faces of all regions, and which of them a leg does not see: itself, and those that it meets at a corner.
+
+    legs: of all curves, one after the other; regions: names of the curves of every region.
+    """
+
+    def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]]) -> None:
+        self.legs: list[Leg] = [leg for curve in curves.values() for leg in curve.legs]
+        self.curve = [name for name, curve in curves.items() for _ in curve.legs]
+        self.pieces = cut_legs(self.legs)
+        self._counts = np.array([count_pieces(leg) for leg in self.legs], dtype=np.int64)
+        first: dict[str, int] = {}
+        for number, name in enumerate(self.curve):
+            first.setdefault(name, number)
+        self._members: list[Integer] = []
+        for names in regions:
+            numbers = [first[name] + at for name in dict.fromkeys(names) for at in range(len(curves[name].legs))]
+            self._members.append(np.array(sorted(numbers), dtype=np.int64))
+        self.corners, self._joined = _find_meetings(self.legs, self._members)
+
+    def find_distances(self, leg: Integer, t: Real, points: Complex, reach: Real) -> tuple[Real, Integer]:
+        """Distance (k,) from points at the fractions t of legs (k,) to the nearest face that they see within a reach
+        (k,), and the number of its leg; infinity and -1 where nothing is that near."""
+        piece_of_point = np.minimum((t * self._counts[leg]).astype(np.int64), self._counts[leg] - 1)
+        distance, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
+        count = len(self.legs)
+        for members in self._members:
+            inside = np.zeros(count, dtype=bool)
+            inside[members] = True
+            own, faces = np.flatnonzero(inside[leg]), np.flatnonzero(inside[self.pieces.leg])
+            if not len(own) or len(faces) < 2:
+                continue
+            low = np.stack([points[own].real, points[own].imag], axis=1) - reach[own, None]
+            which, piece = _surround(self.pieces.select(faces)).find_meeting(Boxes(low, low + 2 * reach[own, None]))
+            at, seen = own[which], faces[piece]
+            apart = np.abs(piece_of_point[at] - self.pieces.number[seen]) > 1
+            keep = np.where(leg[at] == self.pieces.leg[seen], apart, ~self._is_joined(leg[at], self.pieces.leg[seen]))
+            at, seen = at[keep], seen[keep]
+            far = measure_nearness(points[at], self.pieces.select(seen))
+            order = np.lexsort((far, at))
+            at, far, seen = at[order], far[order], seen[order]
+            head = np.flatnonzero(np.diff(at, prepend=-1))
+            better = far[head] < np.minimum(distance[at[head]], reach[at[head]])
+            distance[at[head[better]]] = far[head[better]]
+            nearest[at[head[better]]] = self.pieces.leg[seen[head[better]]]
+        return distance, nearest
+
+    def _is_joined(self, one: Integer, other: Integer) -> NDArray[np.bool_]:
+        code = np.minimum(one, other) * len(self.legs) + np.maximum(one, other)
+        return np.isin(code, self._joined)
+
+
+def _surround(pieces: Pieces) -> Boxes:
+    """Boxes around pieces; of arcs, around the chord and as much more on all sides as the arc rises above it."""
+    rise = 0.5 * np.abs(pieces.end - pieces.start) * np.tan(0.25 * np.abs(pieces.sweep))
+    low = np.stack([np.minimum(pieces.start.real, pieces.end.real), np.minimum(pieces.start.imag, pieces.end.imag)], 1)
+    high = np.stack([np.maximum(pieces.start.real, pieces.end.real), np.maximum(pieces.start.imag, pieces.end.imag)], 1)
+    return Boxes(low - rise[:, None], high + rise[:, None])
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Legs that meet at a point and enclose wedges there.
+
+    ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
+    two legs `sides`.
+    """
+
+    point: complex
+    ends: tuple[tuple[int, bool], ...]
+    angle: float
+    sides: tuple[int, int]
+
+
+def _find_meetings(legs: Sequence[Leg], members: Sequence[Integer]) -> tuple[list[Corner], Integer]:
+    """The corners of wedges, and codes of the pairs of legs that meet but enclose no wedge; members: legs of every
+    region, as legs of different regions do not see each other."""
+    regions: list[set[int]] = [set() for _ in legs]
+    for region, own in enumerate(members):
+        for number in own.tolist():
+            regions[number].add(region)
+    corners: list[Corner] = []
+    narrow: set[tuple[int, int]] = set()
+    met: set[tuple[int, int]] = set()
+    for point, ends in _collect_ends(legs).items():
+        found: list[tuple[float, int, int]] = []
+        around: dict[tuple[int, bool], None] = {}
+        for i, (one, one_ray, one_end) in enumerate(ends):
+            for other, other_ray, other_end in ends[i + 1:]:
+                pair = (min(one, other), max(one, other))
+                if not regions[one] & regions[other]:
+                    continue
+                met.add(pair)
+                angle = abs(float(np.angle(other_ray / one_ray)))
+                if angle < math.radians(WEDGE):
+                    narrow.add(pair)
+                    found.append((angle, *pair))
+                    around |= {(one, one_end): None, (other, other_end): None}
+        if found:
+            angle, one, other = min(found)
+            corners.append(Corner(point, tuple(around), angle, (one, other)))
+    return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
+
+
+def _collect_ends(legs: Sequence[Leg]) -> dict[complex, list[tuple[int, complex, bool]]]:
+    """At every end the legs there: number, direction into the leg, whether it is the leg's end."""
+    ends: dict[complex, list[tuple[int, complex, bool]]] = {}
+    for number, leg in enumerate(legs):
+        ends.setdefault(leg.start, []).append((number, leg.tangent(at_end=False), False))
+        ends.setdefault(leg.end, []).append((number, -leg.tangent(at_end=True), True))
+    return ends

@@ -1,0 +1,114 @@
+"""Narrow wedges between faces: graded alike on both sides down to a last bit, which follows the pairs next to it.
+
+In the corner of a wedge of angle a, lengths proportional to the distance r from the corner keep the ratio of length
+and distance of the sides, down to the element in the corner itself, which no mesh resolves: there pairs open when
+they are pressed. Up to TIED that bit must not choose its own contact status. It takes that of the pair next to it
+(stick, slip with its sign, open); its jump stays free, so that rigid motions of the sides pass through the corner.
+Faces tied to zero jump there would pin cracks that cross: 30 % of the slip, falling with the logarithm of the length.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.model.nearness import Corner, Surroundings
+
+Real = NDArray[np.float64]
+
+# Length of the last bit, as a part of the shortest leg of the wedges at a corner: at 8 degrees, from where it changes
+# with the power of the angle, and its bounds. What it spoils grows in proportion to it, and as slender bodies bend.
+LAST_BIT, AT_ANGLE, POWER = 2e-4, 8.0, 2.5
+LEAST_BIT, MOST_BIT = 5e-5, 1e-2
+# Degrees: below, the last bit follows its neighbour.
+TIED = 25.0
+# Most growth of lengths per distance from the corner, for wedges that are not very narrow.
+MOST_GROWTH = 1.0
+
+
+@dataclass(frozen=True)
+class Tie:
+    """The bit of a curve from arc length `start` to `end` that follows the pair next to it; corner, angle (degrees)
+    and the other side of the wedge are for messages."""
+
+    curve: str
+    start: float
+    end: float
+    corner: complex
+    angle: float
+    other: str
+
+
+@dataclass(frozen=True)
+class Wedges:
+    """All corners of narrow wedges, with the length of the last bit at each; at: number of the corner at an end of a
+    leg (its number, and whether it is the leg's end)."""
+
+    corners: tuple[Corner, ...]
+    bits: tuple[float, ...]
+    ties: tuple[Tie, ...]
+    at: Mapping[tuple[int, bool], int]
+
+    def tabulate(self, legs: int, reach: float) -> tuple[Real, Real]:
+        """Per end of a leg (legs, 2): length of the last bit, and growth of lengths; zeros where no wedge is."""
+        floor, growth = np.zeros((legs, 2)), np.zeros((legs, 2))
+        for corner, bit in zip(self.corners, self.bits, strict=True):
+            for number, at_end in corner.ends:
+                floor[number, int(at_end)] = bit
+                growth[number, int(at_end)] = measure_growth(corner.angle, reach)
+        return floor, growth
+
+    def grade(
+        self, leg: int, at_end: bool, length: float, places: Real, limits: Real, reach: float
+    ) -> Sequence[float]:
+        """Ends of elements, as fractions of the leg from a corner on: in geometric progression, equal on all legs of
+        the corner, up to where they would be longer than a limit (fractions), given from the places (fractions) on;
+        [0] where no wedge is."""
+        number = self.at.get((leg, at_end))
+        if number is None:
+            return [0.0]
+        growth, bit = measure_growth(self.corners[number].angle, reach), self.bits[number]
+        if at_end:
+            places, limits = (1.0 - np.append(places[1:], 1.0))[::-1], limits[::-1]
+        ends = [0.0, bit / length]
+        while True:
+            following = ends[-1] * (1 + growth)
+            within = (places < following) & (places >= ends[1])
+            if following > 0.5 or following - ends[-1] > limits[within].min(initial=np.inf) * (1 + growth):
+                return ends
+            ends.append(following)
+
+
+def measure_growth(angle: float, reach: float) -> float:
+    """Length of an element over its distance from the corner of a wedge (radians)."""
+    return min(MOST_GROWTH, reach * math.sin(angle))
+
+
+def measure_last_bit(angle: float) -> float:
+    """Length of the last bit in the corner of a wedge (radians), as a part of its shortest leg."""
+    return min(max(LAST_BIT * (math.degrees(angle) / AT_ANGLE) ** POWER, LEAST_BIT), MOST_BIT)
+
+
+def find_wedges(surroundings: Surroundings) -> Wedges:
+    """The wedges of a model and what is tied in their corners."""
+    legs, names = surroundings.legs, surroundings.curve
+    before = [0.0]
+    for number in range(1, len(legs)):
+        same = names[number - 1] == names[number]
+        before.append(before[-1] + legs[number - 1].length if same else 0.0)
+    bits, ties = [], []
+    for corner in surroundings.corners:
+        bit = measure_last_bit(corner.angle) * min(legs[number].length for number, _ in corner.ends)
+        bits.append(bit)
+        if math.degrees(corner.angle) >= TIED:
+            continue
+        for number, at_end in corner.ends:
+            first = before[number] + (legs[number].length - bit if at_end else 0.0)
+            other = names[corner.sides[corner.sides[0] == number]]
+            ties.append(Tie(names[number], first, first + bit, corner.point, math.degrees(corner.angle), other))
+    at = {end: number for number, corner in enumerate(surroundings.corners) for end in corner.ends}
+    return Wedges(tuple(surroundings.corners), tuple(bits), tuple(ties), at)

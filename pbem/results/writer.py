@@ -174,7 +174,7 @@ class ResultWriter:
         append_row(file["fields/hoop_stress"], self._evaluate_hoop_stress(step))
         if "interior" in file:
             count = len(self._model.interior_points)
-            none = Interior(np.full(count, np.nan + 0j), np.full((count, 3), np.nan))
+            none = Interior(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
             interior = step.interior or none
             append_row(file["interior/displacement"], to_columns(interior.displacement))
             append_row(file["interior/stress"], interior.stress)

@@ -121,7 +121,7 @@ def _solve(
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
         try:
-            store_steps(march(problem, watch, start), model.output_every, interior, writer)
+            store_steps(march(problem, watch, start), model.output_every, interior, writer, watch)
         except ConvergenceError:
             watch.check()  # a law that failed has answered with no strength
             raise
@@ -134,7 +134,8 @@ def _solve(
 
 
 def store_steps(
-    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None
+    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
+    listener: Reporter | None = None,
 ) -> None:
     """Write the steps as they come, those that are stored with the field at the interior points."""
     waiting: Step | None = None
@@ -145,7 +146,11 @@ def store_steps(
             if interior is not None and stored:
                 step = replace(step, interior=interior.evaluate(step))
             # An error of the first rank is every rank's.
-            do_on_first(world, PbemError, lambda due=step: writer.append(due) if writer else None)  # type: ignore[misc]
+            notes = do_on_first(
+                world, PbemError, lambda due=step: writer.append(due) if writer else (),  # type: ignore[misc]
+            )
+            for note in notes:
+                (listener or SilentReporter()).note(note)
     except ConvergenceError:
         # All ranks are here together: the last step reached is stored as well.
         if interior is not None and waiting is not None:

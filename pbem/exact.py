@@ -201,3 +201,22 @@ def griffith_field(kappa: float, shear_modulus: float, half_length: float, stres
         return Potentials(*(np.asarray(part, dtype=complex) for part in (phi, phi_1, phi_2, psi, psi_1)))
 
     return PlaneField(kappa, shear_modulus, evaluate)
+
+
+def conforming_load(half_angle: float) -> float:
+    """Force Q of a smooth pin in a hole of the same material, by the half-angle (radians) of the contact between them.
+
+    As Q/(E' c), with the clearance c = radius of the hole less that of the pin, and E' the plane modulus of both. A.
+    Persson, On the stress distribution of cylindrical elastic bodies in contact, Chalmers 1964; M. Ciavarella, P.
+    Decuzzi, International Journal of Solids and Structures 38 (2001).
+    """
+    b = np.tan(0.5 * half_angle)
+    return float(np.pi * b**2 * (1 + b**2) / (2 * (1 - b**4) - np.log(1 + b**2)))
+
+
+def conforming_pressure(half_angle: float, angle: ArrayLike) -> Real:
+    """Pressure in the contact of `conforming_load`, by the angle (radians) from its middle, as p R/Q; zero outside."""
+    b, t = np.tan(0.5 * half_angle), np.tan(0.5 * np.minimum(np.abs(angle), half_angle))
+    root, whole = np.sqrt(np.maximum(b**2 - t**2, 0.0)), np.sqrt(b**2 + 1)
+    smooth = 2 / np.pi * root / (whole * (1 + t**2))
+    return np.asarray(smooth + np.log((whole + root) / (whole - root)) / (2 * np.pi * b**2 * (1 + b**2)))

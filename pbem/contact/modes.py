@@ -201,10 +201,11 @@ FAIL_TOGETHER = 0.7
 
 
 def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0) -> Bool:
-    """The intact brittle bonds (m,) that fail next: those overloaded most."""
-    strength = evaluate_strength(laws, np.minimum(state.p_n, 0.0), memory.path, pressure, memory.broken)
+    """The intact brittle bonds (m,) that fail next: those overloaded most, and the pairs that they lead."""
+    limit = tensile_limit(laws, memory) - pressure
+    strength = evaluate_strength(laws, np.minimum(state.p_n, limit), memory.path, pressure, memory.broken)
     overload = np.maximum(state.p_n + pressure - laws.tensile_strength, np.abs(state.p_s) - strength.bound)
-    overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)
+    overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)[laws.leader]
     worst = overload.max(initial=0.0)
     if worst <= ROUNDING * max(_largest_traction(state), floor):
         return np.zeros(laws.count, dtype=bool)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,3 +53,32 @@ def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: N
     nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < CLOSED_AT_LEAST]
     mode[nearest] = closed[nearest]
     return ModeState(mode, modes.sign)
+
+
+def stick_calmest_pairs(
+    mesh: Mesh, laws: PairLaws, modes: ModeState, slip: NDArray[np.float64], overloaded: NDArray[np.int64],
+    holds: Callable[[ModeState], bool],
+) -> tuple[ModeState, NDArray[np.int64]]:
+    """Modes with one pair of an interface after the other sticking until `holds` says that it is enough, and the pairs.
+
+    Only of interfaces on which all closed pairs slip; there the pair of the least slip (m,). overloaded: pairs that
+    stuck instead and could not carry what was left: on their interfaces only pairs that slip in the other sense come
+    into question, as the body moves on in the sense of the overload. The same modes and none if nothing holds.
+    """
+    mode = modes.mode.copy()
+    sense = np.zeros(len(mesh.interface_names))
+    sense[mesh.pairs.interface[overloaded]] = modes.sign[overloaded]
+    of = mesh.pairs.interface
+    sticks = np.bincount(of[mode == STICK], minlength=len(sense)) > 0
+    may = (mode == SLIP) & ~mesh.pairs.crack & resists_slip(laws) & ~sticks[of] & (modes.sign * sense[of] <= 0)
+    may[overloaded] = False
+    candidates = np.flatnonzero(may)
+    candidates = candidates[np.argsort(np.abs(slip[candidates]), kind="stable")]
+    _, first = np.unique(of[candidates], return_index=True)
+    chosen = candidates[np.sort(first)]
+    for count, pair in enumerate(chosen, start=1):
+        mode[pair] = STICK
+        trial = ModeState(mode, modes.sign)
+        if holds(trial):
+            return trial, chosen[:count]
+    return modes, chosen[:0]

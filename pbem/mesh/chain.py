@@ -18,7 +18,7 @@ Integer = NDArray[np.int64]
 class Chain:
     """The elements of one curve in a region's order of travel (region on the left).
 
-    forward: travelled in the curve's own direction. traction: the traction equation is collocated on its nodes.
+    forward: travelled in the curve's own direction. traction (elements,): the traction equation is collocated there.
     first_node: number of its first node in the mesh. order: of the shapes on its elements.
     """
 
@@ -26,7 +26,7 @@ class Chain:
     curve: str
     forward: bool
     crack: bool
-    traction: bool
+    traction: NDArray[np.bool_]
     elements: Elements
     first_node: int
     order: int

@@ -43,7 +43,7 @@ class Elements:
         return np.where(self.sweep == 0, np.abs(self.end - self.start), radius * np.abs(self.sweep))
 
     def place(self, local: Real) -> Complex:
-        """Points (m, p) at the coordinates s (p,)."""
+        """Points (m, p) at the coordinates s, (p,) of all elements or (m, p) of each."""
         straight = 0.5 * (self.end + self.start)[:, None] + 0.5 * (self.end - self.start)[:, None] * local
         return np.where(self.sweep[:, None] == 0, straight, self.center[:, None] + self._radii(local))
 
@@ -75,11 +75,14 @@ class Elements:
 
     def arc_lengths(self, local: Real) -> Real:
         """Length (m, p) from the first element's start to the points at s."""
+        lengths = self.lengths
+        return (np.cumsum(lengths) - lengths)[:, None] + lengths[:, None] * self.fractions(local)
+
+    def fractions(self, local: Real) -> Real:
+        """Fraction (m, p) of each element's length that lies before the points at s, (p,) or (m, p)."""
         angle = np.where(self.sweep == 0, 1.0, self.sweep)[:, None]
         share = 0.5 + 2 * np.arctan(self._quarter_tangents()[:, None] * local) / angle
-        share = np.where(self.sweep[:, None] == 0, 0.5 * (1 + local), share)
-        lengths = self.lengths
-        return (np.cumsum(lengths) - lengths)[:, None] + lengths[:, None] * share
+        return np.where(self.sweep[:, None] == 0, 0.5 * (1 + local), share)
 
     def _quarter_tangents(self) -> Real:
         return np.tan(0.25 * self.sweep)

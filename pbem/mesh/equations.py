@@ -1,30 +1,83 @@
-"""Which boundary integral equation is collocated on which side: the four schemes and their one exception."""
+"""Which boundary integral equation is collocated on which side: the four schemes and their two exceptions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
-from pbem.model.model import Loop, Model, Region
+from pbem.model.facing import Strip, find_strips
+from pbem.model.model import Model, Region
 
 # Notes on inner loops of one region, beyond which there is one for all.
 MOST_NOTES = 6
 
 
-def uses_traction_equation(
-    model: Model, region: Region, loop: Loop, curve: str, inner: Mapping[str, frozenset[str]]
-) -> bool:
-    """Whether the traction equation (else the displacement equation) is collocated on this region's side of a curve.
+@dataclass(frozen=True)
+class Equations:
+    """traction: for every (number of the region, curve) on its loops, whether the traction equation (else the
+    displacement equation) is collocated on each leg of the curve, in the curve's own direction; notes: exceptions."""
+
+    traction: Mapping[tuple[int, str], tuple[bool, ...]]
+    notes: tuple[str, ...]
+
+
+def choose_equations(model: Model) -> Equations:
+    """What the scheme asks for, but for two exceptions.
 
     A rigid motion of a closed inner curve produces nothing in the region outside it through the traction equation, so
     that an inner loop always keeps the displacement equation; with DBEM the side across it takes the traction equation.
-    inner: the result of `find_inner_curves`.
+    Traction equations on both faces of a narrow slot say nearly the same: there one of the faces keeps the displacement
+    equation, as on the faces of a crack; both do on the faces of a thin part, which a traction equation hardly bends.
     """
-    return loop.outer and _asks_traction_equation(model, region, curve, inner)
-
-
-def explain_exceptions(model: Model) -> tuple[str, ...]:
-    """One sentence for every inner loop on which the scheme's traction equation was replaced."""
     inner = find_inner_curves(model)
+    traction: dict[tuple[int, str], tuple[bool, ...]] = {}
+    notes: list[str] = []
+    for number, region in enumerate(model.regions):
+        for loop in region.loops:
+            for side in loop.sides:
+                asks = loop.outer and _asks_traction_equation(model, region, side.curve, inner)
+                traction[number, side.curve] = (asks,) * len(model.curves[side.curve].legs)
+        asked = [(curve, leg) for (of, curve), legs in traction.items() if of == number
+                 for leg, asks in enumerate(legs) if asks]  # fmt: skip
+        strips = find_strips(model, region, asked) if len(asked) > 1 else []
+        kept = _cover_strips(strips)
+        for curve in {curve for curve, _ in kept}:
+            legs = traction[number, curve]
+            traction[number, curve] = tuple(asks and (curve, leg) not in kept for leg, asks in enumerate(legs))
+        notes += _explain_strips(model, region, strips, kept)
+    if len(notes) > MOST_NOTES:
+        scheme = model.analysis.scheme
+        notes = [f"{len(notes)} curves keep the displacement equation as one face of a slot or thin part: "
+                 f"{scheme} has traction equations on both faces, which do not tell them apart"]  # fmt: skip
+    return Equations(traction, (*_explain_inner_loops(model, inner), *notes))
+
+
+def _cover_strips(strips: Sequence[Strip]) -> set[tuple[str, int]]:
+    """Legs (curve, number): both faces of thin parts, and one at least of every slot."""
+    kept = {leg for strip in strips if strip.inside for leg in (strip.first, strip.second)}
+    for strip in strips:
+        if strip.first not in kept and strip.second not in kept:
+            kept.add(strip.first)
+    return kept
+
+
+def _explain_strips(
+    model: Model, region: Region, strips: Sequence[Strip], kept: set[tuple[str, int]]
+) -> list[str]:
+    """One sentence for every curve that keeps the displacement equation, with its narrowest strip."""
+    narrowest: dict[str, Strip] = {}
+    for strip in sorted(strips, key=lambda each: each.width, reverse=True):
+        narrowest |= {leg[0]: strip for leg in (strip.first, strip.second) if leg in kept}
+    return [
+        f"region {region.name} keeps the displacement equation on {curve}, one face of a "
+        f"{f'part {strip.width:.3g} thick' if strip.inside else f'slot {strip.width:.3g} wide'}: "
+        f"{model.analysis.scheme} has traction equations on both faces, which do not tell them apart"
+        for curve, strip in narrowest.items()
+    ]
+
+
+def _explain_inner_loops(model: Model, inner: Mapping[str, frozenset[str]]) -> tuple[str, ...]:
+    """One sentence for every inner loop on which the scheme's traction equation was replaced."""
     notes = []
     for region in model.regions:
         loops = []

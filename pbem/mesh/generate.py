@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import divide_curve
-from pbem.mesh.equations import explain_exceptions, find_inner_curves, uses_traction_equation
-from pbem.mesh.mesh import Mesh
+from pbem.mesh.equations import Equations, choose_equations
+from pbem.mesh.facing import describe_sparse_meshes
+from pbem.mesh.mesh import Mesh, Pairs
 from pbem.mesh.pairing import pair_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
-from pbem.model.model import Model, Region
+from pbem.model.model import Model
 
 
 def generate_mesh(model: Model) -> Mesh:
     """Divide every curve as its legs say, once for each region that it bounds, and pair the nodes of interfaces."""
     order = model.analysis.order
-    chains = _list_chains(model)
+    equations = choose_equations(model)
+    chains = _list_chains(model, equations)
     counts = [chain.elements.count for chain in chains]
     curve_names = tuple(model.curves)
     number = {name: at for at, name in enumerate(curve_names)}
@@ -45,40 +47,39 @@ def generate_mesh(model: Model) -> Mesh:
         position=join(lambda chain: chain.elements.place(chain.local)),
         normal=join(lambda chain: chain.elements.normals(chain.local)),
         weight=join(lambda chain: chain.elements.weights(chain.local)),
-        traction_equation=np.repeat(repeat([chain.traction for chain in chains], np.bool_), order + 1),
+        traction_equation=np.repeat(join(lambda chain: chain.traction), order + 1),
         pairs=pairs,
         links=links,
         region_names=tuple(region.name for region in model.regions),
         curve_names=curve_names,
         interface_names=(*model.interfaces, *model.contacts),
-        notes=explain_exceptions(model),
+        notes=(*equations.notes, *_note_contacts(model, pairs)),
     )
 
 
-def _list_chains(model: Model) -> list[Chain]:
+def _list_chains(model: Model, equations: Equations) -> list[Chain]:
     order = model.analysis.order
     chains: list[Chain] = []
     first_node = 0
-    inner = find_inner_curves(model)
     for number, region in enumerate(model.regions):
-        for curve, forward, crack, traction in _list_sides(model, region, inner):
+        sides = [(side.curve, side.forward, False) for loop in region.loops for side in loop.sides]
+        for curve, forward, crack in [*sides, *((crack, True, True) for crack in region.cracks)]:
+            legs = model.curves[curve].legs
+            # A crack always has the traction equation.
+            traction = (True,) * len(legs) if crack else equations.traction[number, curve]
+            by_element = np.repeat(traction, [leg.elements for leg in legs])
             elements = divide_curve(model.curves[curve])
-            elements = elements if forward else elements.reverse()
-            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order))
+            if not forward:
+                elements, by_element = elements.reverse(), by_element[::-1]
+            chains.append(Chain(number, curve, forward, crack, by_element, elements, first_node, order))
             first_node += elements.count * (order + 1)
     return chains
 
 
-def _list_sides(
-    model: Model, region: Region, inner: Mapping[str, frozenset[str]]
-) -> list[tuple[str, bool, bool, bool]]:
-    """Curve, forward, crack, traction equation of every side of a region; a crack always has the traction equation."""
-    sides = [
-        (side.curve, side.forward, False, uses_traction_equation(model, region, loop, side.curve, inner))
-        for loop in region.loops
-        for side in loop.sides
-    ]
-    return sides + [(crack, True, True, True) for crack in region.cracks]
+def _note_contacts(model: Model, pairs: Pairs) -> tuple[str, ...]:
+    first = len(model.interfaces)
+    slots = [(name, pairs.slot[pairs.interface == first + number]) for number, name in enumerate(model.contacts)]
+    return describe_sparse_meshes(slots, model.analysis.order)
 
 
 def _mark_tips(model: Model, chain: Chain) -> np.ndarray:

@@ -11,8 +11,16 @@ from pbem.case import Case, parse_draft, read_case_text
 from pbem.case.finding import list_names
 from pbem.errors import CaseError, Fault
 from pbem.model.balance import describe_unbalance
-from pbem.model.crack import check_closing, check_inside, check_near_misses, check_tip_elements, find_tips
+from pbem.model.crack import (
+    check_closing,
+    check_inside,
+    check_near_misses,
+    check_tip_elements,
+    describe_near_misses,
+    find_tips,
+)
 from pbem.model.curve import Curve
+from pbem.model.facing import check_facing, split_opposite_ends
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
@@ -91,7 +99,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         return None, faults
     model, faults = _compose(case, roles, loading, topology)
     model = replace(model, interior_points=interior)
-    faults += check_turning(case, model.curves)
+    faults += [*check_turning(case, model.curves), *check_facing(case, model)]
     gaps = [
         fault for name, interface in model.interfaces.items()
         for fault in check_gap(case, ("interfaces", name), interface.law, model.curves[name])
@@ -125,11 +133,16 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
-        faults += check_near_misses(case, curves, cracks, shapes.size)
+        faults += check_near_misses(case, curves, cracks)
         closing, cuts = check_closing(case, curves, cracks, loops)
         faults += closing
         notes += cuts
+    if not faults:
+        written = {name for name in curves if case.curves[name].expression}
+        curves, opposite = split_opposite_ends(curves, loops, roles.contacts, written)
+        notes += opposite
     tips = find_tips(curves, cracks)
+    notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
     return _Topology(curves, split.breaks, loops, tips, shapes.size, tuple(notes), tuple(faults))
 

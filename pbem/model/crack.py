@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.case import Case
 from pbem.errors import Fault
 from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve
+from pbem.model.curve import Curve, Leg
 from pbem.model.intersection import inner_points, project
 from pbem.model.junction import format_point
 from pbem.model.loop import Loops, is_inside, loop_legs
 from pbem.model.model import Loop
 
-# A tip nearer to another curve than this part of the model's size is taken for a slip of the pen.
+# A tip nearer to another curve than this part of its crack's last leg is taken for a slip of the pen.
 NEAR_MISS = 1e-6
+# Ends that all but reach another curve, and are listed one by one.
+MOST_NOTES = 6
 
 
 class _Groups:
@@ -64,30 +67,78 @@ def count_leg_ends(curves: Mapping[str, Curve]) -> Counter[complex]:
     return Counter(end for curve in curves.values() for leg in curve.legs for end in (leg.start, leg.end))
 
 
-def check_near_misses(
-    case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], size: float
-) -> list[Fault]:
-    """A fault for every tip so near to another curve that it must have been meant to lie on it."""
-    faults = []
-    tips = find_tips(curves, cracks)
+@dataclass(frozen=True)
+class _Miss:
+    """A tip of a crack near another curve: its place, the distance, and the crack's leg that ends there."""
+
+    crack: str
+    point: complex
+    other: str
+    distance: float
+    leg: Leg
+
+
+def _find_misses(
+    curves: Mapping[str, Curve], tips: Mapping[str, tuple[bool, bool]], reach: Mapping[str, float]
+) -> list[_Miss]:
+    """The nearest curve of every tip that has one, other than its own crack, within the reach (length) of its crack."""
     legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
-    boxes = Boxes.around_legs([leg for _, leg in legs], NEAR_MISS * size)
-    points = [
-        (name, point) for name, ends in tips.items()
-        for is_tip, point in zip(ends, (curves[name].start, curves[name].end), strict=True) if is_tip
-    ]
-    told = set()
-    at, numbers = boxes.find_around(np.array([point for _, point in points], dtype=complex))
+    boxes = Boxes.around_legs([leg for _, leg in legs], max(reach.values(), default=0.0))
+    ends = [
+        (name, *end) for name, (at_start, at_end) in tips.items()
+        for is_tip, end in (
+            (at_start, (curves[name].start, curves[name].legs[0])), (at_end, (curves[name].end, curves[name].legs[-1]))
+        ) if is_tip
+    ]  # fmt: skip
+    found: dict[int, _Miss] = {}
+    at, numbers = boxes.find_around(np.array([point for _, point, _ in ends], dtype=complex))
     for which, number in zip(at.tolist(), numbers.tolist(), strict=True):
-        (name, point), (other, leg) = points[which], legs[number]
-        if other == name or which in told:
+        (name, point, own), (other, leg) = ends[which], legs[number]
+        if other == name:
             continue
         distance = project(leg, point)[1]
-        if distance < NEAR_MISS * size:
-            told.add(which)
-            found = f"crack '{name}' ending at {format_point(point)}, {distance:.2g} off curve '{other}'"
-            faults.append(case.fault(("curves", name), found, "an end on the curve, or clearly away from it"))
-    return faults
+        if distance < reach[name] and (which not in found or distance < found[which].distance):
+            found[which] = _Miss(name, point, other, distance, own)
+    return [found[which] for which in sorted(found)]
+
+
+def check_near_misses(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> list[Fault]:
+    """A fault for every tip so near to another curve that it must have been meant to lie on it."""
+    reach = {name: NEAR_MISS * max(leg.length for leg in curves[name].legs) for name in cracks}
+    expected = "an end on the curve, or clearly away from it"
+    return [
+        case.fault(
+            ("curves", miss.crack),
+            f"crack '{miss.crack}' ending at {format_point(miss.point)}, {miss.distance:.2g} off curve '{miss.other}'",
+            expected,
+        )
+        for miss in _find_misses(curves, find_tips(curves, cracks), reach)
+        if miss.distance < NEAR_MISS * miss.leg.length
+    ]
+
+
+def describe_near_misses(case: Case, curves: Mapping[str, Curve], tips: Mapping[str, tuple[bool, bool]]) -> list[str]:
+    """Notes for tips that miss another curve by less than an element of their crack, as long as the case asks for."""
+    asked = {name: _measure_element(case, curves[name]) for name in tips}
+    notes = [
+        f"Crack '{miss.crack}' ends at {format_point(miss.point)}, {miss.distance:.3g} short of curve '{miss.other}', "
+        f"less than its elements are long ({asked[miss.crack]:.3g}): it has a tip there, and what is left in between "
+        "carries load. An end on the curve would join them."
+        for miss in _find_misses(curves, tips, asked)
+    ]
+    more = len(notes) - MOST_NOTES
+    if more > 1:
+        return [*notes[:MOST_NOTES], f"{more} more ends of cracks miss a curve by less than an element."]
+    return notes
+
+
+def _measure_element(case: Case, curve: Curve) -> float:
+    """Mean length of the elements that the case asks for on a curve."""
+    table = case.curves[curve.name]
+    if table.size is not None:
+        return table.size
+    count = sum(table.elements) if isinstance(table.elements, tuple) else table.elements
+    return curve.length / (count or len(curve.legs))
 
 
 def check_inside(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops) -> list[Fault]:

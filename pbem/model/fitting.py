@@ -14,6 +14,7 @@ from pbem.model.lengths import count_elements
 from pbem.model.model import Region
 from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
+from pbem.model.slot import Side
 
 # Curves and corners that are named in one note.
 MOST_NAMED = 8
@@ -40,8 +41,12 @@ def fit_curves(
     """
     kept = frozenset(name for name, table in case.curves.items() if table.grading != "auto")
     with_elements = tips if case.analysis.tips else {}
-    names = [[side.curve for loop in region.loops for side in loop.sides] + [*region.cracks] for region in regions]
-    sizes = fit_lengths(curves, names, with_elements, kept, case.analysis.order)
+    sides = [
+        [Side(side.curve, side.forward) for loop in region.loops for side in loop.sides]
+        + [Side(crack, None) for crack in region.cracks]
+        for region in regions
+    ]
+    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order)
     if sizes.excess is not None:
         return FittedCurves(curves, (), (), (_refuse(case, sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)

@@ -57,7 +57,7 @@ def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCu
         breaks[other, index][end] = t
     result = {}
     for name, curve in curves.items():
-        pieces = [piece for i, leg in enumerate(curve.legs) for piece in _split_leg(leg, breaks.get((name, i), {}))]
+        pieces = [piece for i, leg in enumerate(curve.legs) for piece in split_leg(leg, breaks.get((name, i), {}))]
         result[name] = Curve(name, tuple(pieces))
     places = {
         name: tuple(point for i in range(len(curve.legs)) for point in breaks.get((name, i), {}))
@@ -66,7 +66,7 @@ def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCu
     return SplitCurves(result, places, tuple(notes))
 
 
-def _split_leg(leg: Leg, points: Mapping[complex, float]) -> list[Leg]:
+def split_leg(leg: Leg, points: Mapping[complex, float]) -> list[Leg]:
     """Pieces between the points (with their fractions); elements in proportion to length, at least one each."""
     cuts = sorted(points.items(), key=lambda item: item[1])
     fractions = [0.0, *(t for _, t in cuts), 1.0]

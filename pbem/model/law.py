@@ -21,6 +21,8 @@ from pbem.model.model import Law
 from pbem.model.touching import find_least, sample_gap
 
 Loc = tuple[str | int, ...]
+# A tensile strength may be written with so few digits that it exceeds cohesion/friction by this part.
+APEX = 1e-4
 
 
 def read_law(case: Case, loc: Loc, table: LawTable, default: Literal["bonded", "coulomb"]) -> tuple[Law, list[Fault]]:
@@ -106,13 +108,19 @@ def _check_effect(case: Case, loc: Loc, table: LawTable, kind: Kind) -> Iterator
 
 
 def _check_strengths(case: Case, loc: Loc, table: LawTable, kind: Kind) -> Iterator[Fault]:
-    """What of a law weakens has to be there before."""
+    """What of a law weakens has to be there before; and no tension beyond the apex of the cone of friction."""
     if kind == "coulomb" and table.friction_dynamic is not None:
         friction = _find_friction(table)
         if table.friction_dynamic > friction * (1 + 1e-12):
             found = f"friction_dynamic = {table.friction_dynamic:g} above the static friction of {friction:g}"
             expected = "friction that falls with slip: friction_dynamic <= friction"
             yield case.fault((*loc, "friction_dynamic"), found, expected)
+    friction = _find_friction(table) if kind == "coulomb" else 0.0
+    if friction > 0 and table.tensile_strength * friction > table.cohesion * (1 + APEX):
+        apex = table.cohesion / friction
+        found = f"tensile_strength = {table.tensile_strength:g} beyond the apex of the cone of friction, {apex:.6g}"
+        expected = f"at most cohesion/friction = {apex:.6g}: faces that slide without any strength carry no tension"
+        yield case.fault((*loc, "tensile_strength"), found, expected)
     strengths = {"coulomb": ("cohesion", "tensile_strength"), "frictionless": ("tensile_strength",)}.get(kind, ())
     if table.cohesion_lost and strengths and not any(getattr(table, key) for key in strengths):
         expected = f"{' or '.join(strengths)} > 0, which can be lost"

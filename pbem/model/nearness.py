@@ -84,10 +84,12 @@ def measure_nearness(points: Complex, pieces: Pieces) -> Real:
 class Surroundings:
     """The faces of all regions, and which of them a leg does not see: itself, and those that it meets at a corner.
 
-    legs: of all curves, one after the other; regions: names of the curves of every region.
+    legs: of all curves, one after the other; regions: names of the curves of every region;
+    blind: further pairs of legs (numbers) that do not see each other.
     """
 
-    def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]]) -> None:
+    def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]],
+                 blind: Sequence[tuple[int, int]] = ()) -> None:
         self.legs: list[Leg] = [leg for curve in curves.values() for leg in curve.legs]
         self.curve = [name for name, curve in curves.items() for _ in curve.legs]
         self.pieces = cut_legs(self.legs)
@@ -99,7 +101,9 @@ class Surroundings:
         for names in regions:
             numbers = [first[name] + at for name in dict.fromkeys(names) for at in range(len(curves[name].legs))]
             self._members.append(np.array(sorted(numbers), dtype=np.int64))
-        self.corners, self._joined = _find_meetings(self.legs, self._members)
+        self.corners, met = _find_meetings(self.legs, self._members)
+        unseen = [min(pair) * len(self.legs) + max(pair) for pair in blind]
+        self._unseen = np.union1d(met, np.array(unseen, dtype=np.int64))
 
     def find_distances(self, leg: Integer, t: Real, points: Complex, reach: Real) -> tuple[Real, Integer]:
         """Distance (k,) from points at the fractions t of legs (k,) to the nearest face that they see within a reach
@@ -117,7 +121,7 @@ class Surroundings:
             which, piece = _surround(self.pieces.select(faces)).find_meeting(Boxes(low, low + 2 * reach[own, None]))
             at, seen = own[which], faces[piece]
             apart = np.abs(piece_of_point[at] - self.pieces.number[seen]) > 1
-            keep = np.where(leg[at] == self.pieces.leg[seen], apart, ~self._is_joined(leg[at], self.pieces.leg[seen]))
+            keep = np.where(leg[at] == self.pieces.leg[seen], apart, ~self._are_blind(leg[at], self.pieces.leg[seen]))
             at, seen = at[keep], seen[keep]
             far = measure_nearness(points[at], self.pieces.select(seen))
             order = np.lexsort((far, at))
@@ -128,9 +132,9 @@ class Surroundings:
             nearest[at[head[better]]] = self.pieces.leg[seen[head[better]]]
         return distance, nearest
 
-    def _is_joined(self, one: Integer, other: Integer) -> NDArray[np.bool_]:
+    def _are_blind(self, one: Integer, other: Integer) -> NDArray[np.bool_]:
         code = np.minimum(one, other) * len(self.legs) + np.maximum(one, other)
-        return np.isin(code, self._joined)
+        return np.isin(code, self._unseen)
 
 
 def _surround(pieces: Pieces) -> Boxes:

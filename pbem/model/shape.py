@@ -82,15 +82,19 @@ def measure(curves: Mapping[str, Curve]) -> tuple[float, float]:
 
 
 def share(total: int, lengths: Sequence[float]) -> list[int]:
-    """Split a number of elements in proportion to lengths, at least one each (more than the total only for that)."""
+    """Split a number of elements in proportion to lengths, at least one each (more than the total only for that).
+
+    Of lengths that are equal but for rounding, which the units and the place of a model decide, the first gets more.
+    """
     whole = sum(lengths)
     wanted = [total * length / whole for length in lengths]
     counts = [max(1, math.floor(want + 1e-9)) for want in wanted]
     while sum(counts) < total:
-        worst = max(range(len(counts)), key=lambda i: (wanted[i] - counts[i], -i))
+        worst = max(range(len(counts)), key=lambda i: (round(wanted[i] - counts[i], 9), -i))
         counts[worst] += 1
     while sum(counts) > max(total, len(counts)):
-        worst = max((i for i in range(len(counts)) if counts[i] > 1), key=lambda i: (counts[i] - wanted[i], i))
+        several = (i for i in range(len(counts)) if counts[i] > 1)
+        worst = max(several, key=lambda i: (round(counts[i] - wanted[i], 9), i))
         counts[worst] -= 1
     return counts
 

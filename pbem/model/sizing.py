@@ -23,6 +23,7 @@ from pbem.model.curve import Curve, Leg
 from pbem.model.lengths import Cells, LengthField
 from pbem.model.nearness import Surroundings
 from pbem.model.sliver import Wedges, find_wedges
+from pbem.model.slot import Side, divide_alike, find_slots
 
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -64,17 +65,21 @@ class Sizes:
 
 def fit_lengths(
     curves: Mapping[str, Curve],
-    regions: Sequence[Sequence[str]],
+    regions: Sequence[Sequence[Side]],
     tips: Mapping[str, tuple[bool, bool]],
     kept: frozenset[str],
     order: int,
 ) -> Sizes:
     """Divide the legs anew whose elements are longer than other faces or a crack tip allow.
 
-    regions: names of the curves of every region; tips: per crack whether its start and its end have tip elements;
+    regions: curves of every region; tips: per crack whether its start and its end have tip elements;
     kept: curves whose grading is the user's, which follow the rule beside tips only; order: of the polynomials.
     """
-    surroundings = Surroundings(curves, regions)
+    every = [leg for curve in curves.values() for leg in curve.legs]
+    slots = find_slots(every, [name for name, curve in curves.items() for _ in curve.legs], regions)
+    surroundings = Surroundings(
+        curves, [[side.curve for side in sides] for sides in regions], [(slot.first, slot.second) for slot in slots]
+    )
     wedges = find_wedges(surroundings)
     field = LengthField(surroundings, wedges, tips, kept, order)
     cells, allowed, excess = _divide(field)
@@ -93,6 +98,7 @@ def fit_lengths(
             if number not in field.kept_legs else [0.0] for at_end in (False, True)
         )
         legs[number] = _divide_evenly(legs[number], np.append(cells.low[own], 1.0), counts[own], begin, end)
+    divide_alike(legs, slots, field.kept_legs)
     names = surroundings.curve
     result = {
         name: Curve(name, tuple(legs[at] for at in group))

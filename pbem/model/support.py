@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -18,8 +19,10 @@ from pbem.model.touching import measure_opening
 
 Tie = Literal["both", "normal", "none"]
 
-# Faces nearer to each other than this part of the model's size are taken to touch.
+# Faces nearer to each other than this part of the shorter of their curves are taken to touch.
 TOUCHING = 1e-6
+# A distance is known to so many roundings of the largest coordinate that it was computed from.
+ROUNDINGS = 64
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,10 @@ def _link_regions(
 def _touches(model: Model, joint: Interface | Contact) -> bool:
     if isinstance(joint, Interface) and not isinstance(joint.law.gap, str):
         return joint.law.gap <= 0
-    return measure_opening(model, joint) <= TOUCHING * model.size
+    names = [joint.name] if isinstance(joint, Interface) else [joint.first, joint.second]
+    shorter = min(model.curves[name].length for name in names)
+    largest = max(abs(point) for name in names for leg in model.curves[name].legs for point in (leg.start, leg.end))
+    return measure_opening(model, joint) <= max(TOUCHING * shorter, ROUNDINGS * sys.float_info.epsilon * largest)
 
 
 def _describe(vector: NDArray[np.float64], names: list[str], center: complex, scale: float) -> FreeMotion:

@@ -66,12 +66,14 @@ class Tips:
 class Energies:
     """Over the k stored steps (k,), per unit of thickness (stress times length squared), since before any load.
 
-    external: work of loads and conditions; elastic: stored; dissipated: by friction and by bonds that were lost.
+    external: work of loads and conditions; elastic: stored; dissipated: by friction and by bonds that were lost;
+    released: set free where faces ran away within a step. external = elastic + dissipated + released.
     """
 
     external: Real
     elastic: Real
     dissipated: Real
+    released: Real
 
 
 @dataclass(frozen=True)

@@ -240,11 +240,21 @@ def _contact_rows(results: Results) -> list[list[str]]:
 
 def _describe_energy(results: Results) -> list[str]:
     """The balance, and what it lacks: a measure of the mesh."""
-    external, elastic, dissipated = (float(each[-1]) for each in vars(results.energy).values())
-    scale = max(abs(external), abs(elastic), dissipated)
-    lacks = (external - elastic - dissipated) / scale if scale else 0.0
-    return [f"external work {_number(external)} = elastic {_number(elastic)} + dissipated {_number(dissipated)}, "
-            f"to {abs(lacks):.1e} of the largest"]
+    external, elastic, dissipated, released = (float(each[-1]) for each in vars(results.energy).values())
+    scale = max(abs(external), abs(elastic), dissipated, released)
+    lacks = (external - elastic - dissipated - released) / scale if scale else 0.0
+    free = f" + released {_number(released)}" if released else ""
+    return [f"external work {_number(external)} = elastic {_number(elastic)} + dissipated {_number(dissipated)}{free}, "
+            f"to {abs(lacks):.1e} of the largest", *_shorten(_describe_runaways(results), 6)]
+
+
+def _describe_runaways(results: Results) -> list[str]:
+    """A sentence for every stored step in which energy was released, or a step before that was not stored."""
+    before = {name: np.concatenate([[0.0], values[:-1]]) for name, values in vars(results.energy).items()}
+    released = results.energy.released - before["released"]
+    at_hand = np.abs(before["elastic"]) + np.abs(results.energy.external - before["external"])
+    return [f"in step {results.steps.number[k]} faces ran away and released {100 * released[k] / at_hand[k]:.2g} % of "
+            f"the stored energy ({_number(released[k])})" for k in np.flatnonzero(released > 0)]
 
 
 def _describe_tips(results: Results) -> list[str]:

@@ -34,12 +34,22 @@ class PairRecord:
 
 @dataclass(frozen=True)
 class PairWork:
-    """In a step: work of the tractions on the jumps by the trapezoidal rule; what is stored more in the joints; what is
-    dissipated (>= 0). The rest went to fluid in open pairs, or is what the rule makes of pairs that changed."""
+    """In a step, per unit of thickness.
 
-    trapezoid: float
+    stored: what is stored more in the elastic joints. dissipated (>= 0): by friction, by its law's own integral, and by
+    bonds that are lost, whose traction falls in proportion to the jump. fluid: work of the fluid on the faces. excess:
+    what the tractions, falling in proportion to the jumps, do beyond what is stored and dissipated (negative where a
+    pair begins to slip within the step).
+    friction (<= dissipated): what the laws take if bonds that are lost take nothing; surplus (m,): of each pair, what
+    its traction does beyond this and the joint. Where faces run away this is set free.
+    """
+
     stored: float
     dissipated: float
+    fluid: float
+    excess: float
+    friction: float
+    surplus: Real
 
 
 def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairRecord:
@@ -63,29 +73,63 @@ def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairR
 
 def measure_stored(weight: Real, record: PairRecord) -> float:
     """Energy in the elastic joints: half the traction on the joint's part of the jump."""
-    normal, tangential = record.g_n - record.rigid_n, record.g_s - record.rigid_s
-    return 0.5 * float(weight @ (record.p_n * normal + record.p_s * tangential))
+    return float(weight @ _store(record))
 
 
 def measure_work(laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord) -> PairWork:
-    """The work in a step; weight (m,): length of the boundary that belongs to each pair.
-
-    Friction: the mean of its tractions at both ends of the step on the slip. A pair that begins to slip, or turns back,
-    within the step has slipped from the friction bound that it started with on, not from the traction that it bore
-    while it stuck. Bonds that part: their shear and their tension beyond the fluid pressure, falling to the new values.
-    """
-    trapezoid = 0.5 * ((old.p_n + new.p_n) * (new.g_n - old.g_n) + (old.p_s + new.p_s) * (new.g_s - old.g_s))
+    """The work in a step; weight (m,): length of the boundary that belongs to each pair."""
+    moved, slid = new.g_n - old.g_n, new.g_s - old.g_s
+    pressed = 0.5 * (old.p_n + old.pressure + new.p_n + new.pressure) * moved
+    trapezoid = pressed + 0.5 * (old.p_s + new.p_s) * slid
+    stored = _store(new) - _store(old)
     slipped, parted = new.rigid_s - old.rigid_s, new.rigid_n - old.rigid_n
-    limit = np.where(old.broken, 0.0, laws.tensile_strength) - old.pressure
-    bound = evaluate_strength(laws, np.minimum(old.p_n, limit), old.path, old.pressure, old.broken).bound
-    closed = old.mode != OPEN
-    slides = (new.mode == SLIP) & closed & (new.broken == old.broken)
-    begins = np.where(slides, np.where(slipped < 0, -bound, bound), np.where(closed, old.p_s, 0.0))
-    friction = 0.5 * (begins + new.p_s) * slipped
+    closed, lost = old.mode != OPEN, new.broken & ~old.broken
     tension = 0.5 * (np.where(closed, old.p_n + old.pressure, 0.0) + new.p_n + new.pressure) * parted
-    dissipated = np.maximum(friction, 0.0) + np.where(parted > 0, np.maximum(tension, 0.0), 0.0)
+    torn = np.where(parted > 0, np.maximum(tension, 0.0), 0.0)
+    slides = (new.mode == SLIP) & closed
+    falling = np.maximum(0.5 * (np.where(closed, old.p_s, 0.0) + new.p_s) * slipped, 0.0)
+    by_law = _integrate_bound(laws, old, new, slipped) if slides.any() else falling
+    dissipated = np.where(slides & ~lost, by_law, falling) + torn
+    friction = np.where(slides, by_law, np.where(lost, 0.0, falling))
     return PairWork(
-        float(weight @ trapezoid),
-        measure_stored(weight, new) - measure_stored(weight, old),
-        float(weight @ dissipated),
+        stored=float(weight @ stored),
+        dissipated=float(weight @ dissipated),
+        fluid=float(weight @ (0.5 * (old.pressure + new.pressure) * moved)),
+        excess=float(weight @ (trapezoid - stored - dissipated)),
+        friction=float(weight @ friction),
+        surplus=weight * (trapezoid - stored - friction),
     )
+
+
+def _store(record: PairRecord) -> Real:
+    normal, tangential = record.g_n - record.rigid_n, record.g_s - record.rigid_s
+    return 0.5 * (record.p_n * normal + record.p_s * tangential)
+
+
+# Gauss points and weights on (0, 1).
+POINTS, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(8)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(8)[1])
+
+
+def _integrate_bound(laws: PairLaws, old: PairRecord, new: PairRecord, slipped: Real) -> Real:
+    """Integral (m,) of the friction bound over the slip of the step, with normal traction and fluid pressure linear in
+    the slip; pairs whose bonds are lost have lost them from the beginning.
+
+    By Gauss points on two pieces that meet where friction has fallen to its dynamic value: exact for linear weakening.
+    """
+    length = np.abs(slipped)
+    cut = np.full(laws.count, 0.5)
+    for group in laws.strengths:
+        if "slip_distance" in group.parameters:
+            left = group.parameters["slip_distance"] - old.path[group.pairs]
+            whole = length[group.pairs]
+            cut[group.pairs] = np.clip(left / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
+    strength = np.where(new.broken, 0.0, laws.tensile_strength)
+    total = np.zeros(laws.count)
+    for begin, size in ((np.zeros(laws.count), cut), (cut, 1 - cut)):
+        for point, weight in zip(POINTS, WEIGHTS, strict=True):
+            at = begin + size * point
+            pressure = old.pressure + at * (new.pressure - old.pressure)
+            p_n = np.minimum(old.p_n + at * (new.p_n - old.p_n), strength - pressure)
+            bound = evaluate_strength(laws, p_n, old.path + at * length, pressure, new.broken).bound
+            total += weight * size * length * bound
+    return total

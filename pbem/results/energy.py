@@ -16,6 +16,11 @@ again Betti's theorem, between the boundary and a large circle. The work in a st
 t times that of u on outer curves, b times that of I, s0 + far times that of S. Together they are the increment of W and
 the same sum over the pairs, tractions times jumps, as exactly as the discrete fields obey Betti's theorem from step to
 step; in one step from rest, exactly.
+
+Where faces lose strength as they slip or part, there may be no equilibria from the beginning of a step to its end: they
+run away. Loads that grow steadily do between t du and (t + dt) du: the trapezoid is off by half of dt du at most. What
+the tractions of the pairs do in excess of their laws' integrals can be an error of the trapezoid up to there; where it
+is more it was set free, under loads that hardly change, and the trapezoid on the boundary holds.
 """
 
 from __future__ import annotations
@@ -32,7 +37,14 @@ from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.interpolation import interpolate_tips, locate_nodes, stretch_elements
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.model.model import Model
-from pbem.results.dissipation import PairRecord, measure_stored, measure_work, record_pairs, record_pairs_at_rest
+from pbem.results.dissipation import (
+    PairRecord,
+    PairWork,
+    measure_stored,
+    measure_work,
+    record_pairs,
+    record_pairs_at_rest,
+)
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Step
 
@@ -43,6 +55,12 @@ Real = NDArray[np.float64]
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Gauss points along tip elements, in the root of the distance from the tip.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
+# A step within which faces ran away released at least this part of the energy that was stored.
+LEAST_RELEASED = 0.01
+# Interfaces that took part in it have at least this part of what was released.
+LEAST_PART = 0.01
+# Of these, those that are named.
+MOST_NAMES = 4
 
 
 @dataclass(frozen=True)
@@ -52,11 +70,24 @@ class Energy:
     external: work of prescribed tractions and displacements, fluid pressure, weight, and stress far away.
     elastic: stored in the regions, in springs under outer curves and in the elastic joints of interfaces.
     dissipated: by friction and by bonds that parted; it never falls.
+    released: set free where faces ran away within a step, as motion that the quasi-static balance does not follow.
+    external = elastic + dissipated + released, as exactly as the discrete fields obey Betti's theorem.
     """
 
     external: float
     elastic: float
     dissipated: float
+    released: float = 0.0
+
+
+@dataclass(frozen=True)
+class Runaway:
+    """A step within which faces ran away: released energy; its share of what was stored before, with the work of the
+    loads in the step; and the interfaces and cracks that set it free, the largest first."""
+
+    released: float
+    share: float
+    names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -114,26 +145,58 @@ class EnergyBalance:
         ]  # fmt: skip
         self._in_situ = self._sample_in_situ()
         self._reached = reached or Energy(0.0, 0.0, 0.0)
+        self.runaway: Runaway | None = None
         self._state = self._describe_rest() if last is None else self._describe(last)
 
     def add(self, step: Step) -> Energy:
-        """The energies after the next step."""
-        old, new = self._state, self._describe(step)
+        """The energies after the next step; `runaway` tells whether faces ran away in it."""
+        old, new, before = self._state, self._describe(step), self._reached
         nodes = self._outer.node
         moved = (new.displacement - old.displacement)[nodes]
         work = _dot(self._weight[nodes], 0.5 * (old.traction + new.traction)[nodes], moved)
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
         pairs = measure_work(self.laws, self._pair_weight, old.pairs, new.pairs)
-        # What springs take from the boundary they store. What pairs take is stored, dissipated, or was done by fluid;
-        # where a pair changed within the step, the trapezoid on the boundary is off by as much as on the pair.
-        work += new.springs - old.springs + pairs.stored + pairs.dissipated - pairs.trapezoid
+        # What springs take from the boundary they store, and what fluid does is work of its own.
+        work += new.springs - old.springs + pairs.fluid
         self._state = new
+        self.runaway = self._find_runaway(old, new, moved, pairs, abs(before.elastic) + abs(work))
+        dissipated, released = pairs.dissipated, 0.0
+        if self.runaway is not None:
+            dissipated, released = pairs.friction, self.runaway.released
+        else:
+            # Where a pair changed within the step, the trapezoid on the boundary is off by as much as on the pair.
+            work -= pairs.excess
         self._reached = Energy(
-            external=self._reached.external + work,
+            external=before.external + work,
             elastic=new.stored + new.springs + measure_stored(self._pair_weight, new.pairs),
-            dissipated=self._reached.dissipated + pairs.dissipated,
+            dissipated=before.dissipated + dissipated,
+            released=before.released + released,
         )
         return self._reached
+
+    def _find_runaway(
+        self, old: _State, new: _State, moved: Complex, pairs: PairWork, at_hand: float
+    ) -> Runaway | None:
+        """What was set free in the step, if growing loads do not explain it; at_hand: energy stored and supplied."""
+        released = float(pairs.surplus.sum())
+        if not released > max(LEAST_RELEASED * at_hand, self._measure_increments(old, new, moved)):
+            return None
+        names = self._mesh.interface_names
+        by_name = np.bincount(self._mesh.pairs.interface, pairs.surplus, minlength=len(names))
+        largest = np.argsort(-by_name, kind="stable")
+        part = tuple(names[number] for number in largest if by_name[number] > LEAST_PART * released)
+        return Runaway(released, released / at_hand, part)
+
+    def _measure_increments(self, old: _State, new: _State, moved: Complex) -> float:
+        """Half of what the increments of all loads and reactions do in the step, each by its size."""
+        outer, weight = self._outer, self._weight[self._outer.node]
+        traction, away = (new.traction - old.traction)[outer.node, None], moved[:, None]
+        along, by = ((np.conj(outer.direction) * values).real for values in (traction, away))
+        # Springs follow the displacement, of which the trapezoid is exact.
+        total = float(weight @ np.abs((along + outer.stiffness * by) * by).sum(axis=1))
+        total += float(np.abs((new.load - old.load) * (new.conjugate - old.conjugate)).sum())
+        pressure, opened = new.pairs.pressure - old.pairs.pressure, new.pairs.g_n - old.pairs.g_n
+        return 0.5 * (total + float(self._pair_weight @ np.abs(pressure * opened)))
 
     @property
     def _pair_weight(self) -> Real:
@@ -222,6 +285,16 @@ def weigh_faces(mesh: Mesh) -> Real:
         nodes = tips[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
         weight[nodes] = np.einsum("eq,eqj->ej", length, shapes)
     return np.concatenate([weight, weight[second_face_nodes(mesh)]])
+
+
+def describe_runaway(step: Step, runaway: Runaway) -> str:
+    """What a user is told of a step within which faces ran away."""
+    named, more = runaway.names[:MOST_NAMES], len(runaway.names) - MOST_NAMES
+    names = ", ".join(f"'{name}'" for name in named) + (f" and {more} more" if more > 0 else "")
+    return (
+        f"Step {step.number} is no path of equilibria: {names} ran away and released {100 * runaway.share:.2g} % of "
+        f"the stored energy ({runaway.released:.4g})."
+    )
 
 
 def _dot(weight: Real, traction: Complex, displacement: Complex) -> float:

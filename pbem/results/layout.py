@@ -32,7 +32,7 @@ PAIR_DATASETS = {
 # What an interface shows of them; the rest is for going on with a run.
 SHOWN = ("mode", "opening", "slip", "traction_n", "traction_s")
 FACTORS = ("KI", "KII")
-ENERGIES = ("external", "elastic", "dissipated")
+ENERGIES = ("external", "elastic", "dissipated", "released")
 CHUNK_BYTES = 32768
 
 
@@ -84,7 +84,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     _write_tips(file.create_group("tips"), together.create_group("tips"), list(model.crack_tips))
     energy = file.create_group("energy")
     for name in ENERGIES:
-        _create_growing(energy, name, (), "f8")
+        create_energy(energy, name)
     if model.interior_points:
         interior = file.create_group("interior")
         interior["position"] = to_columns(np.array(model.interior_points))
@@ -205,6 +205,11 @@ OTHERS = ("nodes", "elements", "contact", "reactions", "tips")
 def find_growing(file: h5py.File) -> list[h5py.Group]:
     """The groups of what grows with the steps."""
     return [item for name, item in file.items() if name not in OTHERS and isinstance(item, h5py.Group)]
+
+
+def create_energy(group: h5py.Group, name: str) -> h5py.Dataset:
+    """An energy (k,) that grows with the steps."""
+    return _create_growing(group, name, (), "f8")
 
 
 def append_row(dataset: h5py.Dataset, row: NDArray[Any]) -> None:

@@ -167,7 +167,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         pairs=AllPairs(path, read_names(file["contact"]), k),
         groups=tuple(Group(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
         tips=_read_tips(file, k),
-        energy=Energies(*(freeze(file["energy"][kind][:k]) for kind in ENERGIES)),
+        energy=Energies(*(freeze(_read_energy(file, kind, k)) for kind in ENERGIES)),
         interior=_read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
     )
@@ -179,6 +179,12 @@ def _read_status(path: Path, attributes: Mapping[str, Any]) -> str:
     if status not in STATUSES:
         raise ValueError(f"unknown status {status}")
     return "stopped" if status == "running" and not is_being_written(path) else status
+
+
+def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
+    """Files of earlier versions tell nothing of what was released, which they added to the rest."""
+    group = file["energy"]
+    return np.asarray(group[kind][:k]) if kind in group or kind != "released" else np.zeros(k)
 
 
 def _read_steps(file: h5py.File) -> Steps:

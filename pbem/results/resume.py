@@ -12,7 +12,16 @@ from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.energy import Energy
-from pbem.results.layout import ENERGIES, PAIR_DATASETS, count_steps, find_growing, join_pairs, to_columns
+from pbem.results.layout import (
+    ENERGIES,
+    PAIR_DATASETS,
+    count_steps,
+    create_energy,
+    extend,
+    find_growing,
+    join_pairs,
+    to_columns,
+)
 from pbem.solve.step import ContactState, Step
 
 
@@ -57,7 +66,10 @@ def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
 def read_last_energy(file: h5py.File) -> Energy:
     """The energies at the last step that was stored completely."""
     k = count_steps(file)
-    return Energy(**{kind: float(file["energy"][kind][k - 1]) for kind in ENERGIES})
+    group = file["energy"]
+    if "released" not in group:  # a file of an earlier version
+        extend(create_energy(group, "released"), np.zeros(len(group["external"])))
+    return Energy(**{kind: float(group[kind][k - 1]) for kind in ENERGIES})
 
 
 def truncate(file: h5py.File, last_number: int) -> None:

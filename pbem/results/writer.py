@@ -18,7 +18,8 @@ from pbem.contact.custom import find_fault
 from pbem.errors import ConvergenceError, LawError, ResultFileError, StopError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
-from pbem.results.energy import Energy, EnergyBalance
+from pbem.results.coverage import describe_sparse_contacts
+from pbem.results.energy import Energy, EnergyBalance, describe_runaway
 from pbem.results.layout import (
     ENERGIES,
     FACTORS,
@@ -142,8 +143,10 @@ class ResultWriter:
     def _file(self) -> h5py.File:
         return self._storage.file
 
-    def append(self, step: Step) -> None:
+    def append(self, step: Step) -> tuple[str, ...]:
         """Store the step if it is its turn, and its iterations in any case; all of it is on the disk, or nothing.
+
+        Gives what the user should know.
 
         Raises StorageError if the disk has no room for it, LawError if a custom law fails; the file then holds the
         steps before.
@@ -162,6 +165,10 @@ class ResultWriter:
             self._storage.commit()
         except OSError as error:
             raise StorageError(str(self.path), f"no room for step {step.number} ({error.strerror or error})") from error
+        notes = [] if self._balance.runaway is None else [describe_runaway(step, self._balance.runaway)]
+        if step.last_of_stage and step.stage == len(self._model.stages) - 1:
+            notes += describe_sparse_contacts(self._model, self._mesh, step.contact.mode)
+        return tuple(notes)
 
     def complete(self, interior: Interior) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""

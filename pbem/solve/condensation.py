@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from pbem.mesh.numbering import number_components
+
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
@@ -114,6 +116,25 @@ def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
     others = np.flatnonzero(rest[::2])
     unknowns[rest] = np.linalg.solve(split.a_tangent[others], rhs[rest].reshape(-1, 2, 1)).ravel()
     return PairSolution(unknowns.reshape(-1, 2), rcond, residual)
+
+
+def respond_pairs(coupling: Real, split: Split, at: Integer, a_offset: Real, b_offset: Real) -> Real:
+    """x (2 s, 2 s) of the pairs at (s,) among k, for offsets of these pairs one by one: a and b (s, 2, 2)."""
+    changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
+    kept = np.union1d(changed, at)
+    own, place = number_components(kept), np.searchsorted(kept, at)
+    tangent, matrix = split.take(kept), np.zeros((2 * len(kept), 2 * len(kept)))
+    forces = np.zeros((2 * len(kept), 2 * len(at)))
+    first, second = coupling[np.ix_(own, own[::2])], coupling[np.ix_(own, own[1::2])]
+    pairs, columns = np.arange(len(kept)), np.arange(len(at))
+    for j in range(2):
+        matrix[:, j::2] = first * tangent.b_tangent[:, 0, j] + second * tangent.b_tangent[:, 1, j]
+        forces[:, j::2] = first[:, place] * b_offset[:, 0, j] + second[:, place] * b_offset[:, 1, j]
+        for i in range(2):
+            matrix[2 * pairs + i, 2 * pairs + j] += tangent.a_tangent[:, i, j]
+            forces[2 * place + i, 2 * columns + j] += a_offset[:, i, j]
+    result: Real = np.linalg.solve(matrix, -forces)[number_components(place)]
+    return result
 
 
 def _solve_dense(matrix: Real, rhs: Real) -> tuple[Real, float]:

@@ -9,7 +9,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import G_N, P_N, P_S, Linearisation
 from pbem.parallel import broadcast, gather_parts
-from pbem.solve.condensation import PairBases, PairSolution, Split, solve_pairs
+from pbem.solve.condensation import PairBases, PairSolution, Split, respond_pairs, solve_pairs
 from pbem.solve.effort import Effort
 from pbem.solve.linear import choose_method
 from pbem.solve.load_basis import LoadBasis
@@ -19,6 +19,7 @@ from pbem.solve.reference import Reference, apply_narrow
 from pbem.solve.tangent import Solved, describe_residual
 
 Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 # A condensed system of a worse reciprocal condition is not trusted: the factors are made anew in the present modes.
@@ -189,6 +190,25 @@ class CondensedTangent:
         others = (unknowns[of_pairs[rest]] - split.a_offset[rest])[:, :, None]
         unknowns[of_pairs[rest]] = np.linalg.solve(split.a_tangent[rest], others)[:, :, 0]
         return unknowns, found
+
+    def respond(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
+    ) -> Real:
+        """See AnyTangent; by the first rank, from the columns of these pairs."""
+        own = np.searchsorted(self.varying, pairs)
+        missing = np.setdiff1d(own, self.columns.known)
+        if len(missing):
+            self.effort.measure(2 * len(missing), lambda: self.columns.add(missing))
+        known = self.columns.known
+        along = self.bases.inverse[own] @ (directions / self.bases.units[:, None])
+        found: Real | None = None
+        if self.problem.comm.rank == 0:
+            order = np.argsort(known)
+            at = order[np.searchsorted(known, own, sorter=order)]
+            found = respond_pairs(self.columns.coupling, self._split(law).take(known), at, along[:, :2], along[:, 2:])
+        found = broadcast(self.problem.comm, found)
+        assert found is not None
+        return found
 
     def destroy(self) -> None:
         """See AnyTangent."""

@@ -14,9 +14,10 @@ from pbem.parallel import gather_parts
 from pbem.solve.linear import choose_method
 from pbem.solve.problem import Problem
 from pbem.solve.reference import Reference
-from pbem.solve.tangent import Solved, describe_residual
+from pbem.solve.tangent import Solved, describe_residual, select_states
 
 Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
 
 # Of GMRES with old factors: fewer are not worth a try, more take too much storage.
 LEAST_ITERATIONS, MOST_ITERATIONS = 4, 100
@@ -67,6 +68,15 @@ class FactoredTangent:
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """See AnyTangent; every solution is checked."""
         return solved
+
+    def respond(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
+    ) -> Real:
+        """See AnyTangent."""
+        self.reference.present = constraints.matrix
+        states, unknowns = select_states(self.problem, load, law, pairs, directions)
+        forces = (self.problem.operator.apply(-states[:, k]) for k in range(states.shape[1]))
+        return np.stack([self._solve_by_any(constraints, each)[unknowns] for each in forces], axis=1)
 
     def solve_system(self, rhs: Real) -> Real:
         """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side, by the factors."""

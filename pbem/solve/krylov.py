@@ -16,9 +16,10 @@ from pbem.solve.choice import make_dense_tangent
 from pbem.solve.linear import PREFIX, PETSc, petsc_options
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
-from pbem.solve.tangent import AnyTangent, Solved
+from pbem.solve.tangent import AnyTangent, Solved, select_states
 
 Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
 
 # Most iterations of GMRES for one linear system, without restart.
 MOST_ITERATIONS = 300
@@ -30,6 +31,8 @@ SLOW = 60
 WIDENING, MOST_WIDENING = 4, 16
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
+# Responses of single pairs are found to this part of their forces.
+RESPONSE = 1e-3
 
 
 class KrylovTangent:
@@ -131,6 +134,23 @@ class KrylovTangent:
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """The same: every solution has its true residual."""
         return solved
+
+    def respond(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
+    ) -> Real:
+        """See AnyTangent; to RESPONSE of the forces only, as the modes that follow are judged by a full solution."""
+        self.constraints = constraints
+        states, unknowns = select_states(self.problem, load, law, pairs, directions)
+        result = np.empty((len(unknowns), len(unknowns)))
+        usual = self._solver.getTolerances()
+        self._solver.setTolerances(rtol=RESPONSE)
+        for k in range(states.shape[1]):
+            self._right.setArray(-self.problem.operator.apply(states[:, k]))
+            self._left.set(0.0)
+            self._solver.solve(self._right, self._left)
+            result[:, k] = self.gather(np.array(self._left.getArray()))[unknowns]
+        self._solver.setTolerances(rtol=usual[0])
+        return result
 
     def _guess(self, right: Real) -> Real:
         """This rank's part of that multiple of the last solution whose product is nearest to the right-hand side.

@@ -12,6 +12,7 @@ from pbem.errors import ConvergenceError
 from pbem.solve.krylov import make_tangent
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
+from pbem.solve.proportional import is_proportional
 from pbem.solve.step import ContactState, Reporter, Step
 from pbem.solve.tangent import AnyTangent
 
@@ -42,8 +43,9 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
 def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
     """Yield the converged steps of all stages in turn.
 
-    A step that fails is halved, down to solver.min_step of a stage; the factors of a stage's own steps are always met.
-    Raises ConvergenceError with the reason of the last failure, after the steps before it were yielded.
+    A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction;
+    the factors of a stage's own steps are always met. Raises ConvergenceError with the reason of the last failure, or
+    "limit load", after the steps before it were yielded.
     """
     begin = start or start_from_rest(problem)
     tangent = make_tangent(problem)
@@ -79,15 +81,42 @@ def _advance(
             return solve_step(problem, tangent, memory, problem.evaluate_load(stage, target), reporter), target
         except ConvergenceError as error:
             half = 0.5 * (target - reached)
+            if is_proportional(problem, memory, stage, reached):
+                raise _end_at_rest(problem, stage, target, error) from error
             if half < problem.model.solver.min_step:
-                name = problem.model.stages[stage].name
-                raise ConvergenceError(
-                    error.reason,
-                    f"stage {name!r} stopped at the fraction {reached:.6g}; the step to {target:.6g} failed and is the "
-                    f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}",
-                ) from error
+                raise _end_march(problem, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
             target = reached + half
+
+
+def _end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceError) -> ConvergenceError:
+    name = problem.model.stages[stage].name
+    return ConvergenceError(
+        error.reason,
+        f"stage {name!r} stopped at the fraction 0; the load grows in proportion from rest, and what fails at "
+        f"{target:.6g} fails at every fraction: {error.detail}",
+    )
+
+
+def _end_march(
+    problem: Problem, stage: int, reached: float, target: float, error: ConvergenceError
+) -> ConvergenceError:
+    """The error of a step that is as small as allowed.
+
+    A contact that held up to here and becomes a mechanism under more load has come to the largest load that it bears.
+    """
+    name = problem.model.stages[stage].name
+    if error.reason == "free motion" and (stage > 0 or reached > 0):
+        return ConvergenceError(
+            "limit load",
+            f"limit load reached at fraction {reached:.6g} of stage {name!r}, no equilibrium at {target:.6g}: there "
+            f"{error.detail}, or prescribe a displacement in place of the load",
+        )
+    return ConvergenceError(
+        error.reason,
+        f"stage {name!r} stopped at the fraction {reached:.6g}; the step to {target:.6g} failed and is the "
+        f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}",
+    )
 
 
 def describe_step(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,6 @@ from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
-    Frozen,
     Linearisation,
     Proposal,
     find_failures,
@@ -21,11 +21,17 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.support import close_nearest_pairs, find_ties
+from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
+from pbem.parallel import broadcast, do_on_first
+from pbem.solve.cascade import run_cascade
+from pbem.solve.hold import Hold, describe_free_motion, refuse_free_motion
 from pbem.solve.problem import Problem
+from pbem.solve.response import find_response
+from pbem.solve.search import Caution, Search
 from pbem.solve.step import Iteration, Reporter
 from pbem.solve.tangent import AnyTangent, Solved
+from pbem.solve.unsettled import describe_unsettled
 
 Real = NDArray[np.float64]
 
@@ -46,44 +52,28 @@ class Solution:
     iterations: tuple[Iteration, ...]
 
 
-@dataclass(frozen=True)
-class Caution:
-    """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest.
-
-    frozen: what of the friction bound is taken as it is at the last iterate.
-    """
-
-    softening: float
-    share: float
-    frozen: Frozen = "nothing"
-
-
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# Each cycle of modes moves one level down; the last changes one pair at a time.
-CAUTIONS = (
-    Caution(1.0, 0.0),
-    Caution(0.1, 0.0, "slip"),
-    Caution(0.1, 0.0, "strength"),
-    Caution(0.01, 0.3, "strength"),
-    Caution(0.01, 1.0, "strength"),
-)
+# The most pairs that are solved by pivoting; with the hierarchical operator each costs two solutions by GMRES.
+MOST_PIVOTED, MOST_PIVOTED_BY_GMRES = 300, 12
 
 
 def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
     """Converge one load step from the memory of the last.
 
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
-    mode (but for friction that depends on slip), so that a step in which no mode changes takes one iteration. Brittle
-    bonds fail, those with the largest overload first, only when the modes of all other pairs have settled. All
-    decisions are taken from gathered values.
-    Raises ConvergenceError: "free motion", "mode cycle", "iteration limit", "singular tangent", "linear solver".
+    mode (but for friction that depends on slip), so that a step in which no mode changes takes one iteration. How the
+    modes are searched for is said in pbem.solve.search. Brittle bonds fail, those with the largest overload first, only
+    when the modes of all other pairs have settled. All decisions are taken by the first rank.
+    Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
+    "singular tangent", "linear solver".
     """
     laws = problem.laws
-    modes = _hold_free_bodies(problem, memory.modes, laws.gap)
+    hold = Hold(problem)
+    modes = hold.apply(memory.modes, laws.gap, np.zeros(laws.count))
     normal_traction, slip = memory.normal_traction, memory.slip
-    search = _Search(problem.model.solver.newton_max_iterations, modes)
+    search = Search(MOST_PIVOTED_BY_GMRES if problem.groups else MOST_PIVOTED, laws.follows)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -98,21 +88,81 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
                 solved = tangent.check(solved, constraints, load, law)
                 outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
         except ConvergenceError:
-            _refuse_free_motion(problem, modes)
+            refuse_free_motion(problem, modes)
             raise
-        pairs, proposal, failing = outcome.pairs, outcome.proposal, outcome.failing
-        if outcome.settled and failing.any():
-            memory = replace(memory, broken=memory.broken | failing)
+        pairs, proposal = outcome.pairs, outcome.proposal
+        fails, cascade = outcome.settled and bool(outcome.failing.any()), None
+        if fails:
+            floor = _find_floor(problem, solved)
+            cascade = run_cascade(
+                problem, tangent, modes, memory, load, law, solved, outcome.failing, floor, search.most_pivoted
+            )
+            memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
-            search.restart(modes)
+            search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
         reporter.iterate(iterations[-1])
-        if outcome.settled and not failing.any():
-            _refuse_free_motion(problem, modes)
+        if outcome.settled and not fails:
+            refuse_free_motion(problem, modes)
+            for note in hold.describe(modes):
+                reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
-        modes = _hold_free_bodies(problem, limit_changes(modes, proposal, search.caution.share), pairs.g_n)
+        search.note(proposal)
+        if len(search.counts) == problem.model.solver.newton_max_iterations:
+            raise _end(problem, "iteration limit", proposal, search)
+        chosen = cascade.modes if cascade else _pivot(problem, tangent, modes, memory, load, law, solved, search)
+        if chosen is None:
+            chosen = limit_changes(modes, proposal, search.caution.share)
+            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
+                raise _end(problem, "mode cycle", proposal, search)
+        modes = broadcast(problem.comm, hold.apply(chosen, pairs.g_n, plastic_slip(laws, pairs) - memory.slip, modes))
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
-        search.note(problem, modes, proposal)
+
+
+def _end(problem: Problem, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
+    """The error of a search that does not settle, with the truest reason that is known."""
+    free = describe_free_motion(problem, proposal.modes)
+    return free or describe_unsettled(problem, reason, proposal, search.failed_group, search.failed)
+
+
+def _pivot(
+    problem: Problem, tangent: AnyTangent, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
+    solved: Solved, search: Search,
+) -> ModeState | None:
+    """The modes with those of the search's group solved by pivoting; None if it has none or they have no solution.
+
+    Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
+    """
+    group = search.choose_group()
+    if not len(group):
+        return None
+    response = find_response(problem, tangent, load, law, solved, group)
+    subset = take_subset(problem.laws, memory, load.pressure, modes, group)
+    judge = _make_judge(problem, solved, search.caution)
+
+    def settle() -> Settled:
+        return settle_subset(subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure))
+
+    found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
+    if search.conclude(found):
+        raise _end(problem, "no admissible modes", search.proposal, search)
+    if found.modes is None:
+        return None
+    mode, sign = modes.mode.copy(), modes.sign.copy()
+    mode[group], sign[group] = found.modes.mode, found.modes.sign
+    return ModeState(mode[problem.laws.leader], sign[problem.laws.leader])
+
+
+def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:
+    """The choice of modes, with what it takes for rounding."""
+    floor = _find_floor(problem, solved)
+    return lambda laws, modes, state, memory, pressure: propose_modes(
+        laws, modes, state, memory, pressure, caution.softening, floor
+    )
+
+
+def _find_floor(problem: Problem, solved: Solved) -> float:
+    return STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
 
 
 @dataclass(frozen=True)
@@ -128,61 +178,18 @@ class _Outcome:
 def _judge(
     problem: Problem, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved, caution: Caution
 ) -> _Outcome:
-    laws = problem.laws
-    pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
-    floor = STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
-    proposal = propose_modes(laws, modes, pairs, memory, load.pressure, caution.softening, floor)
-    law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
-    settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-    return _Outcome(pairs, proposal, settled, find_failures(laws, pairs, memory, load.pressure, floor))
+    """By the first rank: another could come to other modes where rounding decides."""
 
+    def judge() -> _Outcome:
+        laws = problem.laws
+        pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        floor = _find_floor(problem, solved)
+        proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
+        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
+        settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
+        return _Outcome(pairs, proposal, settled, find_failures(laws, pairs, memory, load.pressure, floor))
 
-def _hold_free_bodies(problem: Problem, modes: ModeState, opening: Real) -> ModeState:
-    """The modes, with the nearest pairs closed where a body would be free to move."""
-    ties = find_ties(problem.model, problem.mesh, modes)
-    if not problem.free_motions(tuple(ties.items())):
-        return modes
-    return close_nearest_pairs(problem.mesh, problem.laws, modes, opening)
-
-
-class _Search:
-    """Watches the sequence of modes: more caution when they come back, an end when nothing helps."""
-
-    def __init__(self, most: int, modes: ModeState) -> None:
-        self.most = most
-        self.restart(modes)
-
-    def restart(self, modes: ModeState) -> None:
-        self.count = 0
-        self.level = 0
-        self.seen = {modes.fingerprint()}
-
-    @property
-    def caution(self) -> Caution:
-        return CAUTIONS[self.level]
-
-    def note(self, problem: Problem, modes: ModeState, proposal: Proposal) -> None:
-        """Take note of the next modes. Raises ConvergenceError when they go round in spite of all caution."""
-        self.count += 1
-        if proposal.changed.any() and modes.fingerprint() in self.seen:
-            if self.level == len(CAUTIONS) - 1:
-                _refuse_free_motion(problem, proposal.modes)
-                raise ConvergenceError("mode cycle", _describe_changes(problem, proposal))
-            self.level += 1
-            self.seen.clear()
-        self.seen.add(modes.fingerprint())
-        if self.count == self.most:
-            _refuse_free_motion(problem, proposal.modes)
-            raise ConvergenceError("iteration limit", _describe_changes(problem, proposal))
-
-
-def _refuse_free_motion(problem: Problem, modes: ModeState) -> None:
-    """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
-    ties = find_ties(problem.model, problem.mesh, modes)
-    free = problem.free_motions(tuple(ties.items()))
-    if free:
-        detail = f"nothing in the present contact prevents a {free}; hold it by a condition"
-        raise ConvergenceError("free motion", detail)
+    return do_on_first(problem.comm, ConvergenceError, judge)
 
 
 def _record(number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:
@@ -190,18 +197,3 @@ def _record(number: int, solved: Solved, modes: ModeState, proposal: Proposal, b
     seconds = time.perf_counter() - begin
     changed = int(proposal.changed.sum())
     return Iteration(number, solved.residual, changed, stick, slip, is_open, seconds, solved.linear_iterations)
-
-
-def _describe_changes(problem: Problem, proposal: Proposal) -> str:
-    """Where pairs still change mode: the worst one, and how many on which interface."""
-    pairs, names = problem.mesh.pairs, problem.mesh.interface_names
-    if not proposal.changed.any():
-        return "the laws of slipping pairs do not settle; try more load steps"
-    worst = int(np.argmax(proposal.violation))
-    place = pairs.position[worst]
-    numbers, counts = np.unique(pairs.interface[proposal.changed], return_counts=True)
-    where = ", ".join(f"{count} on {names[number]}" for number, count in zip(numbers[:5], counts[:5], strict=True))
-    return (
-        f"pairs that still change mode: {where}; the worst on {names[pairs.interface[worst]]} at "
-        f"({place.real:.6g}, {place.imag:.6g}); try more load steps"
-    )

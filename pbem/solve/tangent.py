@@ -12,8 +12,11 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
+from pbem.mesh.numbering import number_components
+from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]
+Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,14 @@ class AnyTangent(Protocol):
         Raises ConvergenceError if it cannot be mended: "singular tangent", "linear solver".
         """
 
+    def respond(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
+    ) -> Real:
+        """What offsets of pairs (s,), directions (s, 4, 2), make of the unknowns of these pairs: (2 s, 2 s).
+
+        After `solve` with the same constraints. Raises ConvergenceError: "singular tangent", "linear solver".
+        """
+
     def destroy(self) -> None:
         """Free the storage."""
 
@@ -57,3 +68,15 @@ def describe_residual(residual: float, tolerance: float) -> ConvergenceError:
         f"the linear system is solved only to a relative residual of {residual:.1e} (asked: {tolerance:.1e}); "
         "a body is probably free to move in its present contact",
     )
+
+
+def select_states(
+    problem: Problem, load: Load, law: Linearisation, pairs: Integer, directions: Real
+) -> tuple[Real, Integer]:
+    """v (4 nodes, 2 s) of offsets of pairs (s,) along directions (s, 4, 2), and the pairs' own unknowns (2 s,)."""
+    spread = np.zeros_like(law.tangent)
+    spread[pairs] = directions
+    matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset)), load).matrix
+    unknowns = number_components(problem.mesh.pairs.slot[pairs])
+    # The carriers' displacements are columns of their own: those of the pairs' unknowns are their states alone.
+    return matrix[:, unknowns].toarray(), unknowns

@@ -106,13 +106,13 @@ def test_a_run_that_finds_no_equilibrium_returns_3(ranks: int, folder: Path, mpi
     (folder / "away.toml").write_text(SLIDES_AWAY)
     done = mpirun(ranks, "run", "away.toml", cwd=folder)
     assert done.returncode == 3, done.stderr
-    assert done.stderr.count("pbem: not converged: free motion: stage 'shear' stopped at the fraction 0.5") == 1
+    assert done.stderr.count("pbem: not converged: limit load: limit load reached at fraction 0.5") == 1
     assert "translation along x of 'upper'" in done.stderr and "away.h5 holds every step reached" in done.stderr
     assert "Traceback" not in done.stderr
     assert "the step is halved" in done.stdout
     results = open_results(folder / "away.h5")
     assert results.status == "failed"
-    assert results.failure.startswith("free motion: stage 'shear' stopped at the fraction 0.5")
+    assert results.failure.startswith("limit load: limit load reached at fraction 0.5")
     assert results.steps.factor[-1] == pytest.approx(0.5, abs=0.05)
     # The last step that was reached is a state of equilibrium.
     np.testing.assert_allclose(results.reactions["bottom"][-1], [-0.8 * results.steps.factor[-1], 2.0], rtol=1e-3)

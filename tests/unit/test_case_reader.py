@@ -42,7 +42,7 @@ pressure = 3.0
 [interfaces.crack]
 friction_angle = 30.0
 cohesion = 0.1
-tensile_strength = 0.2
+tensile_strength = 0.15
 gap = 1e-3
 pressure = 0.5
 pressurised = "all"
@@ -75,7 +75,7 @@ def test_every_key_reaches_the_model() -> None:
     assert [(leg.elements, leg.power) for leg in model.curves["sides"].legs] == [(4, 2.0), (6, 2.0), (4, 2.0)]
     law = model.interfaces["crack"].law
     assert law.kind == "coulomb" and law.friction == pytest.approx(3**-0.5, rel=1e-14)
-    assert (law.cohesion, law.tensile_strength, law.gap, law.pressurised) == (0.1, 0.2, 1e-3, "all")
+    assert (law.cohesion, law.tensile_strength, law.gap, law.pressurised) == (0.1, 0.15, 1e-3, "all")
     assert (model.analysis.scheme, model.analysis.order, model.analysis.tips) == ("DBEM", 1, False)
     assert (model.solver.linear, model.solver.newton_tolerance) == ("lu", 1e-8)
     assert (model.solver.newton_max_iterations, model.solver.min_step) == (20, 1e-3)

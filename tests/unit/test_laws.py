@@ -418,6 +418,14 @@ def test_overloaded_brittle_bonds_fail_the_worst_first() -> None:
     assert not find_failures(tough, state, remember(0.0, 5), np.zeros(5)).any()
 
 
+@pytest.mark.parametrize(("p_s", "fails"), [(0.22, False), (0.23, True), (-0.23, True)])
+def test_brittle_bonds_under_tension_carry_no_more_than_their_cone(p_s: float, fails: bool) -> None:
+    # 0.3 - 0.5 * 0.15 = 0.225, with fluid of the pressure 0.05 in the pair as well
+    laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3, friction=0.5)
+    assert find_failures(laws, make_state(0.15, p_s), remember(0.0), np.zeros(1)).tolist() == [fails]
+    assert find_failures(laws, make_state(0.15, p_s), remember(0.0), np.array([0.05])).tolist() == [fails]
+
+
 def test_broken_bonds_have_friction_left_but_no_cohesion_or_strength() -> None:
     laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3, friction=0.5)
     broken = replace(remember(0.0), broken=np.array([True]))

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -27,10 +28,12 @@ from pbem.model.model import (
     SolverOptions,
     Stage,
 )
+from pbem.results.describe import describe_results
 from pbem.results.dissipation import PairRecord, PairWork, measure_work
-from pbem.results.energy import Energy, EnergyBalance, weigh_faces
+from pbem.results.energy import Energy, EnergyBalance, Runaway, weigh_faces
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
+from pbem.solve.step import Step
 from tests.verification.planes import FREE, ROCK, make_arc, make_circle, make_plane, make_straight, solve
 
 Real = NDArray[np.float64]
@@ -306,6 +309,159 @@ def test_dissipation_of_one_pair(case: tuple[PairRecord, PairRecord, Law, float]
     found = measure_one(old, new, law)
     np.testing.assert_allclose(found.dissipated, 2 * dissipated, atol=1e-14)
     assert found.stored == 0.0
+
+
+WEAKENING = Law("coulomb", 0.6, friction_dynamic=0.3, slip_distance=2.0)
+BOND = Law("coulomb", 0.5, 9.0, 5.0, cohesion_lost=True)
+# before, after, law, what the laws take and what is left over, per unit length
+SURPLUSES: dict[str, tuple[PairRecord, PairRecord, Law, float, float]] = {
+    # Bound 6 falls to 3 over the slip of 2: half of 6 + 3 times 2, then 3 times 8; the trapezoid is 4.5 times 10.
+    "weakens": (make_record(SLIP, -10, 6, 0, 0), make_record(SLIP, -10, 3, 0, 10), WEAKENING, 33.0, 12.0),
+    "weakens backwards": (make_record(SLIP, -10, -6, 0, 0), make_record(SLIP, -10, -3, 0, -10), WEAKENING, 33.0, 12.0),
+    # The same while the pressure grows in proportion to the slip, 10 + s: (0.6 - 0.15 s)(10 + s), then 0.3 (10 + s).
+    "weakens while pressed": (
+        make_record(SLIP, -10, 6, 0, 0), make_record(SLIP, -20, 6, 0, 10), WEAKENING, 9.8 + 38.4, 60 - 48.2),
+    "within the slip distance": (
+        make_record(SLIP, -10, 6, 0, 0), make_record(SLIP, -10, 4.5, 0, 1), WEAKENING, 5.25, 0.0),
+    "a bond is torn": (make_record(STICK, 4, 0, 0, 0), make_record(OPEN, 0, 0, 3, 0, True), BOND, 0.0, 6.0),
+    "a bond is sheared off": (make_record(STICK, -10, 8, 0, 0), make_record(SLIP, -10, 5, 0, 2, True), BOND, 10.0, 3.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SURPLUSES.values(), ids=[name.replace(" ", "_") for name in SURPLUSES])
+def test_what_a_law_takes_of_a_pair_and_what_is_left(case: tuple[PairRecord, PairRecord, Law, float, float]) -> None:
+    old, new, law, taken, left = case
+    found = measure_one(old, new, law)
+    np.testing.assert_allclose(found.friction, 2 * taken, rtol=1e-12)
+    np.testing.assert_allclose(found.surplus, 2 * left, rtol=1e-12, atol=1e-12)
+
+
+def test_a_law_of_ones_own_is_integrated(tmp_path: Path) -> None:
+    """Strength that falls exponentially: the integral of -p_n (0.2 + 0.4 exp(-s))."""
+    file = tmp_path / "law.py"
+    file.write_text(
+        "import numpy as np\nfrom pbem.contact.strength import Strength\n"
+        "def strength(p_n, slip):\n    f, d = 0.2 + 0.4*np.exp(-slip), -0.4*np.exp(-slip)\n"
+        "    return Strength(-f*p_n, -f, -d*p_n)\n"
+    )
+    end = 10 * (0.2 + 0.4 * math.exp(-3))
+    old, new = make_record(SLIP, -10, 6, 0, 0), make_record(SLIP, -10, end, 0, 3)
+    found = measure_one(old, new, Law("custom", file=str(file)))
+    np.testing.assert_allclose(found.dissipated, 2 * 10 * (0.2 * 3 + 0.4 * (1 - math.exp(-3))), rtol=1e-9)
+
+
+def add_runaways(model: Model) -> tuple[list[Energy], list[Runaway | None], list[Step]]:
+    mesh, steps = solve(model)
+    balance = EnergyBalance(model, mesh)
+    energies, runaways = [], []
+    for step in steps:
+        energies.append(balance.add(step))
+        runaways.append(balance.runaway)
+    return energies, runaways, steps
+
+
+def make_fault(slip_distance: float, steps: int) -> Model:
+    """A crack of half-length 1 whose friction falls from 0.6 to 0.3, pressed by 1 and sheared by 0.55, then to 0.65."""
+    stages = (
+        Stage("press", 1, {}, {}, remote=(0.0, -1.0, 0.55)), Stage("shear", steps, {}, {}, remote=(0.0, -1.0, 0.65)),
+    )  # fmt: skip
+    law = Law("coulomb", 0.6, friction_dynamic=0.3, slip_distance=slip_distance)
+    return make_plane((0.0, 0.0, 0.0), {"fault": [make_straight(-1.0, 1.0, 16)]}, law, stages=stages)
+
+
+def test_a_fault_that_runs_away_releases_what_its_law_does_not_take() -> None:
+    """At a shear of 0.6 it slips at once: half of 0.6 + 0.3 on the slip, less 0.3 on it and the fracture energy."""
+    distance, steps = 1e-5, 31
+    energies, runaways, found = add_runaways(make_fault(distance, steps))
+    (at,) = [number for number, runaway in enumerate(runaways) if runaway]
+    reached = 0.55 + 0.1 * found[at].factor
+    assert 0.6 <= reached < 0.6 + 0.2 / steps
+    area = math.pi / 2 * 4 / ROCK.plane_modulus * 0.3  # integral of the slip
+    released = 0.5 * 0.3 * area - 0.5 * 0.3 * distance * 2
+    runaway = runaways[at]
+    assert runaway is not None and runaway.names == ("fault",)
+    np.testing.assert_allclose(runaway.released, released, rtol=0.03)
+    # Of work and friction, the first 0.6 and the second 0.3 on the slip.
+    np.testing.assert_allclose(runaway.share, released / (0.6 * area), rtol=0.03)
+    last = energies[-1]
+    assert last.released == runaway.released
+    assert abs(last.external - last.elastic - last.dissipated - last.released) < 1e-5 * last.external
+    slip = np.abs(found[-1].contact.slip)
+    mesh = generate_mesh(make_fault(distance, steps))
+    weight = weigh_faces(mesh)[mesh.pairs.first]
+    within = np.minimum(slip, distance)
+    by_law = weight @ (0.3 * slip + 0.3 * (within - within**2 / (2 * distance)))
+    np.testing.assert_allclose(last.dissipated, by_law, rtol=1e-9)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_a_fault_that_weakens_slowly_releases_nothing(steps: int) -> None:
+    energies, runaways, _ = add_runaways(make_fault(2e-2, steps))
+    assert runaways == [None] * len(runaways)
+    assert energies[-1].released == 0.0 and energies[-1].dissipated > 0.0
+    assert abs(energies[-1].external - energies[-1].elastic - energies[-1].dissipated) < 1e-9 * energies[-1].external
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_a_column_that_is_torn_releases_all_that_it_stored(size: float) -> None:
+    stages = (Stage("pull", 8, {"top": (0.0, 0.008 * size)}, {}),)
+    law = Law("coulomb", 0.0, 10.0, tensile_strength=3.0, cohesion_lost=True)
+    model = stack_blocks(stages, law, materials=COLUMN)
+    if size != 1.0:
+        resized = {
+            name: Curve(name, tuple(replace(leg, start=size * leg.start, end=size * leg.end) for leg in curve.legs))
+            for name, curve in model.curves.items()
+        }
+        model = replace(model, curves=resized, size=size * model.size)
+    energies, runaways, found = add_runaways(model)
+    (at,) = [number for number, runaway in enumerate(runaways) if runaway]
+    stiffness = 2 / (1 / 3e3 + 1 / 2e3)  # force by displacement
+    before, after = (0.008 * found[number].factor * size for number in (at - 1, at))
+    force = stiffness * before
+    assert force <= 3.0 * 2 * size < stiffness * after
+    supplied = 0.5 * force * (after - before)
+    expect = 0.5 * stiffness * before**2 + supplied
+    runaway = runaways[at]
+    assert runaway is not None
+    np.testing.assert_allclose([runaway.released, runaway.share], [expect, 1.0], rtol=1e-8)
+    expect_energy(replace(energies[-1], external=energies[-1].released), expect, 0.0, 0.0, 1e-8)
+
+
+def test_released_energy_is_stored_shown_and_kept_on_resume(tmp_path: Path) -> None:
+    model = make_fault(1e-4, 6)
+    mesh, steps = solve(model)
+    path = tmp_path / "fault.h5"
+    with ResultWriter(path, model, mesh, 1, "") as writer:
+        (told,) = [note for step in steps for note in writer.append(step)]
+    results = open_results(path)
+    at = int(np.argmax(results.energy.released > 0))
+    assert told.startswith(f"Step {steps[at].number} ") and "'fault' ran away and released" in told
+    assert f"in step {steps[at].number} faces ran away and released" in describe_results(results)
+    broken = tmp_path / "broken.h5"
+    first = ResultWriter(broken, model, mesh, 1, "")
+    for step in steps[: at + 1]:
+        first.append(step)
+    first.fail("stopped", "")
+    with ResultWriter.resume(broken, model, mesh, 1, "") as second:
+        assert [note for step in steps[at + 1 :] for note in second.append(step)] == []
+    np.testing.assert_allclose(open_results(broken).energy.released, results.energy.released, rtol=1e-12)
+
+
+def test_files_without_released_energy_are_read_and_resumed(tmp_path: Path) -> None:
+    model = stack_blocks(shear_and_back(2), Law("coulomb", 1.0), (2, 2))
+    mesh, steps = solve(model)
+    path = tmp_path / "old.h5"
+    writer = ResultWriter(path, model, mesh, 1, "")
+    for step in steps[:3]:
+        writer.append(step)
+    writer.fail("stopped", "")
+    with h5py.File(path, "r+") as file:
+        del file["energy/released"]
+    assert open_results(path).energy.released.tolist() == [0.0, 0.0, 0.0]
+    with ResultWriter.resume(path, model, mesh, 1, "") as again:
+        for step in steps[3:]:
+            again.append(step)
+    assert open_results(path).energy.released.tolist() == [0.0] * len(steps)
 
 
 def test_energies_in_the_file_count_all_steps_and_go_on_after_a_stop(tmp_path: Path) -> None:

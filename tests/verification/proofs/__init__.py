@@ -2,6 +2,7 @@
 
 from tests.verification.proofs import (
     closed_cracks,
+    conforming,
     contact,
     crack_fields,
     cracks,
@@ -20,6 +21,7 @@ PROOFS: tuple[Proof, ...] = (
     *closed_cracks.PROOFS,
     *inclusions.PROOFS,
     *hertz.PROOFS,
+    *conforming.PROOFS,
     *shear_contact.PROOFS,
     *contact.PROOFS,
     *samples.PROOFS,

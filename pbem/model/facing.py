@@ -1,0 +1,204 @@
+"""What faces see along their outward normals: curves of a contact each other, a region itself across a slot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.case import Case
+from pbem.errors import Fault
+from pbem.model.curve import Curve, Leg
+from pbem.model.intersection import inner_points, measure_distances, project
+from pbem.model.junction import format_point, split_leg
+from pbem.model.loop import Loops, side_legs
+from pbem.model.model import Contact, Model, Region, Side
+from pbem.model.sampling import leg_normals
+
+Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# Points on a leg from which its surroundings are looked at.
+SAMPLES = 9
+# Faces look at each other if their normals are opposite within 60 degrees.
+OPPOSITE = -0.5
+# A strip between two faces is narrow if its width is less than this part of their lengths.
+NARROW = 0.25
+# Faces that touch may lie in one another by this part of the shorter curve (rounding, chords of curved sides).
+OVERLAP = 1e-3
+# A leg is not split nearer to its ends than this part of its mean element.
+LEAST_PIECE = 0.25
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What each of some points (k,) meets first along its normal: number of the leg (-1: none), distance, and the
+    product of its own normal with that of the leg there (-1: face to face)."""
+
+    leg: Integer
+    distance: Real
+    product: Real
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Two legs of one region's boundary, each (curve, number of the leg), with a narrow strip in between.
+
+    inside: it is a thin part of the region, else a slot.
+    """
+
+    first: tuple[str, int]
+    second: tuple[str, int]
+    width: float
+    inside: bool
+
+
+def look_along(points: Complex, normals: Complex, legs: Sequence[Leg], nearest: float) -> Sight:
+    """The first of some legs, travelled with their region on the left, on rays (k,); from the distance `nearest` on."""
+    best = Sight(np.full(len(points), -1), np.full(len(points), np.inf), np.zeros(len(points)))
+    for number, leg in enumerate(legs):
+        for distance in _cross(points, normals, leg):
+            at = points + np.where(np.isfinite(distance), distance, 0.0) * normals
+            met = _is_on(leg, at) & (distance >= nearest) & (distance < best.distance)
+            facing = (np.conj(normals) * leg_normals(leg, at)).real
+            best.leg[met], best.distance[met], best.product[met] = number, distance[met], facing[met]
+    return best
+
+
+def _cross(points: Complex, normals: Complex, leg: Leg) -> list[Real]:
+    """Distances along the rays to the line or the circle of a leg; infinite or nan where there is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if leg.center is None:
+            along = leg.end - leg.start
+            return [((leg.start - points) * np.conj(along)).imag / (normals * np.conj(along)).imag]
+        from_center = points - leg.center
+        along_ray = (np.conj(normals) * from_center).real
+        root = np.sqrt(abs(leg.start - leg.center) ** 2 - np.abs(from_center) ** 2 + along_ray**2)
+        return [-along_ray - root, -along_ray + root]
+
+
+def _is_on(leg: Leg, points: Complex) -> NDArray[np.bool_]:
+    """Whether points of the line or circle lie between the ends of the leg."""
+    if leg.center is None:
+        local = (points - leg.start) / (leg.end - leg.start)
+        return np.asarray((local.real >= 0) & (local.real <= 1))
+    angle = np.angle((points - leg.center) / (leg.start - leg.center)) * np.sign(leg.sweep)
+    return np.asarray(angle % (2 * np.pi) <= abs(leg.sweep))
+
+
+def check_facing(case: Case, model: Model) -> list[Fault]:
+    """A fault for every contact whose curves never face each other, with what is known of their distance."""
+    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
+    faults = []
+    for name, contact in model.contacts.items():
+        if _face(model, sides, contact):
+            continue
+        first, second = model.curves[contact.first], model.curves[contact.second]
+        points = np.concatenate([np.array([leg.start, *inner_points(leg), leg.end]) for leg in first.legs])
+        distances = measure_distances(second.legs, points)
+        at = int(np.argmin(distances))
+        found = (
+            f"curves '{contact.first}' and '{contact.second}', which never face each other "
+            f"(nearest at {format_point(complex(points[at]))}, {distances[at]:.3g} apart)"
+        )
+        expected = "two curves that the outward normals of one of them meet, with nothing in between"
+        faults.append(case.fault(("contacts", name), found, expected))
+    return faults
+
+
+def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
+    """Whether a normal of either curve meets the other one from outside, before any other part of the two bodies."""
+    shorter = min(model.curves[contact.first].length, model.curves[contact.second].length)
+    for curve, other in ((contact.first, contact.second), (contact.second, contact.first)):
+        facing = side_legs(model.curves, sides[other])
+        for leg in side_legs(model.curves, sides[curve]):
+            points = inner_points(leg, max(SAMPLES, 4 * leg.elements))
+            seen = look_along(points, leg_normals(leg, points), facing, -OVERLAP * shorter)
+            if ((seen.leg >= 0) & (seen.product < 0)).any():
+                return True
+    return False
+
+
+def split_opposite_ends(
+    curves: Mapping[str, Curve], loops: Loops, contacts: Mapping[str, tuple[str, str]], kept: Set[str] = frozenset()
+) -> tuple[dict[str, Curve], list[str]]:
+    """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
+
+    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well.
+    kept: curves that are not split. Ends near those of an element are left.
+    """
+    sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
+    result, notes = dict(curves), []
+    for pair in contacts.values():
+        for name, other in (pair, pair[::-1]):
+            if name in kept or name not in sides or other not in sides:
+                continue
+            cuts: dict[int, list[float]] = {}
+            for end, normal in _outward_ends(curves[other], sides[other]):
+                found = _find_opposite(curves[name], sides[name].forward, end, normal, curves[other].length)
+                if found is not None:
+                    cuts.setdefault(found[0], []).append(found[1])
+            legs = []
+            for number, leg in enumerate(result[name].legs):
+                points = {complex(leg.point(np.array(t))): t for t in cuts.get(number, ())}
+                legs += split_leg(leg, points)
+                notes += [f"'{name}' is split at {format_point(at)}, opposite an end of '{other}'." for at in points]
+            result[name] = Curve(name, tuple(legs))
+    return result, notes
+
+
+def _outward_ends(curve: Curve, side: Side) -> list[tuple[complex, complex]]:
+    """Both ends of a curve with the outward normals there."""
+    if curve.closed:
+        return []
+    sign = 1 if side.forward else -1
+    return [
+        (point, sign * complex(leg_normals(leg, np.array([point]))[0]))
+        for leg, point in ((curve.legs[0], curve.start), (curve.legs[-1], curve.end))
+    ]
+
+
+def _find_opposite(
+    curve: Curve, forward: bool, end: complex, normal: complex, length: float
+) -> tuple[int, float] | None:
+    """Number of the leg and fraction of it whose normal meets an end of the other curve (of a length) face to face."""
+    number = min(range(len(curve.legs)), key=lambda at: project(curve.legs[at], end)[1])
+    leg = curve.legs[number]
+    t, distance = project(leg, end)
+    foot = leg.point(np.array([t]))
+    outward = complex(leg_normals(leg, foot)[0]) * (1 if forward else -1)
+    shorter = min(length, curve.length)
+    ahead = ((end - complex(foot[0])) * outward.conjugate()).real
+    if min(t, 1 - t) * leg.elements < LEAST_PIECE or distance > shorter or ahead < -OVERLAP * shorter:
+        return None
+    return None if (normal * outward.conjugate()).real > OPPOSITE else (number, t)
+
+
+def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]]) -> list[Strip]:
+    """Pairs of chosen legs (curve, number of the leg) of a region with a narrow slot or a thin part in between."""
+    legs: list[Leg] = []
+    names: list[tuple[str, int]] = []
+    for side in (side for loop in region.loops for side in loop.sides):
+        own = side_legs(model.curves, side)
+        numbers = range(len(own)) if side.forward else range(len(own) - 1, -1, -1)
+        legs += own
+        names += [(side.curve, number) for number in numbers]
+    wanted = set(chosen)
+    strips: dict[frozenset[tuple[str, int]], Strip] = {}
+    for name, leg in zip(names, legs, strict=True):
+        if name not in wanted:
+            continue
+        points = inner_points(leg, SAMPLES)
+        for inside, normals in ((False, leg_normals(leg, points)), (True, -leg_normals(leg, points))):
+            seen = look_along(points, normals, legs, 1e-12 * model.size)
+            facing = (seen.leg >= 0) & ((-seen.product if inside else seen.product) < OPPOSITE)
+            for number in np.unique(seen.leg[facing]):
+                other = names[number]
+                width = float(seen.distance[facing & (seen.leg == number)].min())
+                length = min(model.curves[name[0]].length, model.curves[other[0]].length)
+                if other in wanted and other != name and width < NARROW * length:
+                    strips.setdefault(frozenset((name, other)), Strip(name, other, width, inside))
+    return list(strips.values())

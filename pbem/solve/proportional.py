@@ -1,0 +1,38 @@
+"""Whether a step's problem is the same at every fraction of its load, so that a smaller step cannot help."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.contact.laws import Memory, PairLaws, start_memory
+from pbem.contact.strength import coulomb
+from pbem.solve.problem import Problem
+
+
+def is_proportional(problem: Problem, memory: Memory, stage: int, reached: float) -> bool:
+    """Whether states of this step at a fraction f of its load are f times those at the whole load.
+
+    So it is from rest in the first stage, where all that is prescribed grows with the load from nothing, with laws that
+    know no length and no stress of their own: friction alone, without gap, cohesion, tensile strength or fluid.
+    """
+    if stage > 0 or reached > 0 or not _has_no_scale(problem.laws):
+        return False
+    rest = start_memory(problem.laws)
+    untouched = not memory.slip.any() and not memory.path.any() and not memory.normal_traction.any()
+    same = np.array_equal(memory.modes.mode, rest.modes.mode) and np.array_equal(memory.broken, rest.broken)
+    first = problem.evaluate_load(0, 0.0)
+    whole = problem.evaluate_load(0, 1.0)
+    starts = (first.values, first.known, first.far, first.background)
+    return untouched and same and not any(part.any() for part in starts) and not whole.pressure.any()
+
+
+def _has_no_scale(laws: PairLaws) -> bool:
+    """Whether the laws are friction alone."""
+    may_touch = ~(laws.bonded | laws.parted)
+    if laws.tensile_strength[may_touch].any() or laws.gap[may_touch].any():
+        return False
+    return all(
+        group.law is coulomb and not group.parameters["cohesion"][may_touch[group.pairs]].any()
+        for group in laws.strengths
+        if may_touch[group.pairs].any()
+    )

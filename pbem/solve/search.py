@@ -1,0 +1,135 @@
+"""The search for the pairs' modes: semi-smooth Newton steps, and pivoting for the few pairs that go on changing.
+
+A Newton step gives every pair the mode that its trial values ask for. Far from the solution this settles most pairs at
+a time, and on sound models it ends in a few iterations. Near to it a few pairs can change each other for ever, as the
+step looks at each pair as if the others stood still. The search sees that when the number of changing pairs no longer
+falls, not only when a state comes back, and then solves the contact of the pairs that changed lately exactly, with all
+others kept in their modes (pbem.contact.subset): a non-linear Gauss-Seidel method of two blocks, whose second block is
+the Newton step of all. Pairs that change next join those that are solved for, so that a group that holds all that
+disturb each other is found in a few rounds.
+
+What is left for models whose law is not linear in a mode (friction that weakens with slip) or whose group is too large:
+the friction bound is kept in each iteration at what it was after the last (a fixed point of Tresca's law; J. Haslinger
+et al., Numerical methods for unilateral problems in solid mechanics, 1996). Once no mode changes under it the full
+tangent comes back at once, as the fixed point itself closes in slowly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.contact.modes import Frozen, Proposal
+from pbem.contact.subset import Settled
+
+Integer = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Caution:
+    """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest.
+
+    frozen: what of the friction bound is taken as it is at the last iterate.
+    """
+
+    softening: float
+    share: float
+    frozen: Frozen = "nothing"
+
+
+# Modes that come back in spite of pivoting move one level down; the last changes one pair at a time.
+CAUTIONS = (
+    Caution(1.0, 0.0),
+    Caution(0.1, 0.0, "slip"),
+    Caution(0.1, 0.0, "strength"),
+    Caution(0.01, 0.3, "strength"),
+    Caution(0.01, 1.0, "strength"),
+)
+
+# Changes that fall to no less than this part of the fewest before are a sign of pairs that disturb each other.
+SLOW = 0.5
+# Iterations that are plain Newton steps whatever they change.
+PLAIN = 3
+# Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
+FUTILE = 6
+
+
+class Search:
+    """Watches the changes of modes and says what comes next; the same on all ranks, from the same proposals.
+
+    most_pivoted: the largest group of pairs that is solved by pivoting. follows (m,): pairs that take the mode of
+    another one, which are in no such group.
+    """
+
+    def __init__(self, most_pivoted: int, follows: NDArray[np.bool_] | None = None) -> None:
+        self.most_pivoted, self.follows = most_pivoted, follows
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew, as after the failure of a bond."""
+        self.counts: list[int] = []
+        self.changed: list[Integer] = []
+        self.group: Integer = np.zeros(0, dtype=np.int64)
+        self.failed_group: Integer = self.group
+        self.failed: Settled | None = None
+        self.futile = 0
+        self.level = 0
+        self.returned = False
+        self.seen: set[bytes] = set()
+
+    @property
+    def caution(self) -> Caution:
+        return CAUTIONS[self.level]
+
+    def note(self, proposal: Proposal) -> None:
+        """Take note of what the last solution asks for."""
+        self.proposal = proposal
+        own = proposal.changed if self.follows is None else proposal.changed & ~self.follows
+        self.changed.append(np.flatnonzero(own))
+        self.counts.append(int(proposal.changed.sum()))
+        if not self.counts[-1] and self.level and not self.returned:
+            self.level, self.returned = 0, True
+
+    def choose_group(self) -> Integer:
+        """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
+        nothing = np.zeros(0, dtype=np.int64)
+        if len(self.counts) <= PLAIN or not self.counts[-1]:
+            return nothing
+        if not len(self.group) and self.counts[-1] <= SLOW * min(self.counts[:-1]):
+            return nothing
+        lately = np.unique(np.concatenate(self.changed[-2:]))
+        for group in (np.union1d(self.group, lately), lately, self.changed[-1]):
+            if len(group) <= self.most_pivoted:
+                self.group = group
+                return group
+        return nothing
+
+    def conclude(self, found: Settled) -> bool:
+        """Take note of what pivoting found for the group; True if there seems to be nothing to be found.
+
+        That is certain where all choices were tried for the same pairs twice, with what all others make of it between;
+        of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
+        """
+        if found.modes is not None:
+            self.futile = 0
+            return False
+        again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
+        self.failed_group, self.failed = self.group, found
+        self.futile += found.tried > 1
+        return (again and found.exhaustive) or self.futile >= FUTILE
+
+    def returns(self, fingerprint: bytes) -> bool:
+        """Note a state of modes; whether it was there before at this level of caution."""
+        back = fingerprint in self.seen
+        self.seen.add(fingerprint)
+        return back
+
+    def descend(self) -> bool:
+        """Move to more caution; False at the end of all."""
+        if self.level == len(CAUTIONS) - 1:
+            return False
+        self.level += 1
+        self.seen.clear()
+        return True

@@ -1,0 +1,95 @@
+"""When the search for modes pivots, returns to the full tangent, and gives up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.contact.laws import SLIP
+from pbem.contact.modes import Proposal
+from pbem.contact.subset import Settled
+from pbem.solve.search import CAUTIONS, FUTILE, Search
+from tests.unit.test_laws import make_modes
+
+COUNT = 100
+
+
+def propose(changed: list[int]) -> Proposal:
+    violation = np.zeros(COUNT)
+    violation[changed] = 1.0
+    return Proposal(make_modes(SLIP, count=COUNT), violation)
+
+
+def follow(search: Search, *changes: list[int]) -> list[list[int]]:
+    """The groups chosen after each proposal."""
+    groups = []
+    for changed in changes:
+        search.note(propose(changed))
+        groups.append(search.choose_group().tolist())
+    return groups
+
+
+def test_newtons_steps_go_on_while_fewer_and_fewer_pairs_change() -> None:
+    assert follow(Search(50), *(list(range(count)) for count in (60, 40, 20, 9, 4, 2, 1, 0))) == [[]] * 8
+
+
+def test_pairs_that_changed_lately_are_pivoted_once_their_number_does_not_fall() -> None:
+    search = Search(50)
+    assert follow(search, list(range(60)), list(range(20)), [1, 2, 3, 4])[-1] == []
+    assert follow(search, [3, 4, 5]) == [[1, 2, 3, 4, 5]]
+    # Those that change next join them.
+    assert follow(search, [9]) == [[1, 2, 3, 4, 5, 9]]
+    assert follow(search, []) == [[]]
+
+
+def test_a_group_that_grows_too_large_is_left_for_its_latest_pairs() -> None:
+    search = Search(4)
+    assert follow(search, [0], [1], [2], [3, 4], [5, 6])[-2:] == [[2, 3, 4], [3, 4, 5, 6]]
+    assert follow(search, [7, 8, 9]) == [[7, 8, 9]]
+    assert follow(search, [10, 11, 12, 13, 14]) == [[]]
+
+
+def test_the_full_tangent_comes_back_once_no_mode_changes_under_a_frozen_bound() -> None:
+    search = Search(4)
+    assert search.descend() and search.caution.frozen == "slip"
+    search.note(propose([1]))
+    assert search.level == 1
+    search.note(propose([]))
+    assert search.caution.frozen == "nothing"
+    # Where it changes modes again, the fixed point is followed to its end.
+    search.descend()
+    search.note(propose([]))
+    assert search.caution.frozen == "slip"
+
+
+def test_all_levels_of_caution_are_tried_in_turn() -> None:
+    search = Search(4)
+    assert [search.descend() for _ in CAUTIONS] == [True] * (len(CAUTIONS) - 1) + [False]
+
+
+def test_a_state_that_comes_back_is_noticed_at_each_level() -> None:
+    search = Search(4)
+    assert [search.returns(b"a"), search.returns(b"b"), search.returns(b"a")] == [False, False, True]
+    search.descend()
+    assert not search.returns(b"a")
+
+
+def fail(exhaustive: bool, tried: int) -> Settled:
+    return Settled(None, exhaustive, tried, np.zeros(2, dtype=bool))
+
+
+def test_two_complete_failures_for_the_same_pairs_are_certain() -> None:
+    search = Search(50)
+    follow(search, [1, 2], [1, 2], [1, 2], [1, 2])
+    assert not search.conclude(fail(True, 1))
+    follow(search, [1, 2, 3])
+    assert not search.conclude(fail(True, 1))  # another group
+    assert search.conclude(fail(True, 1))
+
+
+def test_failures_after_many_choices_end_a_search_in_time() -> None:
+    search = Search(50)
+    follow(search, [1, 2], [1, 2], [1, 2], [1, 2])
+    assert [search.conclude(fail(False, 5)) for _ in range(FUTILE)] == [False] * (FUTILE - 1) + [True]
+    search.restart()
+    follow(search, [1, 2], [1, 2], [1, 2], [1, 2])
+    assert not any(search.conclude(fail(False, 1)) for _ in range(2 * FUTILE))

@@ -1,0 +1,53 @@
+"""Brittle bonds that fail one after the other: in few iterations, and as if the whole problem were solved for each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.solve import newton
+
+# A plate that a bonded fault cuts in two, sheared until the bond unzips; a gap in the bond's strength where it begins.
+PLATE = """
+materials.rock = { young = 1e3, poisson = 0.2 }
+curves.bottom = { points = [[-2, -1], [2, -1]], elements = 8 }
+curves.right = { points = [[2, -1], [2, 1]], elements = 8 }
+curves.top = { points = [[2, 1], [-2, 1]], elements = 8 }
+curves.left = { points = [[-2, 1], [-2, -1]], elements = 8 }
+curves.fault = { points = [[-2, 0.1], [2, -0.1]], elements = 16, grading = "none" }
+regions.plate = { material = "rock", boundary = ["bottom", "right", "top", "left"], cracks = ["fault"] }
+boundary.bottom = { ux = 0.0, uy = 0.0 }
+boundary.top = { ux = -0.012, uy = UY }
+interfaces.fault = { friction = 0.3, cohesion = 1.5, tensile_strength = 1.0, cohesion_lost = true }
+analysis.steps = 1
+"""
+
+
+def run_plate(folder: Path, uy: float) -> pbem.results.reader.Results:
+    """The plate, pressed (uy < 0) or pulled as it is sheared."""
+    case = folder / "plate.toml"
+    case.write_text(PLATE.replace("UY", str(uy)))
+    return pbem.run(case, folder / "plate.h5")
+
+
+@pytest.mark.parametrize(("uy", "most"), [(-0.004, 8), (0.003, 8)])
+def test_a_cascade_ends_as_with_a_solution_for_each_bond_and_takes_few_iterations(
+    uy: float, most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "one").mkdir()
+    fast = run_plate(tmp_path, uy)
+    with monkeypatch.context() as patch:
+        patch.setattr(newton, "MOST_PIVOTED", 0)  # no pairs are followed at once
+        slow = run_plate(tmp_path / "one", uy)
+    broken = slow.pairs.at("broken", 0)
+    assert broken.sum() > 15
+    assert slow.steps.iterations[0] > 2 * fast.steps.iterations[0]
+    assert fast.steps.iterations[0] <= most
+    np.testing.assert_array_equal(fast.pairs.at("broken", 0), broken)
+    np.testing.assert_array_equal(fast.contact["fault"].mode, slow.contact["fault"].mode)
+    for name in ("opening", "slip", "traction_n", "traction_s"):
+        ours, theirs = getattr(fast.contact["fault"], name), getattr(slow.contact["fault"], name)
+        np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max())

@@ -1,0 +1,145 @@
+"""Meshes that the program fits to near faces: thin bodies, ligaments, parallel cracks, slots, wedges; few elements asked.
+
+Reference solutions: beam theory in plane strain with Timoshenko's shear, Jeffery's eccentric ring (S. Timoshenko and
+J. Goodier, Theory of Elasticity, art. 73), the crack that a slot tends to, and the same model on a much finer mesh.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.verification.proofs.proof import Solved, line, solve_case
+
+ROCK = {"young": 1000.0, "poisson": 0.2}
+MODULUS = 1000.0 / (1 - 0.2**2)
+
+
+def solve_cantilever(slenderness: float, scale: float = 1.0) -> float:
+    """Deflection of the end over that of a clamped beam in plane strain, with 10 elements asked along each side."""
+    length, thick = 10.0 * scale, 10.0 * scale / slenderness
+    corners = [0j, complex(length, 0), complex(length, thick), complex(0, thick)]
+    bottom, right, top, left = (line(corners[k], corners[(k + 1) % 4], 10 if k % 2 == 0 else 3) for k in range(4))
+    solved = solve_case(
+        materials={"rock": ROCK},
+        curves={"bottom": bottom, "right": right, "top": top, "left": left},
+        regions={"beam": {"material": "rock", "boundary": ["bottom", "right", "top", "left"]}},
+        boundary={"left": {"ux": 0.0, "uy": 0.0}, "right": {"tx": 0.0, "ty": -1e-3}},
+        analysis={"steps": 1},
+    )
+    end = np.argmax(solved.mesh.position.real)
+    force = 1e-3 * thick
+    bending = 4 * force * length**3 / (MODULUS * thick**3)
+    shear = 1.2 * force * length / (thick * 1000.0 / (2 * 1.2))
+    return float(-solved.last.displacement[end].imag / (bending + shear))
+
+
+@pytest.mark.parametrize("slenderness", [10, 30, 100, 200])
+def test_the_deflection_of_cantilevers(slenderness: float) -> None:
+    assert solve_cantilever(slenderness) == pytest.approx(1.0, abs=0.015)
+
+
+def test_the_deflection_does_not_depend_on_the_unit_of_length() -> None:
+    assert solve_cantilever(60.0, 1e-6) == pytest.approx(solve_cantilever(60.0), rel=1e-7)
+
+
+@pytest.mark.parametrize("ligament", [0.1, 0.03, 0.01, 0.003])
+def test_the_stress_in_the_ligament_of_an_eccentric_ring(ligament: float) -> None:
+    solved = solve_case(
+        materials={"rock": {"young": 1000.0, "poisson": 0.3}},
+        curves={
+            "inner": {"center": [1 - ligament, 0.0], "radius": 1.0, "elements": 64},
+            "outer": {"center": [0.0, 0.0], "radius": 2.0, "elements": 64},
+        },
+        regions={"ring": {"material": "rock", "boundary": ["inner", "outer"]}},
+        boundary={"inner": {"pressure": 1.0}},
+        analysis={"steps": 1, "order": 3},
+    )
+    hoop = solved.hoop_stress()[solved.nodes("inner")]
+    e = 1 - ligament
+    exact = 2 * 4 * (4 + 1 - 2 * e - e**2) / (5 * (4 - 1 - 2 * e - e**2)) - 1
+    assert hoop.max() == pytest.approx(exact, rel=0.01)
+
+
+def solve_parallel_cracks(distance: float, elements: int, remote: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+    solved = solve_case(
+        materials={"rock": ROCK},
+        curves={"low": line(-0.5, 0.5, elements), "high": line(-0.5 + distance * 1j, 0.5 + distance * 1j, elements)},
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": ["low", "high"]}},
+        remote=remote,
+        analysis={"steps": 1},
+    )
+    return solved.factors("low")
+
+
+@pytest.mark.parametrize("distance", [0.5, 0.1, 0.03])
+@pytest.mark.parametrize("remote", [{"syy": 1.0}, {"syy": -1.0, "sxy": 1.0}], ids=["tension", "closed"])
+def test_the_factors_of_parallel_cracks(distance: float, remote: dict[str, float]) -> None:
+    coarse, fine = (np.array(solve_parallel_cracks(distance, count, remote)) for count in (8, 120))
+    assert np.abs(coarse - fine).max() < 0.01 * np.abs(fine).max()
+
+
+def solve_slot(width: float, scheme: str, counts: tuple[int, int] = (20, 27)) -> Solved:
+    """A plate with a slot from its right side to the middle, clamped below, pulled at the top; width 0: a crack."""
+    curves: dict[str, Any] = {"bottom": line(-1j, 3 - 1j, 12), "top": line(3 + 1j, 1j, 12), "left": line(1j, -1j, 12)}
+    plate: dict[str, Any] = {"material": "rock", "boundary": ["bottom", "right_low", "right_high", "top", "left"]}
+    h = 0.5j * width
+    curves |= {"right_low": line(3 - 1j, 3 - h, 12), "right_high": line(3 + h, 3 + 1j, 12)}
+    if width:
+        slot = {"low": line(3 - h, 1 - h, counts[0]), "end": line(1 - h, 1 + h, 2), "high": line(3 + h, 1 + h, counts[1])}
+        curves |= slot
+        plate["boundary"] += [*slot]
+    else:
+        curves["low"] = line(3 + 0j, 1 + 0j, max(counts))
+        plate["cracks"] = ["low"]
+    return solve_case(
+        materials={"rock": {"young": 1000.0, "poisson": 0.3}},
+        curves=curves,
+        regions={"plate": plate},
+        boundary={"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"tx": 0.0, "ty": 0.1}},
+        analysis={"steps": 1, "scheme": scheme},
+    )
+
+
+def find_lift(solved: Solved) -> float:
+    return float(solved.last.displacement[np.argmax(solved.mesh.position.real + solved.mesh.position.imag)].imag)
+
+
+@pytest.mark.parametrize("scheme", ["SST", "DBEM", "HST"])
+def test_a_slot_tends_to_a_crack_however_narrow_it_is(scheme: str) -> None:
+    crack = find_lift(solve_slot(0.0, scheme))
+    assert find_lift(solve_slot(1e-3, scheme)) == pytest.approx(crack, rel=2e-3)
+    assert find_lift(solve_slot(1e-6, scheme)) == pytest.approx(crack, rel=2e-4)
+
+
+def test_the_faces_of_a_slot_have_the_same_elements() -> None:
+    solved = solve_slot(1e-3, "SST")
+    low, high = (solved.model.curves[name].legs[0] for name in ("low", "high"))
+    assert low.elements == high.elements
+    np.testing.assert_allclose(low.element_fractions(), high.element_fractions(), rtol=0, atol=1e-15)
+
+
+def solve_needle(angle: float, halves: int, **analysis: Any) -> float:
+    """Jump at the mouth of an open crack that leaves the side of a plate at a small angle: a slender needle bends."""
+    end = -2 - 1j + 1.5 * np.exp(1j * np.radians(90 - angle))
+    curves = {
+        "bottom": line(-2 - 2j, 2 - 2j, 10), "right": line(2 - 2j, 2 + 2j, 10), "top": line(2 + 2j, -2 + 2j, 10),
+        "above": line(-2 + 2j, -2 - 1j, 10), "below": line(-2 - 1j, -2 - 2j, 10),
+        "crack": line(-2 - 1j, complex(end), 8 * 2**halves),
+    }  # fmt: skip
+    solved = solve_case(
+        materials={"rock": ROCK},
+        curves=curves,
+        regions={"plate": {"material": "rock", "boundary": [*curves][:5], "cracks": ["crack"]}},
+        interfaces={"crack": {"law": "open"}},
+        boundary={"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"ux": 0.01, "uy": 0.01}},
+        analysis={"steps": 1, **analysis},
+    )
+    return float(solved.last.contact.opening[0])
+
+
+@pytest.mark.parametrize("angle", [15.0, 25.0, 40.0])
+def test_the_needle_at_the_mouth_of_a_shallow_crack(angle: float) -> None:
+    assert solve_needle(angle, 0) == pytest.approx(solve_needle(angle, 1, order=3), rel=0.01)

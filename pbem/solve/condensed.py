@@ -16,7 +16,7 @@ from pbem.solve.load_basis import LoadBasis
 from pbem.solve.pair_columns import PairColumns
 from pbem.solve.problem import Problem
 from pbem.solve.reference import Reference, apply_narrow
-from pbem.solve.tangent import Solved, describe_residual
+from pbem.solve.tangent import Solved, describe_residual, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -100,7 +100,7 @@ class CondensedTangent:
         for _ in range(1 + MOST_CORRECTIONS):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load)
-            residual = problem.measure(left) / scale
+            residual = problem.measure(left) / size_residual(scale, unknowns)
             if best is not None and not residual < best.residual:
                 break
             best = Solved(unknowns, v, residual)

@@ -14,7 +14,7 @@ from pbem.parallel import gather_parts
 from pbem.solve.linear import choose_method
 from pbem.solve.problem import Problem
 from pbem.solve.reference import Reference
-from pbem.solve.tangent import Solved, describe_residual, select_states
+from pbem.solve.tangent import Solved, describe_residual, select_states, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -57,7 +57,7 @@ class FactoredTangent:
         for attempt in range(2):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load)
-            residual = problem.measure(left) / scale
+            residual = problem.measure(left) / size_residual(scale, unknowns)
             if residual <= tolerance:
                 return Solved(unknowns, v, residual)
             if attempt == 0 and np.isfinite(residual):
@@ -104,7 +104,8 @@ class FactoredTangent:
         if not solver.factored:
             return
         part = self.reference.solve_columns(rhs[:, None])[:, 0]
-        residual = self.problem.measure(solver.multiply(part) - rhs) / self.problem.measure(rhs)
+        size = size_residual(self.problem.measure(rhs), gather_parts(self.problem.comm, part))
+        residual = self.problem.measure(solver.multiply(part) - rhs) / size
         tolerance = self.problem.model.solver.newton_tolerance
         if not residual <= tolerance:
             self.factored = None

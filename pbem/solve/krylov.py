@@ -16,7 +16,7 @@ from pbem.solve.choice import make_dense_tangent
 from pbem.solve.linear import PREFIX, PETSc, petsc_options
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
-from pbem.solve.tangent import AnyTangent, Solved, select_states
+from pbem.solve.tangent import AnyTangent, Solved, select_states, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -97,7 +97,7 @@ class KrylovTangent:
             count += self.iterations[-1]
             unknowns = self.gather(np.array(self._left.getArray()))
             v = constraints.evaluate(unknowns)
-            residual = problem.measure(problem.apply(v, load)) / scale
+            residual = problem.measure(problem.apply(v, load)) / size_residual(scale, unknowns)
             solved = residual <= tolerance
             widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
             if solved:

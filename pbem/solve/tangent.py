@@ -61,6 +61,19 @@ class AnyTangent(Protocol):
         """Free the storage."""
 
 
+# Rounding leaves a residual in proportion to the unknowns, which of slender bodies are far larger than the forces (both
+# lengths): it counts against this part of them where that is more than the forces ...
+ROUNDED = 1e-5
+# ... but unknowns that are larger than so many times the forces are those of a singular system.
+MOST_AMPLIFIED = 1e11
+
+
+def size_residual(forces: float, unknowns: Real) -> float:
+    """What the norm of a residual is compared with, from the norm of the forces B m and the unknowns x."""
+    size = float(np.linalg.norm(unknowns))
+    return max(forces, ROUNDED * size) if size <= MOST_AMPLIFIED * forces else forces
+
+
 def describe_residual(residual: float, tolerance: float) -> ConvergenceError:
     """The error of a system that cannot be solved well enough."""
     return ConvergenceError(

@@ -1,4 +1,4 @@
-"""Meshes that the program fits to near faces: thin bodies, ligaments, parallel cracks, slots, wedges; few elements asked.
+"""Meshes that the program fits to near faces: thin bodies, ligaments, parallel cracks, slots and wedges.
 
 Reference solutions: beam theory in plane strain with Timoshenko's shear, Jeffery's eccentric ring (S. Timoshenko and
 J. Goodier, Theory of Elasticity, art. 73), the crack that a slot tends to, and the same model on a much finer mesh.
@@ -57,10 +57,10 @@ def test_the_stress_in_the_ligament_of_an_eccentric_ring(ligament: float) -> Non
         boundary={"inner": {"pressure": 1.0}},
         analysis={"steps": 1, "order": 3},
     )
-    hoop = solved.hoop_stress()[solved.nodes("inner")]
+    thinnest = np.argmin(np.abs(solved.mesh.position - (2 - ligament)))
     e = 1 - ligament
     exact = 2 * 4 * (4 + 1 - 2 * e - e**2) / (5 * (4 - 1 - 2 * e - e**2)) - 1
-    assert hoop.max() == pytest.approx(exact, rel=0.01)
+    assert solved.hoop_stress()[thinnest] == pytest.approx(exact, rel=0.005)
 
 
 def solve_parallel_cracks(distance: float, elements: int, remote: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +88,8 @@ def solve_slot(width: float, scheme: str, counts: tuple[int, int] = (20, 27)) ->
     h = 0.5j * width
     curves |= {"right_low": line(3 - 1j, 3 - h, 12), "right_high": line(3 + h, 3 + 1j, 12)}
     if width:
-        slot = {"low": line(3 - h, 1 - h, counts[0]), "end": line(1 - h, 1 + h, 2), "high": line(3 + h, 1 + h, counts[1])}
+        slot = {"low": line(3 - h, 1 - h, counts[0]), "high": line(3 + h, 1 + h, counts[1])}
+        slot["end"] = line(1 - h, 1 + h, 2)
         curves |= slot
         plate["boundary"] += [*slot]
     else:

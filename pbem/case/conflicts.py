@@ -58,6 +58,24 @@ def _check_name(loc: Loc, name: str) -> list[Finding]:
     return [Finding(loc, f"the name {show(name)}", expected)]
 
 
+# A circle's points differ from its center by so many of the center's own rounding errors at least.
+ROUNDING = 1e-12
+
+
+def _check_roundness(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    """A radius that is lost in the rounding of the center's coordinates makes no circle."""
+    center, radius = table.get("center"), table.get("radius")
+    if not isinstance(center, list) or not isinstance(radius, int | float):
+        return []
+    if not all(isinstance(each, int | float) for each in center):
+        return []
+    farthest = max((abs(each) for each in center), default=0)
+    if not 0 < radius < ROUNDING * min(farthest, 1e300):
+        return []
+    found = f"{show(radius)}, which is lost in the rounding of the center's coordinates"
+    return [Finding((*loc, "radius"), found, f"more than {ROUNDING:g} of the center's coordinates")]
+
+
 def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     shapes = "points, or center and radius (with angles for an arc), or expression"
@@ -70,6 +88,7 @@ def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
             Finding(loc, f"no {key}", "center and radius, and angles for an arc")
             for key in ("center", "radius") if key not in table
         ]
+        findings += _check_roundness(loc, table)
     else:
         findings += [
             Finding((*loc, key), f"{key} with {given[0]}", f"one shape: {shapes}")

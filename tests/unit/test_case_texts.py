@@ -99,6 +99,14 @@ def test_options_are_tried_before_anything_is_computed() -> None:
     assert "nonsense" in caught.value.faults[0].found and "no integer value" in caught.value.faults[1].found
 
 
+def test_circles_that_rounding_makes_points_are_faults() -> None:
+    for center, radius in (("[0.5, 1e99]", "0.2"), ("[-1e8, 0]", "1e-5")):
+        text = CRACK + f"curves.hole = {{ center = {center}, radius = {radius}, elements = 8 }}\n"
+        faults = [fault for fault in find_faults(text) if fault.place == "curves.hole.radius (line 5)"]
+        assert len(faults) == 1 and "more than 1e-12 of the center's coordinates" in faults[0].expected
+    parse_case(CRACK + "curves.hole = { center = [1e8, 0], radius = 1.0, elements = 8 }\n")
+
+
 def test_a_gap_by_expression_is_described(tmp_path: Path) -> None:
     path = tmp_path / "case.toml"
     path.write_text(CRACK + 'interfaces.crack = { gap = { expression = "0.001*(1+x)" } }\n')

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 from typing import get_args
 
 from pbem.contact.strength import read_checked_model
-from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
+from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
 from pbem.model.refinement import bisect_elements, impose_fractions
-from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
+from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_first, world
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.estimator import Estimator
 from pbem.results.output import check_output_path
@@ -28,9 +28,11 @@ from pbem.solve.beside import NOTHING_COARSER, put_beside
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
+from pbem.solve.options import check_options
 from pbem.solve.second import SecondSolution
 from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step
+from pbem.solve.watch import Watch
 
 
 def run(
@@ -38,6 +40,7 @@ def run(
     output: str | os.PathLike[str] | None = None,
     *,
     resume: bool = False,
+    force: bool = False,
     petsc: Mapping[str, str] | None = None,
     operator: Operator | None = None,
     reporter: Reporter | None = None,
@@ -45,105 +48,142 @@ def run(
     """Read a case file, solve it, and return its results.
 
     case: path of the TOML file. output: path of the result file; by default the case's name with .h5, in the working
-    directory. resume: go on after the last step that the file holds. petsc: PETSc options without prefix, which win
-    over the case's [petsc] table. operator: "auto", "dense" or "hierarchical", in place of the case's solver.operator;
-    the configuration in the result file tells it. reporter: told of the progress, on the first rank only.
-    Every rank of an MPI run calls this and gets the results.
+    directory. resume: go on after the last step that the file holds. force: replace results that are there; without
+    either, they are left alone. petsc: PETSc options without prefix, which win over the case's [petsc] table.
+    operator: "auto", "dense" or "hierarchical", in place of the case's solver.operator; the configuration in the result
+    file tells it. reporter: told of the progress, on the first rank only. Every rank of an MPI run calls this and gets
+    the results.
 
     Raises LaunchError (ranks, libraries or threads that do not fit together), CaseError (all faults of the case),
-    ResultFileError (the output cannot be written, or does not belong to the case), ConvergenceError (the file then
-    holds every step reached), StorageError (the disk has no room for a step; the file holds those before it). Any other
+    ResultFileError (the output cannot be written, is there already, or is another case's), ConvergenceError (the file
+    then holds every step reached), StorageError (the disk has no room for a step; the file holds those before it),
+    LawError (a custom law failed), StopError (told to stop by a signal; KeyboardInterrupt by SIGINT). Any other
     exception on one rank ends all ranks. ValueError: there is no such operator.
     """
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
-    with abort_if_unexpected(world, PbemError):
-        placement = check_start(world)
-        path = Path(case)
-        model = do_on_first(world, PbemError, lambda: read_checked_model(path))
-        if operator is not None:
-            if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
-                found = f'"{model.solver.linear}" with operator = "hierarchical", which stores no matrix to factor'
-                raise CaseError(str(path), (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
-            model = replace(model, solver=replace(model.solver, operator=operator))
-        target = Path(output) if output is not None else Path(path.stem + ".h5")
-        do_on_first(world, PbemError, lambda: check_output_path(target))
-        listener = reporter if reporter is not None and world.rank == 0 else SilentReporter()
-        options = {**model.solver.petsc, **(petsc or {})}
-        with petsc_options(options):
-            _refine_and_solve(model, target, resume, options, listener, placement)
-        results = open_results(target)
-        for note in compare_release(results):
-            listener.note(note)
-        return results
+    try:
+        with abort_if_unexpected(world, PbemError), StopSignals() as signals:
+            placement = check_start(world)
+            signals.at_once = world.size == 1
+            path = Path(case)
+            model = do_on_first(world, PbemError, lambda: _read(path, operator))
+            target = Path(output) if output is not None else Path(path.stem + ".h5")
+            inputs = [path, *map(Path, model.law_texts)]
+            do_on_first(world, PbemError, lambda: check_output_path(
+                target, resume=resume, force=force, source=model.source, inputs=inputs))
+            do_on_first(world, PbemError, lambda: check_options(str(path), model.solver.petsc, petsc or {}))
+            watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)
+            options = {**model.solver.petsc, **(petsc or {})}
+            with petsc_options(options):
+                _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement)
+            results = open_results(target)
+            for note in compare_release(results):
+                watch.note(note)
+            return results
+    except StopError as error:
+        if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
+            raise KeyboardInterrupt from error
+        raise
+
+
+@dataclass(frozen=True)
+class _Target:
+    """The result file, and whether to go on with it or to replace it."""
+
+    path: Path
+    resume: bool
+    force: bool
+
+
+def _read(path: Path, operator: Operator | None) -> Model:
+    model = read_checked_model(path)
+    if operator is None:
+        return model
+    if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
+        found = f'"{model.solver.linear}" with operator = "hierarchical", which stores no matrix to factor'
+        raise CaseError(str(path), (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
+    return replace(model, solver=replace(model.solver, operator=operator))
 
 
 def _refine_and_solve(
-    model: Model, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter, placement: Sequence[str]
+    model: Model, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
+    placement: Sequence[str],
 ) -> None:
     """Solve, and where `analysis.accuracy` asks for it refine and solve again, from rest, until it is met.
 
     Raises ConvergenceError ("accuracy") when passes or unknowns run out; the file then holds the last pass.
     """
-    if resume and model.analysis.accuracy is not None:
-        fractions = do_on_first(world, PbemError, lambda: read_mesh_fractions(target))
+    if target.resume and model.analysis.accuracy is not None:
+        fractions = do_on_first(world, PbemError, lambda: read_mesh_fractions(target.path))
         model = model if fractions is None else impose_fractions(model, fractions)
     first_unknowns = 0
     notes: Sequence[str] = (*model.notes,)
     for number in count(1):
         mesh = generate_mesh(model)
         check_shares(model, mesh, world.size)
-        listener.begin(model)
+        watch.begin(model)
         for note in (*notes, *mesh.notes, *placement) if number == 1 else ():
-            listener.note(note)
+            watch.note(note)
         first_unknowns = first_unknowns or 2 * mesh.nodes
-        decision = _solve(model, mesh, target, resume, options, listener, Pass(number, first_unknowns))
+        decision = _solve(model, mesh, target, options, watch, signals, Pass(number, first_unknowns))
         if decision.marked is None:
             return
-        model, resume = bisect_elements(model, decision.marked, decision.gently), False
+        # The next pass takes the place of this one in the file.
+        model, target = bisect_elements(model, decision.marked, decision.gently), _Target(target.path, False, True)
 
 
 def _solve(
-    model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter, one: Pass
+    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals, one: Pass
 ) -> Decision:
     """March through the load history; the first rank writes. Returns what follows."""
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
 
     def open_writer() -> ResultWriter | None:
-        create = ResultWriter.resume if resume else ResultWriter
         flat = [f"{name}={value}" for name, value in options.items()]
-        return create(target, model, mesh, world.size, petsc_version(), flat, region)
+        if target.resume:
+            return ResultWriter.resume(target.path, model, mesh, world.size, petsc_version(), flat, region)
+        return ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region, force=target.force)
 
+    watch.check()
+    signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)
     decision: Decision | None = None
     try:
+        signals.at_once = world.size == 1
         problem = assemble_problem(model, mesh, world)
+        signals.at_once = False
+        watch.look_after(problem.laws)
+        watch.check()
         for note in problem.notes:
-            listener.note(note)
+            watch.note(note)
         if interior is not None:
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
         estimator = make_estimator(model, mesh, last)
-        store_steps(march(problem, listener, start), model.output_every, interior, writer, listener, estimator)
+        try:
+            store_steps(march(problem, watch, start), model.output_every, interior, writer, watch, estimator)
+        except ConvergenceError:
+            watch.check()  # a law that failed has answered with no strength
+            raise
         estimator.destroy()
         if writer:
             for note in estimator.list_notes():
-                listener.note(note)
+                watch.note(note)
             decision = decide(model, mesh, writer.relative_errors, estimator, one)
         decision = broadcast(world, decision)
         assert decision is not None
         for note in decision.notes:
-            listener.note(note)
+            watch.note(note)
         if decision.failure:
             raise ConvergenceError("accuracy", decision.failure)
+        do_on_first(world, PbemError, lambda: writer.finish() if writer else None)
     except BaseException as error:
         if writer:
             writer.__exit__(type(error), error, error.__traceback__)
         raise
-    if writer:
-        writer.finish()
     world.Barrier()
     return decision
 

@@ -172,7 +172,8 @@ class Model:
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
-    follow the status of the pair next to them.
+    follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
+    were when the case was read.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -197,3 +198,4 @@ class Model:
     interior_grid: tuple[int, int] | None = None
     groups: tuple[Group, ...] = ()
     ties: tuple[Tie, ...] = ()
+    law_texts: Mapping[str, str] = field(default_factory=dict)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -51,13 +50,6 @@ def to_columns(points: NDArray[np.complex128]) -> NDArray[np.float64]:
     return np.stack([points.real, points.imag], axis=-1)
 
 
-def open_file(path: Path, mode: str) -> h5py.File:
-    """Open a result file for writing ("w") or for going on ("r+")."""
-    # Without locks, so that the file may be read while it is written; the 1.8 format stores long lists of names. Only
-    # views need more; a file that is all of the 1.10 format could not be opened after its run was killed.
-    return h5py.File(path, mode, libver=("v108", "v110"), locking=False)
-
-
 def write_attributes(
     file: h5py.File, model: Model, ranks: int, petsc_version: str, petsc_options: Sequence[str]
 ) -> None:
@@ -66,7 +58,7 @@ def write_attributes(
         "title": model.title, "pbem_version": __version__, "petsc_version": petsc_version, "case": model.source,
         "units_length": model.units_length, "units_stress": model.units_stress, "status": "running",
         "ranks": np.int32(ranks), "configuration": dump_configuration(model),
-        "petsc_options": " ".join(petsc_options),
+        "petsc_options": " ".join(petsc_options), "custom_laws": json.dumps(dict(model.law_texts)),
     }
     for name, value in attributes.items():
         file.attrs[name] = value
@@ -234,6 +226,28 @@ def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: 
     row = max(1, int(np.prod(shape))) * np.dtype(kind).itemsize
     chunk = (max(1, min(64, CHUNK_BYTES // row)), *(max(1, length) for length in shape))
     return group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=chunk)
+
+
+def count_steps(file: h5py.File) -> int:
+    """How many steps were stored completely: the shortest of all that grows with them."""
+    counts: list[int] = []
+
+    def count(_: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.maxshape[:1] == (None,):
+            counts.append(len(item))
+
+    for group in find_growing(file):
+        group.visititems(count)
+    return min(counts)
+
+
+# Groups of what does not grow, or of views of what does.
+OTHERS = ("nodes", "elements", "contact", "reactions", "tips")
+
+
+def find_growing(file: h5py.File) -> list[h5py.Group]:
+    """The groups of what grows with the steps."""
+    return [item for name, item in file.items() if name not in OTHERS and isinstance(item, h5py.Group)]
 
 
 def create_energy(group: h5py.Group, name: str) -> h5py.Dataset:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,13 +20,24 @@ from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
 from pbem.results.contents import Balances, Elements, Energies, Errors, Nodes, Steps, Tips, Units
-from pbem.results.layout import ENERGIES, TIP_DATASETS, read_fractions
-from pbem.results.lazy import AllPairs, Contact, Interfaces, Interior, freeze, open_quietly, read_names
+from pbem.results.journal import check_pages, is_being_written
+from pbem.results.layout import ENERGIES, TIP_DATASETS, count_steps, read_fractions
+from pbem.results.lazy import (
+    AllPairs,
+    Contact,
+    Interfaces,
+    Interior,
+    freeze,
+    open_quietly,
+    read_names,
+    refuse_damage,
+)
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
-STATUSES = ("running", "finished", "failed")
+STATUSES = ("running", "finished", "failed", "stopped")
+ATTEMPTS = 5
 
 
 @dataclass(frozen=True)
@@ -37,7 +49,7 @@ class Results:
     energies; balance: of the forces on every region, None in files of earlier versions; interior: points inside, None
     if the case has none; convergence: one row per Newton iteration with the fields step, iteration, residual, changed,
     stick, slip, open, seconds.
-    failure: why the run ended early (status "failed"), otherwise empty.
+    failure: why the run ended early (status "failed" or "stopped"), empty if it did not, or was killed.
     """
 
     path: Path
@@ -116,31 +128,41 @@ def open_results(path: str | os.PathLike[str]) -> Results:
     source = Path(path)
     if not source.is_file():
         raise ResultFileError(str(path), "no such file")
+    for attempt in range(ATTEMPTS):
+        try:
+            with refuse_damage(source):
+                return _open(source)
+        except ResultFileError:
+            # Of a run that is going on, the pages of a step may just be on their way to their places.
+            if attempt + 1 == ATTEMPTS or not is_being_written(source):
+                raise
+            time.sleep(0.1)
+    raise AssertionError
+
+
+def _open(path: Path) -> Results:
+    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
-        with open_quietly(source) as file:
-            if "pbem_version" not in file.attrs:
-                raise ResultFileError(str(path), "is an HDF5 file, but not a result file of pbem")
-            if "nodes" in file and "all" not in file:
-                raise ResultFileError(str(path), "was written by an older version of pbem")
-            return _read(source, file)
-    except OSError as error:
-        raise ResultFileError(str(path), f"is not an HDF5 file, or is cut off ({error})") from error
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise ResultFileError(str(path), f"is not a complete result file ({error})") from error
+        check_pages(disk)
+    finally:
+        os.close(disk)
+    with open_quietly(path) as file:
+        if "pbem_version" not in file.attrs:
+            raise ResultFileError(str(path), "is an HDF5 file, but not a result file of pbem")
+        if "nodes" in file and "all" not in file:
+            raise ResultFileError(str(path), "was written by an older version of pbem")
+        return _read(path, file)
 
 
 def _read(path: Path, file: h5py.File) -> Results:
     attributes = dict(file.attrs)
     steps = _read_steps(file)
     k = len(steps)
-    for name in ("fields/displacement", "fields/traction"):
-        if len(file[name]) < k:
-            raise ValueError(f"/{name} holds fewer steps than /steps")
     nodes, elements = file["nodes"], file["elements"]
     return Results(
         path=path,
         **{name: str(attributes[name]) for name in ("title", "case", "pbem_version", "petsc_version")},
-        status=_read_status(attributes), failure=str(attributes.get("failure", "")),
+        status=_read_status(path, attributes), failure=str(attributes.get("failure", "")),
         configuration=str(attributes.get("configuration", "")), ranks=int(attributes["ranks"]),
         units=Units(str(attributes["units_length"]), str(attributes["units_stress"])),
         nodes=Nodes(
@@ -168,11 +190,12 @@ def _read(path: Path, file: h5py.File) -> Results:
     )
 
 
-def _read_status(attributes: Mapping[str, Any]) -> str:
+def _read_status(path: Path, attributes: Mapping[str, Any]) -> str:
+    """The status in the file; of a run that was killed, and could not change it, "stopped"."""
     status = str(attributes["status"])
     if status not in STATUSES:
         raise ValueError(f"unknown status {status}")
-    return status
+    return "stopped" if status == "running" and not is_being_written(path) else status
 
 
 def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
@@ -184,7 +207,7 @@ def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
 def _read_steps(file: h5py.File) -> Steps:
     group = file["steps"]
     columns = ("number", "stage", "factor", "iterations", "residual")
-    k = min(len(group[name]) for name in columns)
+    k = count_steps(file)
     values = {name: freeze(group[name][:k].astype(float if name in ("factor", "residual") else int))
               for name in columns}
     return Steps(**values, stage_names=read_names(group["stage"]))

@@ -86,7 +86,7 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
     from pbem.contact.anchor import anchor_motions
     from pbem.contact.laws import collect_laws, start_memory
     from pbem.contact.loads import collect_outer_nodes, evaluate_load, find_needed_columns
-    from pbem.contact.support import close_nearest_pairs, describe_free_motions, find_ties
+    from pbem.contact.support import close_nearest_pairs, find_support, find_ties
     from pbem.mesh.generate import generate_mesh
     from pbem.model.build import build_model
     from pbem.model.support import find_free_motions
@@ -119,10 +119,11 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
             evaluate_load(model, mesh, outer, 0, (1 + number) / STEPS)
         find_needed_columns(model, mesh, outer)
     with clock.measure("support"):
-        anchors = anchor_motions(mesh, find_free_motions(model))
+        anchored = find_free_motions(model)
+        anchors = anchor_motions(mesh, anchored)
         modes = start_memory(laws).modes
         for _ in range(STEPS):
-            describe_free_motions(model, find_ties(model, mesh, modes), len(anchors))
+            find_support(model, mesh, anchors, anchored, find_ties(model, mesh, modes))
         close_nearest_pairs(mesh, laws, modes, laws.gap)
     with clock.measure("writer, begin"):
         writer = ResultWriter(target, model, mesh, 1, "")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.anchor import Anchor, see_motions
+from pbem.contact.anchor import Anchor, group_motions, see_motions
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, resists_slip
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -83,35 +83,47 @@ def find_support(
     """Which rigid motions are free with these ties, and which of the anchors, made for `anchored`, hold them."""
     motions = find_free_motions(model, ties)
     whole = np.eye(len(anchors))
-    if not motions:
-        return Support((), None, whole[:, :0], whole)
-    if len(motions) > len(anchors) or not _is_spanned(mesh, anchors, anchored, motions):
-        return Support(motions, "; ".join(motion.text for motion in motions), whole, whole[:, :0])
-    seen = see_motions(mesh, anchors, motions)
-    basis = np.linalg.qr(seen / np.linalg.norm(seen, axis=0), mode="complete")[0]
-    return Support(motions, None, basis[:, : len(motions)], basis[:, len(motions) :])
+    acting, released, unheld = [whole[:, :0]], [whole[:, :0]], []
+    region_of = np.array([anchor.region for anchor in anchors], dtype=np.int64)
+    numbers = {name: number for number, name in enumerate(mesh.region_names)}
+    present = {id(motion) for motion in motions}
+    for group in group_motions([*anchored, *motions]):
+        free = [motion for motion in group if id(motion) in present]
+        known = [motion for motion in group if id(motion) not in present]
+        at = np.flatnonzero(np.isin(region_of, [numbers[name] for motion in known for name in motion.regions]))
+        own = [anchors[k] for k in at]
+        if free and (len(free) > len(own) or not _is_spanned(mesh, own, known, free)):
+            unheld += [motion.text for motion in free]
+            acting.append(whole[:, at])
+            continue
+        seen = see_motions(mesh, own, free)
+        basis = np.linalg.qr(seen / np.linalg.norm(seen, axis=0), mode="complete")[0]
+        acting.append(whole[:, at] @ basis[:, : len(free)])
+        released.append(whole[:, at] @ basis[:, len(free) :])
+    text = "; ".join(unheld) or None
+    return Support(motions, text, np.concatenate(acting, axis=1), np.concatenate(released, axis=1))
 
 
 def _is_spanned(
-    mesh: Mesh, anchors: tuple[Anchor, ...], anchored: tuple[FreeMotion, ...], motions: tuple[FreeMotion, ...]
+    mesh: Mesh, anchors: Sequence[Anchor], anchored: Sequence[FreeMotion], motions: Sequence[FreeMotion]
 ) -> bool:
     """Whether all motions are combinations of the anchored ones; the anchors tell which."""
     parts = np.linalg.solve(see_motions(mesh, anchors, anchored), see_motions(mesh, anchors, motions))
-    whole, known = _list_velocities(mesh, motions), _list_velocities(mesh, anchored)
+    both = _list_velocities(mesh, [*motions, *anchored])
+    whole, known = both[:, : len(motions)], both[:, len(motions) :]
     return bool((np.abs(whole - known @ parts).max(axis=0) <= ANCHORED * np.abs(whole).max(axis=0)).all())
 
 
-def _list_velocities(mesh: Mesh, motions: tuple[FreeMotion, ...]) -> NDArray[np.complex128]:
-    """Velocities of a point of every region, and of another one against it, (2 regions, motions)."""
-    first = np.searchsorted(mesh.region, np.arange(len(mesh.region_names)))
-    size = float(np.abs(mesh.start - mesh.start.mean()).max())
-    result = np.zeros((2 * len(first), len(motions)), dtype=complex)
-    numbers = {name: number for number, name in enumerate(mesh.region_names)}
+def _list_velocities(mesh: Mesh, motions: Sequence[FreeMotion]) -> NDArray[np.complex128]:
+    """Velocities of a point of every region that moves, and of another one against it, (2 regions, motions)."""
+    names = {name: row for row, name in enumerate(sorted({name for motion in motions for name in motion.regions}))}
+    size = float(np.abs(mesh.start - mesh.start[0]).max())
+    result = np.zeros((len(names), 2, len(motions)), dtype=complex)
     for column, motion in enumerate(motions):
         for name, (shift, spin) in motion.velocities.items():
-            row = 2 * numbers[name]
-            result[row : row + 2, column] = shift + 1j * spin * mesh.start[first[numbers[name]]], spin * size
-    return result
+            point = mesh.start[np.searchsorted(mesh.region, mesh.region_names.index(name))]
+            result[names[name], :, column] = shift + 1j * spin * point, spin * size
+    return result.reshape(2 * len(names), -1)
 
 
 # Pairs of each parted interface that are closed to hold a body that would be free.

@@ -330,9 +330,10 @@ def in_child(action: Callable[[], None]) -> BaseException | None:
     if child == 0:
         os.close(reader)
         code = 0
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process, also within HDF5
+        signal.alarm(PATIENCE)
         try:
-            with alarm(PATIENCE):
-                action()
+            action()
         except BaseException as error:
             os.write(writer, describe_failure(error).encode()[:4000])
             code = 1

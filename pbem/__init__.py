@@ -17,7 +17,16 @@ Inside the program a point or a vector of the plane is one complex number x + iy
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pbem.errors import CaseError, ConvergenceError, LaunchError, PbemError, ResultFileError, StorageError
+from pbem.errors import (
+    CaseError,
+    ConvergenceError,
+    LaunchError,
+    LawError,
+    PbemError,
+    ResultFileError,
+    StopError,
+    StorageError,
+)
 from pbem.version import __version__
 
 if TYPE_CHECKING:
@@ -25,8 +34,8 @@ if TYPE_CHECKING:
     from pbem.results.reader import open_results
 
 __all__ = [
-    "CaseError", "ConvergenceError", "LaunchError", "PbemError", "ResultFileError", "StorageError", "__version__",
-    "open_results", "run",
+    "CaseError", "ConvergenceError", "LaunchError", "LawError", "PbemError", "ResultFileError", "StopError",
+    "StorageError", "__version__", "open_results", "run",
 ]
 
 # Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5.

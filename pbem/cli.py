@@ -5,27 +5,37 @@ from __future__ import annotations
 import argparse
 import contextlib
 import difflib
+import io
 import os
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from pbem.environment import find_launch
-from pbem.errors import CaseError, ConvergenceError, Fault, LaunchError, PbemError, StorageError
+from pbem.environment import PREFIX, find_launch, split_petsc_options
+from pbem.errors import (
+    CaseError,
+    ConvergenceError,
+    Fault,
+    LaunchError,
+    LawError,
+    PbemError,
+    StopError,
+    StorageError,
+    printable,
+)
 from pbem.make import add_make_commands, make
 from pbem.version import __version__
 
 if TYPE_CHECKING:
-    from pbem.results.reader import Results, Steps
+    from pbem.results.reader import Results
     from pbem.solve.step import Reporter
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.
 
-PREFIX = "-pbem_"
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 COMMANDS = ("make", "check", "run", "info", "plot")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
@@ -65,6 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if rank > 0:
         # What all ranks would say alike is said by the first.
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a title may have characters that the terminal's encoding has not
+            stream.reconfigure(errors="backslashreplace")
     petsc, plain = split_petsc_options(sys.argv[1:] if arguments is None else arguments)
     code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank)
     if code and rank > 0:
@@ -98,32 +111,6 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
 def _discard_output() -> None:
     """Send the rest of standard output nowhere: flushing it into a closed pipe at the end would fail once more."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def split_petsc_options(arguments: Sequence[str]) -> tuple[dict[str, str], list[str]]:
-    """PETSc options without their prefix, and the other arguments.
-
-    An option's value is the next argument unless that is an option itself (a negative number is none) or a case file.
-    """
-    petsc: dict[str, str] = {}
-    plain: list[str] = []
-    waiting = list(arguments)
-    while waiting:
-        argument = waiting.pop(0)
-        if not argument.startswith(PREFIX):
-            plain.append(argument)
-            continue
-        name, equals, value = argument.removeprefix(PREFIX).partition("=")
-        if not equals and waiting and not _starts_an_option(waiting[0]):
-            value = waiting.pop(0)
-        petsc[name] = value
-    return petsc, plain
-
-
-def _starts_an_option(argument: str) -> bool:
-    if argument.endswith(".toml"):
-        return True
-    return argument.startswith("-") and not argument[1:2].isdigit() and argument[1:2] != "."
 
 
 def find_case(name: str) -> Path:
@@ -178,9 +165,16 @@ def _names_a_case(argument: str) -> bool:
     return Path(argument).exists() or not difflib.get_close_matches(argument, COMMANDS, cutoff=0.7)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that repeats no control characters of its arguments."""
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        super()._print_message(printable(message, keep="\n"), file)
+
+
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line, without the options of PETSc."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="pbem", description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--version", action="version", version=f"pbem {__version__}")
@@ -202,6 +196,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("case", metavar="CASE")
     run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
     run.add_argument("--resume", action="store_true", help="go on after the last step that the result file holds")
+    run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
     info = add("info", _info, "tell what a result file holds")
@@ -212,15 +207,16 @@ def make_parser() -> argparse.ArgumentParser:
     plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
     plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
+    plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
     plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
     return parser
 
 
 def _make(options: argparse.Namespace) -> int:
     try:
-        print(f"case file: {make(options)}")
+        _tell(f"case file: {make(options)}")
     except (OSError, ValueError) as error:
-        print(f"pbem make: {error}", file=sys.stderr)
+        _say(f"pbem make: {error}", 0)
         return WRONG_INPUT
     return 0
 
@@ -235,12 +231,12 @@ def _check(options: argparse.Namespace) -> int:
     if options.plot:
         check_picture_path(options.plot)
     mesh = generate_mesh(model)
-    print(describe_model(model, mesh))
+    _tell(describe_model(model, mesh))
     if options.plot:
         from pbem.results.plots import plot_model
 
         plot_model(model, mesh, options.plot)
-        print(f"\npicture: {options.plot}")
+        _tell(f"\npicture: {options.plot}")
     return 0
 
 
@@ -248,7 +244,7 @@ def _info(options: argparse.Namespace) -> int:
     from pbem.results.describe import describe_results
     from pbem.results.reader import open_results
 
-    print(describe_results(open_results(options.file)))
+    _tell(describe_results(open_results(options.file)))
     return 0
 
 
@@ -260,14 +256,21 @@ def _plot(options: argparse.Namespace) -> int:
 
     results = open_results(options.file)
     source = Path(options.file)
-    beside = source.with_name(f"{source.stem}_{options.field}.png") if options.field else source.with_suffix(".png")
+    kind = "mesh" if options.mesh else options.field
+    beside = source.with_name(f"{source.stem}_{kind}.png") if kind else source.with_suffix(".png")
     target = check_picture_path(options.output or beside)
     step = -1 if options.step is None else results.find_step(options.step)
-    if options.field:
+    if options.mesh:
+        from pbem.results.level_plot import read_refined
+        from pbem.results.plots import plot_model
+
+        model, mesh, levels = read_refined(results)
+        plot_model(model, mesh, target, levels)
+    elif options.field:
         plot_field(results, options.field, target, step)
     else:
         plot_results(results, target, step, options.magnify)
-    print(f"picture: {target}")
+    _tell(f"picture: {target}")
     return 0
 
 
@@ -276,7 +279,7 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     target = Path(options.output or case.stem + ".h5")
 
     run = _load_driver()
-    from pbem.parallel import abort_if_unexpected, world
+    from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
     from pbem.progress import make_reporter
 
     reporter: Reporter | None = None
@@ -285,41 +288,49 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     try:
         with abort_if_unexpected(world, PbemError):
             reporter = make_reporter(options.quiet) if world.rank == 0 else None
-        results = run(
-            case, target, resume=options.resume, petsc=petsc, operator=options.operator, reporter=reporter
-        )
+        results = run(case, target, resume=options.resume, force=options.force, petsc=petsc,
+                      operator=options.operator, reporter=reporter)
     except LaunchError as error:
         _close(reporter)
         code = _say_wrong_launch(error, world.rank, world.size)
-    except ConvergenceError as error:
+    except (Exception, KeyboardInterrupt) as error:
         _close(reporter)
-        _say(f"pbem: not converged: {error}\n{target} holds every step reached", world.rank)
-        code = NOT_CONVERGED
-    except StorageError as error:
-        _close(reporter)
-        _say(f"pbem: {error}; it holds every step before", world.rank)
-        code = UNEXPECTED
-    except KeyboardInterrupt:
-        _close(reporter)
-        _say(f"pbem: interrupted; if {target} was begun, --resume goes on after its last step", world.rank)
-        return INTERRUPTED
-    except BrokenPipeError:
-        # Only of one rank: several have been ended. The run is not finished, whatever has become of its reader.
-        _discard_output()
-        _say(f"pbem: nobody reads the progress any more; if {target} was begun, --resume goes on after its last step",
-             world.rank)
-        code = UNEXPECTED
-    except PbemError as error:
-        _close(reporter)
-        _say(f"pbem: {error}", world.rank)
-        code = WRONG_INPUT
+        if isinstance(error, PbemError | KeyboardInterrupt):
+            text, code = _describe_end(error, target)
+        elif lacks_memory(error):
+            text, code = f"{describe_lack(error)}; {_describe_rest(target)}", UNEXPECTED
+        else:
+            raise
+        _say(f"pbem: {text}", world.rank)
+        if isinstance(error, StopError) and error.reason == "reader":
+            _discard_output()
     else:
         if world.rank == 0 and not options.quiet:
             _close(reporter)
-            _say_finished(results.steps, target, time.perf_counter() - begun)
+            _say_finished(results, target, time.perf_counter() - begun)
     # All ranks raise these errors alike, and the first must have spoken before a launcher sees one of them end.
     world.Barrier()
     return code
+
+
+def _describe_end(error: BaseException, target: Path) -> tuple[str, int]:
+    """What is said of a run that has ended early, and the exit code."""
+    if isinstance(error, ConvergenceError):
+        return f"not converged: {error}\n{target} holds every step reached", NOT_CONVERGED
+    if isinstance(error, StorageError):
+        return f"{error}; {_describe_rest(target)}", UNEXPECTED
+    if isinstance(error, LawError):
+        return f"{error}; {target} holds every step before", UNEXPECTED
+    if isinstance(error, StopError):
+        return f"{error.detail}; {_describe_rest(target)}", error.code
+    if isinstance(error, KeyboardInterrupt):
+        return f"interrupted; {_describe_rest(target)}", INTERRUPTED
+    return str(error), WRONG_INPUT
+
+
+def _describe_rest(target: Path) -> str:
+    """What is left of it."""
+    return f"if {target} was begun, it holds every step before, and --resume goes on after them"
 
 
 def _load_driver() -> Callable[..., Results]:
@@ -353,19 +364,32 @@ def _say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
     return WRONG_INPUT
 
 
-def _say_finished(steps: Steps, target: Path, seconds: float) -> None:
+def _say_finished(results: Results, target: Path, seconds: float) -> None:
+    from pbem.results.describe import describe_errors
+
+    steps = results.steps
     number = int(steps.number[-1]) if len(steps) else 0
-    print(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}", flush=True)
+    if number:
+        _tell(f"estimated discretisation errors: {describe_errors(results)[0]}")
+    _tell(f"finished: {number} step{'s' * (number != 1)} in {seconds:.3g} s, results: {target}")
+
+
+def _tell(text: str) -> None:
+    """Print to standard output; names and titles from files must not steer the terminal."""
+    print(printable(text, keep="\n"), flush=True)
 
 
 def _close(reporter: Reporter | None) -> None:
     close = getattr(reporter, "close", None)
     if close is not None:
-        close()
+        with contextlib.suppress(OSError):
+            close()
 
 
 def _say(text: str, rank: int) -> None:
     """Print to standard error, on the first rank."""
     if rank == 0:
-        sys.stdout.flush()
-        print(text, file=sys.stderr, flush=True)
+        with contextlib.suppress(OSError):  # of a pipe or terminal that has been closed
+            sys.stdout.flush()
+        with contextlib.suppress(OSError):
+            print(printable(text, keep="\n"), file=sys.stderr, flush=True)

@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import get_args
 
 from pbem.contact.strength import read_checked_model
-from pbem.errors import CaseError, ConvergenceError, Fault, PbemError
+from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
-from pbem.parallel import abort_if_unexpected, broadcast, do_on_first, world
+from pbem.model.refinement import bisect_elements, impose_fractions
+from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_first, world
+from pbem.results.accuracy import Decision, Pass, decide
+from pbem.results.estimator import Estimator
 from pbem.results.output import check_output_path
 from pbem.results.reader import Results, open_results
+from pbem.results.resume import read_mesh_fractions
+from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
 from pbem.solve.assembly import assemble_problem
+from pbem.solve.beside import NOTHING_COARSER, put_beside
 from pbem.solve.fields import InteriorField
 from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
+from pbem.solve.options import check_options
+from pbem.solve.second import SecondSolution
 from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step
+from pbem.solve.watch import Watch
 
 
 def run(
@@ -30,6 +40,7 @@ def run(
     output: str | os.PathLike[str] | None = None,
     *,
     resume: bool = False,
+    force: bool = False,
     petsc: Mapping[str, str] | None = None,
     operator: Operator | None = None,
     reporter: Reporter | None = None,
@@ -37,75 +48,162 @@ def run(
     """Read a case file, solve it, and return its results.
 
     case: path of the TOML file. output: path of the result file; by default the case's name with .h5, in the working
-    directory. resume: go on after the last step that the file holds. petsc: PETSc options without prefix, which win
-    over the case's [petsc] table. operator: "auto", "dense" or "hierarchical", in place of the case's solver.operator;
-    the configuration in the result file tells it. reporter: told of the progress, on the first rank only.
-    Every rank of an MPI run calls this and gets the results.
+    directory. resume: go on after the last step that the file holds. force: replace results that are there; without
+    either, they are left alone. petsc: PETSc options without prefix, which win over the case's [petsc] table.
+    operator: "auto", "dense" or "hierarchical", in place of the case's solver.operator; the configuration in the result
+    file tells it. reporter: told of the progress, on the first rank only. Every rank of an MPI run calls this and gets
+    the results.
 
     Raises LaunchError (ranks, libraries or threads that do not fit together), CaseError (all faults of the case),
-    ResultFileError (the output cannot be written, or does not belong to the case), ConvergenceError (the file then
-    holds every step reached), StorageError (the disk has no room for a step; the file holds those before it). Any other
+    ResultFileError (the output cannot be written, is there already, or is another case's), ConvergenceError (the file
+    then holds every step reached), StorageError (the disk has no room for a step; the file holds those before it),
+    LawError (a custom law failed), StopError (told to stop by a signal; KeyboardInterrupt by SIGINT). Any other
     exception on one rank ends all ranks. ValueError: there is no such operator.
     """
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
-    with abort_if_unexpected(world, PbemError):
-        placement = check_start(world)
-        path = Path(case)
-        model = do_on_first(world, PbemError, lambda: read_checked_model(path))
-        if operator is not None:
-            if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
-                found = f'"{model.solver.linear}" with operator = "hierarchical", which stores no matrix to factor'
-                raise CaseError(str(path), (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
-            model = replace(model, solver=replace(model.solver, operator=operator))
-        target = Path(output) if output is not None else Path(path.stem + ".h5")
-        do_on_first(world, PbemError, lambda: check_output_path(target))
+    try:
+        with abort_if_unexpected(world, PbemError), StopSignals() as signals:
+            placement = check_start(world)
+            signals.at_once = world.size == 1
+            path = Path(case)
+            model = do_on_first(world, PbemError, lambda: _read(path, operator))
+            target = Path(output) if output is not None else Path(path.stem + ".h5")
+            inputs = [path, *map(Path, model.law_texts)]
+            do_on_first(world, PbemError, lambda: check_output_path(
+                target, resume=resume, force=force, source=model.source, inputs=inputs))
+            do_on_first(world, PbemError, lambda: check_options(str(path), model.solver.petsc, petsc or {}))
+            watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)
+            options = {**model.solver.petsc, **(petsc or {})}
+            with petsc_options(options):
+                _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement)
+            results = open_results(target)
+            for note in compare_release(results):
+                watch.note(note)
+            return results
+    except StopError as error:
+        if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
+            raise KeyboardInterrupt from error
+        raise
+
+
+@dataclass(frozen=True)
+class _Target:
+    """The result file, and whether to go on with it or to replace it."""
+
+    path: Path
+    resume: bool
+    force: bool
+
+
+def _read(path: Path, operator: Operator | None) -> Model:
+    model = read_checked_model(path)
+    if operator is None:
+        return model
+    if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
+        found = f'"{model.solver.linear}" with operator = "hierarchical", which stores no matrix to factor'
+        raise CaseError(str(path), (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
+    return replace(model, solver=replace(model.solver, operator=operator))
+
+
+def _refine_and_solve(
+    model: Model, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
+    placement: Sequence[str],
+) -> None:
+    """Solve, and where `analysis.accuracy` asks for it refine and solve again, from rest, until it is met.
+
+    Raises ConvergenceError ("accuracy") when passes or unknowns run out; the file then holds the last pass.
+    """
+    if target.resume and model.analysis.accuracy is not None:
+        fractions = do_on_first(world, PbemError, lambda: read_mesh_fractions(target.path))
+        model = model if fractions is None else impose_fractions(model, fractions)
+    first_unknowns = 0
+    notes: Sequence[str] = (*model.notes,)
+    for number in count(1):
         mesh = generate_mesh(model)
         check_shares(model, mesh, world.size)
-        listener = reporter if reporter is not None and world.rank == 0 else SilentReporter()
-        listener.begin(model)
-        for note in (*model.notes, *mesh.notes, *placement):
-            listener.note(note)
-        options = {**model.solver.petsc, **(petsc or {})}
-        with petsc_options(options):
-            _solve(model, mesh, target, resume, options, listener)
-        return open_results(target)
+        watch.begin(model)
+        for note in (*notes, *mesh.notes, *placement) if number == 1 else ():
+            watch.note(note)
+        first_unknowns = first_unknowns or 2 * mesh.nodes
+        decision = _solve(model, mesh, target, options, watch, signals, Pass(number, first_unknowns))
+        if decision.marked is None:
+            return
+        # The next pass takes the place of this one in the file.
+        model, target = bisect_elements(model, decision.marked, decision.gently), _Target(target.path, False, True)
 
 
 def _solve(
-    model: Model, mesh: Mesh, target: Path, resume: bool, options: Mapping[str, str], listener: Reporter
-) -> None:
-    """March through the load history; the first rank writes."""
+    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals, one: Pass
+) -> Decision:
+    """March through the load history; the first rank writes. Returns what follows."""
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
 
     def open_writer() -> ResultWriter | None:
-        create = ResultWriter.resume if resume else ResultWriter
         flat = [f"{name}={value}" for name, value in options.items()]
-        return create(target, model, mesh, world.size, petsc_version(), flat, region)
+        if target.resume:
+            return ResultWriter.resume(target.path, model, mesh, world.size, petsc_version(), flat, region)
+        return ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region, force=target.force)
 
+    watch.check()
+    signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)
+    decision: Decision | None = None
     try:
+        signals.at_once = world.size == 1
         problem = assemble_problem(model, mesh, world)
+        signals.at_once = False
+        watch.look_after(problem.laws)
+        watch.check()
         for note in problem.notes:
-            listener.note(note)
+            watch.note(note)
         if interior is not None:
             interior.prepare(problem.operator)
         start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-        store_steps(march(problem, listener, start), model.output_every, interior, writer, listener)
+        estimator = make_estimator(model, mesh, last)
+        try:
+            store_steps(march(problem, watch, start), model.output_every, interior, writer, watch, estimator)
+        except ConvergenceError:
+            watch.check()  # a law that failed has answered with no strength
+            raise
+        estimator.destroy()
+        if writer:
+            for note in estimator.list_notes():
+                watch.note(note)
+            decision = decide(model, mesh, writer.relative_errors, estimator, one)
+        decision = broadcast(world, decision)
+        assert decision is not None
+        for note in decision.notes:
+            watch.note(note)
+        if decision.failure:
+            raise ConvergenceError("accuracy", decision.failure)
+        do_on_first(world, PbemError, lambda: writer.finish() if writer else None)
     except BaseException as error:
         if writer:
             writer.__exit__(type(error), error, error.__traceback__)
         raise
-    if writer:
-        writer.finish()
     world.Barrier()
+    return decision
+
+
+def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:
+    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
+    beside, second, missing = None, None, ""
+    try:
+        beside = put_beside(model, mesh)
+        second = None if beside is None else SecondSolution(beside, world, start)
+        missing = NOTHING_COARSER if beside is None else ""
+    except PbemError as error:
+        missing = f"the second solution cannot be computed ({error})"
+    return Estimator(model, mesh, beside, second, missing, world.rank == 0)
 
 
 def store_steps(
     steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
     listener: Reporter | None = None,
+    estimator: Estimator | None = None,
 ) -> None:
     """Write the steps as they come, those that are stored with the field at the interior points."""
     waiting: Step | None = None
@@ -115,12 +213,16 @@ def store_steps(
             waiting = None if stored else step
             if interior is not None and stored:
                 step = replace(step, interior=interior.evaluate(step))
+            rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
             notes = do_on_first(
-                world, PbemError, lambda due=step: writer.append(due) if writer else (),  # type: ignore[misc]
+                world, PbemError,
+                lambda due=step, rows=rows: writer.append(due, rows) if writer else (),  # type: ignore[misc]
             )
             for note in notes:
                 (listener or SilentReporter()).note(note)
+            if writer and estimator is not None and estimator.missing:
+                writer.note_missing(estimator.missing)
     except ConvergenceError:
         # All ranks are here together: the last step reached is stored as well.
         if interior is not None and waiting is not None:

@@ -26,6 +26,9 @@ RANK_ONLY = ("PMIX_RANK", "PALS_RANKID", "ALPS_APP_PE")
 # From here up Slurm's step numbers stand for the batch script, an interactive shell and the like, not for srun.
 SPECIAL_STEPS = 4294967280
 
+# Of options on the command line that are PETSc's.
+PREFIX = "-pbem_"
+
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 OVERRIDE = "PBEM_ALLOW_OVERSUBSCRIPTION"
 
@@ -236,3 +239,29 @@ def is_allowed(environ: Mapping[str, str]) -> bool:
 
 def _count(number: float, noun: str) -> str:
     return f"{number:g} {noun}{'' if number == 1 else 's'}"
+
+
+def split_petsc_options(arguments: Sequence[str]) -> tuple[dict[str, str], list[str]]:
+    """PETSc options without their prefix, and the other arguments.
+
+    An option's value is the next argument unless that is an option itself (a negative number is none) or a case file.
+    """
+    petsc: dict[str, str] = {}
+    plain: list[str] = []
+    waiting = list(arguments)
+    while waiting:
+        argument = waiting.pop(0)
+        if not argument.startswith(PREFIX):
+            plain.append(argument)
+            continue
+        name, equals, value = argument.removeprefix(PREFIX).partition("=")
+        if not equals and waiting and not _starts_an_option(waiting[0]):
+            value = waiting.pop(0)
+        petsc[name] = value
+    return petsc, plain
+
+
+def _starts_an_option(argument: str) -> bool:
+    if argument.endswith(".toml"):
+        return True
+    return argument.startswith("-") and not argument[1:2].isdigit() and argument[1:2] != "."

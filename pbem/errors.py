@@ -2,8 +2,26 @@
 
 from __future__ import annotations
 
+import unicodedata
 from dataclasses import dataclass
 from typing import Any
+
+# Characters that change the direction of writing: what stands in a message would not be what is seen.
+DIRECTIONS = frozenset("\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+
+
+def is_control(character: str) -> bool:
+    """Whether a terminal may obey a character, or cannot show it: controls, line separators, half characters."""
+    return unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in DIRECTIONS
+
+
+def printable(text: str, keep: str = "") -> str:
+    """The text with escapes such as \\x1b in place of control characters, but of those to keep."""
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(
+        each if each in keep or not is_control(each) else each.encode("unicode_escape").decode() for each in text
+    )
 
 
 @dataclass(frozen=True)
@@ -19,7 +37,7 @@ class Fault:
     expected: str
 
     def __str__(self) -> str:
-        return f"{self.place}: found {self.found}; expected {self.expected}"
+        return printable(f"{self.place}: found {self.found}; expected {self.expected}")
 
 
 class PbemError(Exception):
@@ -37,7 +55,7 @@ class CaseError(PbemError):
         self.source = source
         self.faults = faults
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
-        super().__init__("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
+        super().__init__("\n".join([f"{printable(source)}: {count}", *(f"  {fault}" for fault in faults)]))
 
 
 class ConvergenceError(PbemError):
@@ -53,6 +71,30 @@ class ConvergenceError(PbemError):
         super().__init__(f"{reason}: {detail}")
 
 
+class StopError(PbemError):
+    """A run was told to stop, or cannot go on here; a later one can go on from its file.
+
+    reason: a short name, e.g. "SIGTERM"; detail: a sentence; code: the exit code of the program.
+    """
+
+    def __init__(self, reason: str, detail: str, code: int = 1) -> None:
+        self.reason = reason
+        self.detail = detail
+        self.code = code
+        super().__init__(f"{reason}: {detail}")
+
+
+class LawError(PbemError):
+    """A custom law failed, or gave something else than a strength, while it was computed with.
+
+    reason: a sentence that names the law's file.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)
+
+
 class ResultFileError(PbemError):
     """A result file cannot be written, is not one of pbem's, or does not belong to the case.
 
@@ -62,7 +104,7 @@ class ResultFileError(PbemError):
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
         self.reason = reason
-        super().__init__(f"{path}: {reason}")
+        super().__init__(printable(f"{path}: {reason}"))
 
 
 class StorageError(PbemError):
@@ -74,7 +116,7 @@ class StorageError(PbemError):
     def __init__(self, path: str, reason: str) -> None:
         self.path = path
         self.reason = reason
-        super().__init__(f"{path}: {reason}")
+        super().__init__(printable(f"{path}: {reason}"))
 
 
 class LaunchError(PbemError):

@@ -141,6 +141,12 @@ def arc_crack_intensity(radius: float, half_angle: float, stress: float) -> Inte
     return Intensity(float(root * np.cos(half)), float(root * np.sin(half)))
 
 
+def arc_crack_parallel_stress(half_angle: float, stress: float) -> float:
+    """T-stress of the crack of `arc_crack_intensity`: what its potential has beside the root (Muskhelishvili, 124)."""
+    share = np.sin(0.5 * half_angle) ** 2
+    return float(2 * stress * share / (1 + share))
+
+
 def collinear_cracks_intensity(inner: float, outer: float, stress: float) -> tuple[float, float]:
     """KI at the inner and the outer tips of two cracks from inner to outer on either side of the middle, in tension."""
     m = 1 - (inner / outer) ** 2

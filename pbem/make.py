@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pbem.errors import printable
+
 if TYPE_CHECKING:
     from pbem.case.make import Plan, Value
 
@@ -153,7 +155,7 @@ def read_plan(options: argparse.Namespace, arguments: Sequence[str]) -> Plan:
         table={key: value for key, value in table.items() if value is not None},
         host=host, filling=filling, remote=(options.sxx, options.syy, options.sxy), order=options.order,
         steps=options.steps, plate=options.plate, plate_elements=options.plate_elements,
-        command=shlex.join(["pbem", "make", *arguments]), law=_read_law(options, cracks),
+        command=printable(shlex.join(["pbem", "make", *arguments])), law=_read_law(options, cracks),
     )
 
 

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from pbem.errors import LaunchError
+from pbem.errors import LaunchError, StopError, printable
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
 T = TypeVar("T")
+
+PETSC_ERR_MEM = 55
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 world: MPI.Intracomm = MPI.COMM_WORLD
 
@@ -33,13 +38,73 @@ def abort_if_unexpected(comm: MPI.Intracomm, expected: type[Exception]) -> Itera
         yield
     except expected:
         raise
-    except BaseException:
+    except BaseException as error:
         if comm.size == 1:
             raise
-        sys.stdout.flush()
-        sys.stderr.write(f"pbem: rank {comm.rank} of {comm.size} failed, all ranks end\n{traceback.format_exc()}")
-        sys.stderr.flush()
+        where = f"pbem: rank {comm.rank} of {comm.size}"
+        if lacks_memory(error):
+            # Ranks of a node run out of memory together; whichever speaks first ends the others.
+            time.sleep(0.2 * min(comm.rank, 50))
+            text = f"{where}: {describe_lack(error)}; all ranks end\n"
+        else:
+            text = f"{where} failed, all ranks end\n{traceback.format_exc()}"
+        with suppress(OSError):
+            sys.stdout.flush()
+            sys.stderr.write(printable(text, keep="\n"))
+            sys.stderr.flush()
         comm.Abort(1)
+
+
+def lacks_memory(error: BaseException) -> bool:
+    """Whether it is Python's error of too little memory, or PETSc's."""
+    return isinstance(error, MemoryError) or getattr(error, "ierr", None) == PETSC_ERR_MEM
+
+
+def describe_lack(error: BaseException) -> str:
+    """That there is not enough memory, in one line."""
+    text = " ".join(str(error).split())
+    return f"out of memory{f' ({text})' if text else ''}; more nodes, or fewer ranks on each, give a rank more of it"
+
+
+class StopSignals:
+    """Notes the signals by which users and batch systems stop a run, so that all ranks can stop together.
+
+    Used as a context, in the main thread; elsewhere, and for signals that are ignored (nohup), it does nothing. The
+    first signal is noted only, a second one does what it does without this. asked: reason, detail and exit code, as of
+    StopError; None as long as the run may go on. With `at_once` the first signal raises StopError itself: for what one
+    rank does between two occasions to ask.
+    """
+
+    def __init__(self) -> None:
+        self.asked: tuple[str, str, int] | None = None
+        self.at_once = False
+        self._former: dict[int, Any] = {}
+
+    def ask(self, reason: str, detail: str, code: int) -> None:
+        """Let the run stop at the next occasion; the first reason counts."""
+        self.asked = self.asked or (reason, detail, code)
+
+    def _note(self, number: int, _: object) -> None:
+        name = signal.Signals(number).name
+        self.ask(name, f"stopped by {name}", 128 + number)
+        self._restore()
+        if self.at_once and self.asked is not None:
+            raise StopError(*self.asked)
+
+    def __enter__(self) -> StopSignals:
+        if threading.current_thread() is threading.main_thread():
+            for number in STOP_SIGNALS:
+                if signal.getsignal(number) not in (signal.SIG_IGN, None):
+                    self._former[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._restore()
+
+    def _restore(self) -> None:
+        while self._former:
+            number, former = self._former.popitem()
+            signal.signal(number, former)
 
 
 def do_on_first(comm: MPI.Intracomm, expected: type[Exception], action: Callable[[], T], share: bool = True) -> T:

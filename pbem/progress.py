@@ -6,6 +6,7 @@ import math
 import sys
 from typing import Any, TextIO
 
+from pbem.errors import printable
 from pbem.model.model import Model, Stage
 from pbem.solve.step import OPEN, SLIP, STICK, Iteration, Reporter, SilentReporter, Step
 
@@ -34,7 +35,7 @@ class LogReporter:
         self._number: int | None = None
 
     def begin(self, model: Model) -> None:
-        self._plan = Plan(model.stages)
+        self._plan, self._number = Plan(model.stages), None
 
     def note(self, text: str) -> None:
         self._say(f"note: {text}")
@@ -62,7 +63,7 @@ class LogReporter:
         self._say("  the step is halved")
 
     def _say(self, text: str) -> None:
-        print(text, file=self._stream, flush=True)
+        print(printable(text), file=self._stream, flush=True)
 
 
 class BarReporter:
@@ -111,7 +112,7 @@ class BarReporter:
             self._bar.close()
 
     def _write(self, text: str) -> None:
-        self._bar.write(text, file=self._bar.fp)
+        self._bar.write(printable(text), file=self._bar.fp)
 
 
 def make_reporter(quiet: bool = False, stream: TextIO | None = None) -> Reporter:

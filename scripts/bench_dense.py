@@ -126,7 +126,7 @@ def main() -> None:
         start = world.gather(measure_peak())
         recorder = Recorder()
         begin = time.perf_counter()
-        pbem.run(case, folder / "plate.h5", reporter=recorder)
+        pbem.run(case, folder / "plate.h5", force=True, reporter=recorder)
         whole = time.perf_counter() - begin
         peaks = world.gather(measure_peak())
         model = read_model(case)[1]

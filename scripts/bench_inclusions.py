@@ -95,7 +95,7 @@ def main() -> None:
                 recorder = Recorder()
                 begin = clock()
                 results = pbem.run(
-                    folder / f"inclusions_{count}_{law}.toml", folder / "inclusions.h5", reporter=recorder
+                    folder / f"inclusions_{count}_{law}.toml", folder / "inclusions.h5", force=True, reporter=recorder
                 )
                 whole = clock() - begin
                 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -36,7 +36,7 @@ def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 begin = peak()
-results = run(sys.argv[1], sys.argv[2])
+results = run(sys.argv[1], sys.argv[2], force=True)
 peaks = world.gather((begin, peak()))
 if world.rank == 0:
     iterations = int(results.steps.iterations.sum())

@@ -12,6 +12,6 @@ export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy
 export OMP_NUM_THREADS=1
 
 mkdir -p demo
-mpirun -n 2 .venv/bin/pbem run cases/two_blocks.toml -o demo/two_blocks.h5
+mpirun -n 2 .venv/bin/pbem run cases/two_blocks.toml -o demo/two_blocks.h5 --force
 .venv/bin/pbem info demo/two_blocks.h5
 .venv/bin/pbem plot demo/two_blocks.h5 -o "$root/demo/two_blocks.png" # and says where the picture is

@@ -89,7 +89,7 @@ def measure(case: Path, operator_only: bool, output: str | None = None) -> dict[
         driver.march = lambda problem, listener, start: iter(())
     with tempfile.TemporaryDirectory() as folder:
         target = output or world.bcast(str(Path(folder) / "run.h5"), root=0)
-        driver.run(case, target)
+        driver.run(case, target, force=True)
         clock.seconds["whole"] = time.perf_counter() - begin
         world.Barrier()
     problem = problems[0]

@@ -65,7 +65,7 @@ class Runs:
                 return stored
         print(f"running {stem}", flush=True)
         case.write_text(text, encoding="utf-8")
-        results: Results = pbem.run(case, path)
+        results: Results = pbem.run(case, path, force=True)
         return results
 
 

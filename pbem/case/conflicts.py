@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -56,6 +58,24 @@ def _check_name(loc: Loc, name: str) -> list[Finding]:
     return [Finding(loc, f"the name {show(name)}", expected)]
 
 
+# A circle's points differ from its center by so many of the center's own rounding errors at least.
+ROUNDING = 1e-12
+
+
+def _check_roundness(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+    """A radius that is lost in the rounding of the center's coordinates makes no circle."""
+    center, radius = table.get("center"), table.get("radius")
+    if not isinstance(center, list) or not isinstance(radius, int | float):
+        return []
+    if not all(isinstance(each, int | float) for each in center):
+        return []
+    farthest = max((abs(each) for each in center), default=0)
+    if not 0 < radius < ROUNDING * min(farthest, 1e300):
+        return []
+    found = f"{show(radius)}, which is lost in the rounding of the center's coordinates"
+    return [Finding((*loc, "radius"), found, f"more than {ROUNDING:g} of the center's coordinates")]
+
+
 def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     shapes = "points, or center and radius (with angles for an arc), or expression"
@@ -68,6 +88,7 @@ def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
             Finding(loc, f"no {key}", "center and radius, and angles for an arc")
             for key in ("center", "radius") if key not in table
         ]
+        findings += _check_roundness(loc, table)
     else:
         findings += [
             Finding((*loc, key), f"{key} with {given[0]}", f"one shape: {shapes}")
@@ -208,11 +229,41 @@ def _check_solver(raw: Mapping[str, Any]) -> list[Finding]:
     return [Finding(("solver", "linear"), found, "\"auto\" or \"gmres\", or operator = \"dense\"")]
 
 
+# Options of the iterations that PETSc refuses outside of these bounds, when it solves the first system: least, most,
+# and whether they count something.
+OPTION_BOUNDS: Mapping[str, tuple[float, float, bool]] = {
+    "ksp_rtol": (0.0, 1.0, False), "ksp_atol": (0.0, math.inf, False), "ksp_divtol": (0.0, math.inf, False),
+    "ksp_max_it": (0, 2**31 - 1, True), "ksp_gmres_restart": (1, 2**31 - 1, True),
+}  # fmt: skip
+
+
 def _check_options(raw: Mapping[str, Any]) -> list[Finding]:
     options = raw.get("petsc")
-    expected = "the option's name without the leading dash, without spaces"
-    names: Sequence[str] = list(options) if isinstance(options, dict) else []
-    return [
-        Finding(("petsc", name), f"the option {show(name)}", expected)
-        for name in names if name.startswith("-") or not name or any(c.isspace() for c in name)
-    ]
+    if not isinstance(options, dict):
+        return []
+    findings = []
+    for name, value in options.items():
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
+            expected = "the option's name without the leading dash, of letters, digits and _"
+            findings.append(Finding(("petsc", name), f"the option {show(name)}", expected))
+        elif name in OPTION_BOUNDS and isinstance(value, str | int | float):
+            findings += _check_bounds(name, value)
+    return findings
+
+
+def _check_bounds(name: str, value: str | int | float) -> list[Finding]:
+    least, most, whole = OPTION_BOUNDS[name]
+    if isinstance(value, str) and value.lower().removeprefix("petsc_") in ("default", "decide"):
+        return []
+    try:
+        number = int(str(value)) if whole else float(value)
+        right = least <= number <= most and not (name == "ksp_rtol" and number == most)
+    except (ValueError, OverflowError):
+        right = False
+    if isinstance(value, float) and not math.isfinite(value):
+        return []  # the schema reports it
+    if right and not isinstance(value, bool):
+        return []
+    kind = "whole number" if whole else "number"
+    below = {"ksp_rtol": " and < 1"}.get(name, "")
+    return [Finding(("petsc", name), show(value), f"a {kind} >= {least:g}{below}")]

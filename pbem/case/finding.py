@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from pbem.case.places import Loc
+from pbem.errors import printable
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ def show(value: object) -> str:
     if isinstance(value, bool):
         text = "true" if value else "false"
     elif isinstance(value, str):
-        text = f'"{value}"'
+        text = '"' + printable(value.replace("\\", "\\\\").replace('"', '\\"')) + '"'
     elif isinstance(value, (list, tuple)):
         text = "[" + ", ".join(show(entry) for entry in value[:6]) + (", ..." if len(value) > 6 else "") + "]"
     elif isinstance(value, dict):

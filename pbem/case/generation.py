@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pbem.case.effects import combine_laws
 from pbem.case.finding import Finding, list_names, suggest
 from pbem.case.placement import Area, Body, make_ground, place_bodies
 from pbem.case.schema import CaseFile, CurveTable, GenerateTable, LawTable, RegionTable, StageTable
@@ -68,9 +69,11 @@ def expand(case: CaseFile) -> tuple[Expansion | None, list[Finding]]:
         _add_to_regions(regions, table, names)
     if findings:
         return None, findings
+    for name, own in case.interfaces.items():
+        laws[name] = combine_laws(laws[name], own) if name in laws else own
     groups = tuple(Group(table.name, table.kind, table.count, table.region) for table in case.generate)
     stages = tuple(_spread_groups(stage, groups) for stage in case.stages)
-    return Expansion(curves, regions, {**laws, **case.interfaces}, stages, groups, origin), []
+    return Expansion(curves, regions, laws, stages, groups, origin), []
 
 
 def _check_names(case: CaseFile) -> list[Finding]:

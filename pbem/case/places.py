@@ -7,6 +7,9 @@ from collections.abc import Mapping
 
 Loc = tuple[str | int, ...]
 
+# Keys of more parts are faults, whose line is that of their first parts.
+DEEP = 20
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
 _DOTTED = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
@@ -59,7 +62,7 @@ def find_line(lines: Mapping[Loc, int], loc: Loc) -> int | None:
 
 
 def _record(lines: dict[Loc, int], table: Loc, loc: Loc, number: int) -> None:
-    for length in range(len(table) + 1, len(loc) + 1):
+    for length in range(len(table) + 1, min(len(loc), DEEP) + 1):
         lines.setdefault(loc[:length], number)
 
 

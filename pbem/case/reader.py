@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import PrivateAttr, ValidationError
 
 from pbem.case.conflicts import find_conflicts
+from pbem.case.controls import DEEPEST, find_controls, find_depth
 from pbem.case.finding import Finding
 from pbem.case.generation import Group, expand
 from pbem.case.places import Loc, find_line, find_lines, format_place
@@ -119,7 +120,11 @@ def parse_draft(text: str, source: str = "case") -> Draft:
     if not raw:
         return _refuse("the file", "nothing (an empty file)", "the tables [materials.*], [curves] and [regions.*]")
     lines = find_lines(text)
-    findings = find_conflicts(raw) + find_schema_findings(raw)
+    deep = find_depth(raw)
+    if deep is not None:
+        return _refuse(format_place(deep[:4], find_line(lines, deep[:1])), f"tables and lists within each other more "
+                       f"than {DEEPEST} deep", "the tables and keys of a case file")
+    findings = find_controls(raw) + find_conflicts(raw) + find_schema_findings(raw)
     case, more = _compose_draft(raw, findings, text, source, lines)
     findings = _order(findings + more, lines)
     faults = tuple(

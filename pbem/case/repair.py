@@ -32,6 +32,11 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
         return False
     table, key = str(loc[0]), str(loc[2]) if len(loc) > 2 else ""
     known = known_keys(loc[:2])
+    entry = raw[table].get(loc[1]) if len(loc) > 1 and isinstance(raw.get(table), dict) else None
+    if table in ("materials", "contacts") and len(loc) == 2 and isinstance(entry, dict):
+        return True  # its name is wrong, and is what others know it by
+    if table in ("materials", "interfaces", "contacts") and not isinstance(entry, dict):
+        return _delete(raw, loc)
     if table in ("curves", "regions") and len(loc) < 3:
         return _patch_elements(raw, loc) if table == "curves" else False
     if table == "regions" and key in known:

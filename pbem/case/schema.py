@@ -244,6 +244,9 @@ class AnalysisTable(Table):
     order: Annotated[int, Field(strict=True, ge=0, le=3)] = 2
     tips: Flag = Field(True, description="crack-tip elements with the square-root shape")
     steps: Count = Field(10, description="load steps; ignored when [[stages]] is given")
+    accuracy: Part | None = Field(
+        None, description="refine and solve again until the estimated relative error is below this"
+    )
 
 
 class StageInterfaceTable(Table):

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.strength import Strength, StrengthLaw, choose_strength, coulomb
+from pbem.contact.strength import choose_strength, coulomb
+from pbem.contact.strength_type import Strength, StrengthLaw
 from pbem.mesh.mesh import Mesh
 from pbem.model.expression import evaluate_expression
 from pbem.model.model import Contact, Interface, Law, Model
@@ -125,7 +126,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         return np.array(values)[pairs.interface] if values else np.zeros(0)
 
     return PairLaws(
-        strengths=_group_strengths(laws, pairs.interface),
+        strengths=_group_strengths(laws, pairs.interface, model.law_texts),
         tensile_strength=spread([law.tensile_strength for law in laws]),
         gap=_evaluate_gaps(laws, mesh),
         bonded=spread([law.kind == "bonded" for law in laws]).astype(bool),
@@ -159,14 +160,14 @@ def _find_leaders(model: Model, mesh: Mesh) -> Integer:
     return leader
 
 
-def _group_strengths(laws: list[Law], interface: Integer) -> tuple[StrengthGroup, ...]:
+def _group_strengths(laws: list[Law], interface: Integer, texts: Mapping[str, str]) -> tuple[StrengthGroup, ...]:
     functions: dict[str | None, StrengthLaw] = {}  # of each file, which is run once
     chosen = []
     for law in laws:
         if law.kind == "custom" and law.file in functions:
             chosen.append((functions[law.file], dict(law.parameters)))
             continue
-        chosen.append(choose_strength(law))
+        chosen.append(choose_strength(law, texts.get(law.file or "")))
         if law.kind == "custom":
             functions[law.file] = chosen[-1][0]
     groups = []

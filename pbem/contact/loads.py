@@ -76,9 +76,6 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
 
     none = (0.0, 0.0)
     values = interpolate(*([stage.boundary.get(name, none) for name in model.conditions] for stage in (before, after)))
-    pressure = interpolate(
-        *([stage.pressure.get(name, 0.0) for name in mesh.interface_names] for stage in (before, after))
-    )
     gravity = complex(*interpolate(before.gravity, after.gravity))
     remote = interpolate(before.remote, after.remote)
     balanced = _sample(mesh, [balanced_background(model, region, gravity) for region in model.regions])
@@ -86,11 +83,20 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
         values=values.reshape(-1, 2)[outer.condition],
-        pressure=pressure[mesh.pairs.interface],
+        pressure=evaluate_pressure(model, mesh, stage, factor),
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
     )
+
+
+def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
+    """Fluid pressure (m,) of the pairs at the fraction `factor` of a stage."""
+    values = []
+    for name in mesh.interface_names:
+        start = model.stages[stage - 1].pressure.get(name, 0.0) if stage > 0 else 0.0
+        values.append(start + factor * (model.stages[stage].pressure.get(name, 0.0) - start))
+    return np.array(values, dtype=float)[mesh.pairs.interface]
 
 
 def _sample(mesh: Mesh, backgrounds: Sequence[Background]) -> Complex:

@@ -7,31 +7,19 @@ function, named `strength`, in a Python file that the case names: law = "custom"
 
 from __future__ import annotations
 
-import runpy
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.custom import CustomLaw, read_law_texts
+from pbem.contact.strength_type import Strength, StrengthLaw
 from pbem.errors import CaseError, Fault
 from pbem.model.build import read_model
 from pbem.model.model import Law, Model
 
 Real = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Strength:
-    """bound: largest |p_s|, stress >= 0; by_traction, by_slip: its derivatives by p_n and by the slip path."""
-
-    bound: Real
-    by_traction: Real
-    by_slip: Real
-
-
-StrengthLaw = Callable[..., Strength]
 
 
 def coulomb(p_n: Real, slip: Real, friction: Real, cohesion: Real) -> Strength:
@@ -51,52 +39,56 @@ def slip_weakening(
     return Strength(static.bound, static.by_traction, by_slip)
 
 
-def choose_strength(law: Law) -> tuple[StrengthLaw, dict[str, float]]:
-    """The function and the parameters of an interface's law."""
+def choose_strength(law: Law, text: str | None = None) -> tuple[StrengthLaw, dict[str, float]]:
+    """The function and the parameters of an interface's law; text: of its file, which is read if not given."""
     if law.kind == "custom":
         assert law.file is not None
-        return load_strength(Path(law.file)), dict(law.parameters)
+        return CustomLaw(law.file, read_law_texts([law.file])[law.file] if text is None else text), dict(law.parameters)
     parameters = {"friction": law.friction, "cohesion": law.cohesion}
     if law.friction_dynamic is None or law.slip_distance is None:
         return coulomb, parameters
     return slip_weakening, parameters | {"friction_dynamic": law.friction_dynamic, "slip_distance": law.slip_distance}
 
 
+def list_laws(model: Model) -> dict[str, Law]:
+    """The laws of all interfaces, cracks and contacts, by their place in the case file."""
+    laws = {f"interfaces.{name}": joint.law for name, joint in model.interfaces.items()}
+    return laws | {f"contacts.{name}": joint.law for name, joint in model.contacts.items()}
+
+
 def check_custom_laws(model: Model) -> tuple[Fault, ...]:
     """Faults of laws of one's own: files that do not run, have no such function, or give no strength."""
     faults = []
-    joints = {f"interfaces.{name}": joint.law for name, joint in model.interfaces.items()}
-    joints |= {f"contacts.{name}": joint.law for name, joint in model.contacts.items()}
     tried: set[int] = set()
-    for place, law in joints.items():
+    for place, law in list_laws(model).items():
         if law.kind != "custom" or id(law) in tried:  # many interfaces that were generated together have one law
             continue
         tried.add(id(law))
-        try:
-            function, parameters = choose_strength(law)
-            result = function(-np.ones(2), np.zeros(2), **{name: np.full(2, v) for name, v in parameters.items()})
-            shapes = {np.shape(part) for part in (result.bound, result.by_traction, result.by_slip)}
-            if shapes != {(2,)} or not np.all(np.isfinite(result.bound)):
-                raise ValueError(f"strength gives {result} at two pairs")
-        except Exception as error:  # a user's file may raise anything
-            found = f"a law that fails ({type(error).__name__}: {error})"
+        found = _try(law)
+        if found:
             expected = "a Python file with a function strength(p_n, slip, **parameters) that gives a Strength of arrays"
             faults.append(Fault(f"{place}.file", found, expected))
     return tuple(faults)
 
 
+def _try(law: Law) -> str:
+    """What goes wrong when the law is asked for its strength at two pairs; "" if nothing does."""
+    try:
+        function, parameters = choose_strength(law)
+        assert isinstance(function, CustomLaw)
+        function(-np.ones(2), np.zeros(2), **{name: np.full(2, value) for name, value in parameters.items()})
+        return function.fault.partition("; expected")[0]
+    except Exception as error:  # a user's file may raise anything
+        return f"a law that fails ({type(error).__name__}: {error})"
+
+
 def read_checked_model(path: Path) -> Model:
-    """Read a case and build its model. Raises CaseError with its faults; laws of one's own are tried last."""
+    """Read a case and build its model, with the texts of its custom laws, which are tried.
+
+    Raises CaseError with its faults; those of laws come last.
+    """
     _, model = read_model(path)
     faults = check_custom_laws(model)
     if faults:
         raise CaseError(str(path), faults)
-    return model
-
-
-def load_strength(file: Path) -> StrengthLaw:
-    """The function `strength` of a Python file. Raises ValueError if the file has none."""
-    function = runpy.run_path(str(file)).get("strength")
-    if not callable(function):
-        raise ValueError(f"{file} defines no function named strength")
-    return function  # type: ignore[no-any-return]
+    return replace(model, law_texts=read_law_texts(law.file for law in list_laws(model).values()))

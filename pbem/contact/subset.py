@@ -132,11 +132,11 @@ def settle_subset(
     """Find modes of s pairs that `judge` leaves as they are; the judge sees modes and states of these pairs alone."""
     problem = _pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
-    compliance = _find_compliance(problem)
+    compliance, sprung = _find_compliance(problem)
     none = np.zeros(len(loses), dtype=bool)
     if compliance is None:
         return Settled(None, False, 0, none)
-    wrong = (np.diag(compliance) >= 0).reshape(2, -1).any(axis=0)
+    wrong = none if sprung else (np.diag(compliance) >= 0).reshape(2, -1).any(axis=0)
     tried: set[bytes] = set()
     complete = True
     for detached in _choose_detached(subset.modes.mode == OPEN, loses):
@@ -228,21 +228,23 @@ def _pose(subset: Subset, response: Response) -> _Pairs:
     )  # fmt: skip
 
 
-def _find_compliance(pairs: _Pairs) -> Real | None:
+def _find_compliance(pairs: _Pairs) -> tuple[Real | None, bool]:
     """What tractions (p_n of all pairs, then p_s) do to the jumps, (2 s, 2 s); None if that cannot be found.
 
-    Where the tractions leave a body free, as pairs that alone hold it do, soft springs tie its faces to where they are.
+    Where the tractions leave a body free, as pairs that alone hold it do, soft springs tie its faces to where they are:
+    then the second value is True.
     """
     count = len(pairs.sign)
     tractions, jumps = (pairs.change[k : k + 2].reshape(2 * count, 2 * count) for k in (0, 2))
     values = np.linalg.svd(tractions, compute_uv=False)
-    if values[-1] <= FREE * values[0]:
+    sprung = bool(values[-1] <= FREE * values[0])
+    if sprung:
         tractions = tractions - SPRING * values[0] / np.linalg.norm(jumps, 2) * jumps
     try:
         found = jumps @ np.linalg.inv(tractions)
     except np.linalg.LinAlgError:
-        return None
-    return found if np.isfinite(found).all() else None
+        return None, sprung
+    return (found if np.isfinite(found).all() else None), sprung
 
 
 def _pivot(pairs: _Pairs, compliance: Real, detached: Bool) -> ModeState | None:

@@ -150,13 +150,18 @@ def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: N
     return ModeState(mode, modes.sign)
 
 
+# Slips that differ by less than this part are those of a symmetric model.
+ALIKE = 1e-6
+
+
 def stick_calmest_pairs(
     mesh: Mesh, laws: PairLaws, modes: ModeState, slip: NDArray[np.float64], overloaded: NDArray[np.int64],
     holds: Callable[[ModeState], bool],
 ) -> tuple[ModeState, NDArray[np.int64]]:
-    """Modes with one pair of an interface after the other sticking until `holds` says that it is enough, and the pairs.
+    """Modes with the calmest pairs of one interface after the other sticking until `holds` says enough, and the pairs.
 
-    Only of interfaces on which all closed pairs slip; there the pair of the least slip (m,). overloaded: pairs that
+    Only of interfaces on which all closed pairs slip; there the pair of the least slip (m,), and those that are its
+    images in a symmetric model. overloaded: pairs that
     stuck instead and could not carry what was left: on their interfaces only pairs that slip in the other sense come
     into question, as the body moves on in the sense of the overload. The same modes and none if nothing holds.
     """
@@ -169,11 +174,13 @@ def stick_calmest_pairs(
     may[overloaded] = False
     candidates = np.flatnonzero(may)
     candidates = candidates[np.argsort(np.abs(slip[candidates]), kind="stable")]
-    _, first = np.unique(of[candidates], return_index=True)
-    chosen = candidates[np.sort(first)]
-    for count, pair in enumerate(chosen, start=1):
-        mode[pair] = STICK
+    held: list[int] = []
+    for interface in dict.fromkeys(of[candidates].tolist()):
+        own = candidates[of[candidates] == interface]
+        alike = np.abs(slip[own]) <= (1 + ALIKE) * abs(slip[own[0]])
+        held += own[alike & (modes.sign[own] == modes.sign[own[0]])].tolist()
+        mode[held] = STICK
         trial = ModeState(mode, modes.sign)
         if holds(trial):
-            return trial, chosen[:count]
-    return modes, chosen[:0]
+            return trial, np.array(held)
+    return modes, np.zeros(0, dtype=np.int64)

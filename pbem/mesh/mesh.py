@@ -19,7 +19,7 @@ class Pairs:
 
     interface (m,): index into Mesh.interface_names; first, second (m,): the two nodes. The pair of a crack has only
     one node, whose unknown displacement is the jump u_r - u_l: there second = first and crack is True. Between curves
-    with different meshes `second` is the nearest node of the element that the first node faces.
+    with different meshes one of both is the slot, and the other the node that has most in common with it.
     slot (m,): the node that follows the other side and owns the pair's two unknowns; sense (m,): +1 if that is the
     second, -1 if it is the first.
     position, normal (m,): complex; normal is outward of the first side. arc_length (m,): from the curve's first point.

@@ -174,7 +174,9 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source=case.text,
         regions=regions, curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
-        analysis=Analysis(case.analysis.scheme, case.analysis.order, case.analysis.tips),
+        analysis=Analysis(
+            case.analysis.scheme, case.analysis.order, case.analysis.tips, case.analysis.accuracy
+        ),
         solver=SolverOptions(
             linear=case.solver.linear, operator=case.solver.operator, tolerance=case.solver.tolerance,
             newton_tolerance=case.solver.newton_tolerance, newton_max_iterations=case.solver.newton_max_iterations,
@@ -188,7 +190,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         groups=case.groups,
         ties=fitted.ties,
     )
-    return model, list(fitted.faults)
+    return replace(model, notes=(*model.notes, *_note_loads(model))), list(fitted.faults)
 
 
 def _note_choices(case: Case) -> list[str]:
@@ -197,7 +199,24 @@ def _note_choices(case: Case) -> list[str]:
     unused = [f"'{name}'" for name in case.materials if name not in used]
     if unused:
         notes.append(f"Materials that no region uses: {list_names(unused)}.")
+    strength = {"friction", "friction_angle", "cohesion"}
+    smooth = [f"'{name}'" for laws in (case.interfaces, case.contacts) for name, law in laws.items()
+              if law.law == "coulomb" and not strength & law.model_fields_set]
+    if smooth:
+        notes.append(f"No friction or cohesion is given with law = \"coulomb\" for {list_names(smooth)}: their faces "
+                     "slide freely; law = \"frictionless\" says so.")
     return notes
+
+
+def _note_loads(model: Model) -> list[str]:
+    """A model whose answer is zero everywhere has probably lost its loads."""
+    weights = any(region.material.density for region in model.regions)
+    loads = [value for stage in model.stages for value in (
+        *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
+        *(stage.gravity if weights else ()))]
+    loads += [value for stress in model.initial_stress.values() for value in stress]
+    return [] if any(loads) else ["No load: all prescribed displacements and tractions, pressures, stresses far away, "
+                                  "weights and in-situ stresses are zero, and so will be the results."]
 
 
 def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:

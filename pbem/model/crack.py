@@ -94,7 +94,8 @@ def _find_misses(
     at, numbers = boxes.find_around(np.array([point for _, point, _ in ends], dtype=complex))
     for which, number in zip(at.tolist(), numbers.tolist(), strict=True):
         (name, point, own), (other, leg) = ends[which], legs[number]
-        if other == name:
+        # The sides of a wedge are near each other all along.
+        if other == name or {own.start, own.end} & {leg.start, leg.end}:
             continue
         distance = project(leg, point)[1]
         if distance < reach[name] and (which not in found or distance < found[which].distance):

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from pbem.case import Case
 from pbem.errors import Fault
+from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points, measure_distances, project
+from pbem.model.intersection import inner_points, measure_distances, project, surround
 from pbem.model.junction import format_point, split_leg
 from pbem.model.loop import Loops, side_legs
 from pbem.model.model import Contact, Model, Region, Side
@@ -29,7 +30,7 @@ OPPOSITE = -0.5
 NARROW = 0.25
 # Faces that touch may lie in one another by this part of the shorter curve (rounding, chords of curved sides).
 OVERLAP = 1e-3
-# A leg is not split nearer to its ends than this part of its mean element.
+# A leg is not split nearer to its ends than this part of its mean element, nor for faces farther away than that.
 LEAST_PIECE = 0.25
 
 
@@ -56,35 +57,54 @@ class Strip:
     inside: bool
 
 
-def look_along(points: Complex, normals: Complex, legs: Sequence[Leg], nearest: float) -> Sight:
-    """The first of some legs, travelled with their region on the left, on rays (k,); from the distance `nearest` on."""
-    best = Sight(np.full(len(points), -1), np.full(len(points), np.inf), np.zeros(len(points)))
-    for number, leg in enumerate(legs):
-        for distance in _cross(points, normals, leg):
-            at = points + np.where(np.isfinite(distance), distance, 0.0) * normals
-            met = _is_on(leg, at) & (distance >= nearest) & (distance < best.distance)
-            facing = (np.conj(normals) * leg_normals(leg, at)).real
-            best.leg[met], best.distance[met], best.product[met] = number, distance[met], facing[met]
-    return best
+class Surroundings:
+    """Legs, travelled with their region on the left, that rays may meet; straight ones are looked at all at once."""
+
+    def __init__(self, legs: Sequence[Leg]) -> None:
+        straight = [number for number, leg in enumerate(legs) if leg.center is None]
+        self._numbers = np.array(straight, dtype=np.int64)
+        self._start = np.array([legs[number].start for number in straight], dtype=complex)
+        self._along = np.array([legs[number].end - legs[number].start for number in straight], dtype=complex)
+        self._arcs = [(number, leg) for number, leg in enumerate(legs) if leg.center is not None]
+
+    def look_along(self, points: Complex, normals: Complex, nearest: float) -> Sight:
+        """What rays (k,) from the points along the unit normals meet first, from the distance `nearest` on."""
+        best = Sight(np.full(len(points), -1), np.full(len(points), np.inf), np.zeros(len(points)))
+        if len(self._numbers):
+            x, n = points[:, None], normals[:, None]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                distance = ((self._start - x) * np.conj(self._along)).imag / (n * np.conj(self._along)).imag
+                local = ((x + distance * n - self._start) / self._along).real
+            distance = np.where((local >= 0) & (local <= 1) & (distance >= nearest), distance, np.inf)
+            at = np.argmin(distance, axis=1)
+            rows = np.arange(len(points))
+            outward = -1j * self._along / np.abs(self._along)
+            met = np.isfinite(distance[rows, at])
+            best.leg[met] = self._numbers[at[met]]
+            best.distance[met] = distance[rows, at][met]
+            best.product[met] = (np.conj(normals) * outward[at]).real[met]
+        for number, leg in self._arcs:
+            for distance in _cross_arc(points, normals, leg):
+                at_arc = points + np.where(np.isfinite(distance), distance, 0.0) * normals
+                met = _is_on_arc(leg, at_arc) & (distance >= nearest) & (distance < best.distance)
+                facing = (np.conj(normals) * leg_normals(leg, at_arc)).real
+                best.leg[met], best.distance[met], best.product[met] = number, distance[met], facing[met]
+        return best
 
 
-def _cross(points: Complex, normals: Complex, leg: Leg) -> list[Real]:
-    """Distances along the rays to the line or the circle of a leg; infinite or nan where there is none."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if leg.center is None:
-            along = leg.end - leg.start
-            return [((leg.start - points) * np.conj(along)).imag / (normals * np.conj(along)).imag]
-        from_center = points - leg.center
-        along_ray = (np.conj(normals) * from_center).real
+def _cross_arc(points: Complex, normals: Complex, leg: Leg) -> list[Real]:
+    """Distances along the rays to the circle of a leg; nan where there is none."""
+    assert leg.center is not None
+    from_center = points - leg.center
+    along_ray = (np.conj(normals) * from_center).real
+    with np.errstate(invalid="ignore"):
         root = np.sqrt(abs(leg.start - leg.center) ** 2 - np.abs(from_center) ** 2 + along_ray**2)
-        return [-along_ray - root, -along_ray + root]
+    return [-along_ray - root, -along_ray + root]
 
 
-def _is_on(leg: Leg, points: Complex) -> NDArray[np.bool_]:
-    """Whether points of the line or circle lie between the ends of the leg."""
-    if leg.center is None:
-        local = (points - leg.start) / (leg.end - leg.start)
-        return np.asarray((local.real >= 0) & (local.real <= 1))
+def _is_on_arc(leg: Leg, points: Complex) -> NDArray[np.bool_]:
+    """Whether points of the circle lie between the ends of the leg."""
+    assert leg.center is not None
     angle = np.angle((points - leg.center) / (leg.start - leg.center)) * np.sign(leg.sweep)
     return np.asarray(angle % (2 * np.pi) <= abs(leg.sweep))
 
@@ -113,10 +133,10 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
     """Whether a normal of either curve meets the other one from outside, before any other part of the two bodies."""
     shorter = min(model.curves[contact.first].length, model.curves[contact.second].length)
     for curve, other in ((contact.first, contact.second), (contact.second, contact.first)):
-        facing = side_legs(model.curves, sides[other])
+        facing = Surroundings(side_legs(model.curves, sides[other]))
         for leg in side_legs(model.curves, sides[curve]):
             points = inner_points(leg, max(SAMPLES, 4 * leg.elements))
-            seen = look_along(points, leg_normals(leg, points), facing, -OVERLAP * shorter)
+            seen = facing.look_along(points, leg_normals(leg, points), -OVERLAP * shorter)
             if ((seen.leg >= 0) & (seen.product < 0)).any():
                 return True
     return False
@@ -127,7 +147,8 @@ def split_opposite_ends(
 ) -> tuple[dict[str, Curve], list[str]]:
     """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
 
-    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well.
+    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well, and
+    faces far away are not.
     kept: curves that are not split. Ends near those of an element are left.
     """
     sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
@@ -172,7 +193,8 @@ def _find_opposite(
     outward = complex(leg_normals(leg, foot)[0]) * (1 if forward else -1)
     shorter = min(length, curve.length)
     ahead = ((end - complex(foot[0])) * outward.conjugate()).real
-    if min(t, 1 - t) * leg.elements < LEAST_PIECE or distance > shorter or ahead < -OVERLAP * shorter:
+    piece = LEAST_PIECE * leg.length / leg.elements
+    if min(t, 1 - t) * leg.length < piece or distance > piece or ahead < -OVERLAP * shorter:
         return None
     return None if (normal * outward.conjugate()).real > OPPOSITE else (number, t)
 
@@ -188,17 +210,30 @@ def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]])
         names += [(side.curve, number) for number in numbers]
     wanted = set(chosen)
     strips: dict[frozenset[tuple[str, int]], Strip] = {}
-    for name, leg in zip(names, legs, strict=True):
+    for (name, leg), near in zip(zip(names, legs, strict=True), _find_near(legs), strict=True):
         if name not in wanted:
             continue
+        around = Surroundings([legs[number] for number in near])
         points = inner_points(leg, SAMPLES)
         for inside, normals in ((False, leg_normals(leg, points)), (True, -leg_normals(leg, points))):
-            seen = look_along(points, normals, legs, 1e-12 * model.size)
+            seen = around.look_along(points, normals, 1e-12 * model.size)
             facing = (seen.leg >= 0) & ((-seen.product if inside else seen.product) < OPPOSITE)
             for number in np.unique(seen.leg[facing]):
-                other = names[number]
+                other = names[near[number]]
                 width = float(seen.distance[facing & (seen.leg == number)].min())
-                length = min(model.curves[name[0]].length, model.curves[other[0]].length)
+                length = min(leg.length, legs[near[number]].length)
                 if other in wanted and other != name and width < NARROW * length:
                     strips.setdefault(frozenset((name, other)), Strip(name, other, width, inside))
     return list(strips.values())
+
+
+def _find_near(legs: Sequence[Leg]) -> list[list[int]]:
+    """Of every leg the numbers of those, itself among them, that a narrow strip may lie between it and."""
+    reach = NARROW * np.array([leg.length for leg in legs])
+    corners = [surround([leg]) for leg in legs]
+    wide = [(low - (1 + 1j) * r, high + (1 + 1j) * r) for (low, high), r in zip(corners, reach, strict=True)]
+    near: list[list[int]] = [[] for _ in legs]
+    at, found = Boxes.of_corners(corners).find_meeting(Boxes.of_corners(wide))
+    for number, other in zip(at.tolist(), found.tolist(), strict=True):
+        near[number].append(other)
+    return near

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.case import Case
+from pbem.case.effects import WITHOUT_EFFECT, Kind
 from pbem.case.schema import LawTable
 from pbem.errors import Fault
 from pbem.model.curve import Curve
@@ -20,21 +21,8 @@ from pbem.model.model import Law
 from pbem.model.touching import find_least, sample_gap
 
 Loc = tuple[str | int, ...]
-Kind = Literal["bonded", "coulomb", "open", "frictionless", "custom"]
-
-_FRICTION = ("friction", "friction_angle", "cohesion")
-_WEAKENING = ("friction_dynamic", "slip_distance")
-_JOINT = ("normal_stiffness", "tangential_stiffness")
 # A tensile strength may be written with so few digits that it exceeds cohesion/friction by this part.
 APEX = 1e-4
-# Keys of a law's table that would change nothing, by the kind of law.
-_WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
-    "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", "file", "parameters"),
-    "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, "file", "parameters"),
-    "coulomb": ("file", "parameters"),
-    "frictionless": ("file", "parameters"),
-    "custom": (*_FRICTION, *_WEAKENING),
-}
 
 
 def read_law(case: Case, loc: Loc, table: LawTable, default: Literal["bonded", "coulomb"]) -> tuple[Law, list[Fault]]:
@@ -103,7 +91,7 @@ def _find_friction(table: LawTable) -> float:
 def _check_effect(case: Case, loc: Loc, table: LawTable, kind: Kind) -> Iterator[Fault]:
     """Keys without effect under the law would be a misunderstanding: refuse them unless they are zero."""
     chosen = f'law = "{kind}"' if table.law else f'law = "{kind}", the default here'
-    for key in _WITHOUT_EFFECT[kind]:
+    for key in WITHOUT_EFFECT[kind]:
         value = getattr(table, key)
         if value:
             other = "custom" if key in ("file", "parameters") else "coulomb"

@@ -87,7 +87,7 @@ class Interface:
 class Contact:
     """Two different outer curves that may touch; their meshes need not match, the gap follows from the geometry.
 
-    first, second: names of the curves; the first carries the contact pairs and gives their normal. Neither has a
+    first, second: names of the curves; the pairs lie on the first, which gives their normal. Neither has a
     Condition: where they do not touch they are free of traction.
     """
 
@@ -131,11 +131,15 @@ class Stage:
 
 @dataclass(frozen=True)
 class Analysis:
-    """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements."""
+    """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements.
+
+    accuracy: the mesh is refined until the estimated relative error is below it; None: it is taken as it is.
+    """
 
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: int = 2
     tips: bool = True
+    accuracy: float | None = None
 
 
 # How the operator of the integral equations is stored.
@@ -168,7 +172,8 @@ class Model:
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
-    follow the status of the pair next to them.
+    follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
+    were when the case was read.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -193,3 +198,4 @@ class Model:
     interior_grid: tuple[int, int] | None = None
     groups: tuple[Group, ...] = ()
     ties: tuple[Tie, ...] = ()
+    law_texts: Mapping[str, str] = field(default_factory=dict)

@@ -13,8 +13,9 @@ from pbem.model.model import Model
 
 
 def dump_configuration(model: Model) -> str:
-    """JSON text of the model without its source; complex points as [x, y]."""
-    return json.dumps({key: value for key, value in to_plain(model).items() if key not in ("source", "notes")})
+    """JSON text of the model without the texts that it was read from; complex points as [x, y]."""
+    texts = ("source", "notes", "law_texts")
+    return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 
 def to_plain(value: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,14 +53,19 @@ class Elements:
 
 @dataclass(frozen=True)
 class Tips:
-    """Stress-intensity factors of a crack over the k stored steps: KI, KII (k, 2), at its start and at its end.
+    """At the start and at the end of a crack, over the k stored steps: KI, KII, J, T (k, 2). NaN where no tip is.
 
-    Stress times the root of length; NaN at an end that is no tip. KI >= 0 opens. KII > 0 if the face on the left of the
-    crack's direction moves along it, at both ends.
+    KI, KII: stress-intensity factors, stress times the root of length. KI >= 0 opens. KII > 0 if the face on the left
+    of the crack's direction moves along it, at both ends. J: J-integral, stress times length, the energy that growth
+    straight ahead would release per length; (KI^2 + KII^2)/E' if the mesh is good enough. T: T-stress, what stays
+    finite at the tip of the normal stress along the crack. plane_modulus: E', stress.
     """
 
     KI: Real
     KII: Real
+    J: Real
+    T: Real
+    plane_modulus: float
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,28 @@ class Energies:
     elastic: Real
     dissipated: Real
     released: Real
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Estimated discretisation errors over the k stored steps; NaN where there is no estimate (`missing` says why).
+
+    reactions: per outer curve (k, 2), force. opening, slip: per interface (k,), largest error, length; traction_n,
+    traction_s: root of the mean square error along it, stress. KI, KII: per crack (k, 2), at start and end.
+    displacement (k,): largest error. relative: `reactions`, `jumps`, `tractions`, `factors`, `displacement` (k,), the
+    largest of each kind over the largest value in the model so far.
+    """
+
+    reactions: Mapping[str, Real]
+    opening: Mapping[str, Real]
+    slip: Mapping[str, Real]
+    traction_n: Mapping[str, Real]
+    traction_s: Mapping[str, Real]
+    KI: Mapping[str, Real]
+    KII: Mapping[str, Real]
+    displacement: Real
+    relative: Mapping[str, Real]
+    missing: str
 
 
 @dataclass(frozen=True)

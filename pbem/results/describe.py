@@ -14,10 +14,12 @@ from pbem.model.model import Condition, Law, Model, Region
 from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
 from pbem.results.reader import Results
+from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.solve.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
 MOST_TIPS = 10
+MOST_ERRORS = 10
 
 
 def describe_model(model: Model, mesh: Mesh) -> str:
@@ -66,10 +68,41 @@ def describe_results(results: Results) -> str:
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
+        parts.append(_section("estimated discretisation errors at the last step", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
     return "\n\n".join(part for part in parts if part)
+
+
+# Kinds of estimated errors as they are called.
+ERROR_NAMES = {"reactions": "reactions", "jumps": "slips and openings", "tractions": "tractions", "factors": "K"}
+
+
+def describe_errors(results: Results) -> list[str]:
+    """The estimated errors of the last stored step: relative ones in a line, then the largest of each interface."""
+    errors = results.errors
+    relative = {name: errors.relative[kind][-1] for kind, name in ERROR_NAMES.items() if kind in errors.relative}
+    present = {
+        "reactions": bool(errors.reactions), "slips and openings": bool(errors.slip),
+        "tractions": bool(errors.traction_n), "K": bool(errors.KI),
+    }  # fmt: skip
+    shown = {name: value for name, value in relative.items() if present[name]}
+    if not shown and "displacement" in errors.relative:
+        shown = {"displacements": errors.relative["displacement"][-1]}
+    if errors.missing and not any(np.isfinite(value) for value in shown.values()):
+        return [f"none: {errors.missing}"]
+    lines = [
+        ", ".join(f"{name} {value:.1e}" for name, value in shown.items()) + " of the largest in the model so far"
+    ]
+    if len(errors.slip) > MOST_ERRORS:
+        return lines
+    worst = sorted(errors.slip, key=lambda name: -np.nan_to_num(max(errors.slip[name][-1], errors.opening[name][-1])))
+    rows = [
+        [name, *(f"{getattr(errors, kind)[name][-1]:.1e}" for kind in ("opening", "slip", "traction_n", "traction_s"))]
+        for name in worst
+    ]
+    return lines + _table(["interface", "opening", "slip", "traction n", "traction s"], rows)
 
 
 # Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by
@@ -156,7 +189,12 @@ def describe_law(law: Law) -> str:
         return law.kind
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
-    return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
+    return ", ".join([*given, *([f"gap {_describe_gap(law.gap)}"] if law.gap else [])])
+
+
+def _describe_gap(gap: float | str) -> str:
+    """A number, or the expression in quotes."""
+    return f'"{gap}"' if isinstance(gap, str) else f"{gap:.4g}"
 
 
 def _describe_loads(model: Model) -> list[str]:
@@ -260,15 +298,19 @@ def _describe_tips(results: Results) -> list[str]:
     shown = found
     if len(found) > MOST_TIPS:
         shown = sorted(found, key=lambda tip: np.hypot(tip[2], tip[3]), reverse=True)[:MOST_TIPS]
-    rows = [[name, end, _number(opening), _number(sliding)] for name, end, opening, sliding in shown]
+    rows = [[name, end, *map(_number, values)] for name, end, *values in shown]
     left_out = len(found) - len(shown)
-    return _table(["crack", "tip", "KI", "KII"], rows) + ([f"... and {left_out} smaller ones"] if left_out else [])
+    notes = [*compare_release(results), *explain_missing_factors(results)]
+    return [
+        *_table(["crack", "tip", "KI", "KII", "J", "T"], rows),
+        *([f"... and {left_out} smaller ones"] if left_out else []), *notes,
+    ]
 
 
-def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float]]:
-    """Crack, end, KI, KII of every end of a crack that is a tip."""
-    factors = zip(("start", "end"), tips.KI[-1], tips.KII[-1], strict=True)
-    return [(name, end, float(opening), float(sliding)) for end, opening, sliding in factors if not np.isnan(opening)]
+def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float, float, float]]:
+    """Crack, end, KI, KII, J, T of every tip; those of cracks along interfaces have J alone."""
+    values = zip(("start", "end"), *(each[-1].tolist() for each in (tips.KI, tips.KII, tips.J, tips.T)), strict=True)
+    return [(name, *each) for each in values if not (np.isnan(each[1]) and np.isnan(each[3]))]
 
 
 def _section(title: str, lines: Iterable[str]) -> str:

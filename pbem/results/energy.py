@@ -121,12 +121,15 @@ class _State:
 
 
 class EnergyBalance:
-    """Adds up the energies step by step: all steps of a run in turn, also those that are not stored."""
+    """Adds up the energies step by step: all steps of a run in turn, also those that are not stored.
+
+    laws: those of the pairs, evaluated once more here.
+    """
 
     def __init__(self, model: Model, mesh: Mesh, last: Step | None = None, reached: Energy | None = None) -> None:
         """Begins at rest, or after the step `last` with the energies that were reached by then."""
         self._model, self._mesh = model, mesh
-        self._laws = collect_laws(model, mesh)
+        self.laws = collect_laws(model, mesh)
         self._outer = collect_outer_nodes(model, mesh)
         self._weight = weigh_faces(mesh)
         self._faces = list_faces(mesh)
@@ -152,7 +155,7 @@ class EnergyBalance:
         moved = (new.displacement - old.displacement)[nodes]
         work = _dot(self._weight[nodes], 0.5 * (old.traction + new.traction)[nodes], moved)
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
-        pairs = measure_work(self._laws, self._pair_weight, old.pairs, new.pairs)
+        pairs = measure_work(self.laws, self._pair_weight, old.pairs, new.pairs)
         # What springs take from the boundary they store, and what fluid does is work of its own.
         work += new.springs - old.springs + pairs.fluid
         self._state = new
@@ -202,12 +205,12 @@ class EnergyBalance:
 
     def _describe_rest(self) -> _State:
         nothing = np.zeros(len(self._weight), dtype=complex)
-        pairs = record_pairs_at_rest(self._laws, self._mesh, self._in_situ[: self._mesh.nodes])
+        pairs = record_pairs_at_rest(self.laws, self._mesh, self._in_situ[: self._mesh.nodes])
         return self._compose(self._in_situ, nothing, 0, 0.0, pairs)
 
     def _describe(self, step: Step) -> _State:
         pressure = evaluate_load(self._model, self._mesh, self._outer, step.stage, step.factor).pressure
-        pairs = record_pairs(self._laws, step.contact, pressure)
+        pairs = record_pairs(self.laws, step.contact, pressure)
         return self._compose(step.traction, step.displacement, step.stage, step.factor, pairs)
 
     def _compose(

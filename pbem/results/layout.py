@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -15,8 +14,11 @@ from numpy.typing import NDArray
 from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.model.refinement import Fractions
 from pbem.results.balance import create_balance
 from pbem.results.configuration import dump_configuration
+from pbem.results.estimates import list_datasets
+from pbem.results.interface_tips import list_tip_curves
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
 
@@ -33,7 +35,7 @@ PAIR_DATASETS = {
 }
 # What an interface shows of them; the rest is for going on with a run.
 SHOWN = ("mode", "opening", "slip", "traction_n", "traction_s")
-FACTORS = ("KI", "KII")
+TIP_DATASETS = ("KI", "KII", "J", "T")
 ENERGIES = ("external", "elastic", "dissipated", "released")
 CHUNK_BYTES = 32768
 
@@ -48,13 +50,6 @@ def to_columns(points: NDArray[np.complex128]) -> NDArray[np.float64]:
     return np.stack([points.real, points.imag], axis=-1)
 
 
-def open_file(path: Path, mode: str) -> h5py.File:
-    """Open a result file for writing ("w") or for going on ("r+")."""
-    # Without locks, so that the file may be read while it is written; the 1.8 format stores long lists of names. Only
-    # views need more; a file that is all of the 1.10 format could not be opened after its run was killed.
-    return h5py.File(path, mode, libver=("v108", "v110"), locking=False)
-
-
 def write_attributes(
     file: h5py.File, model: Model, ranks: int, petsc_version: str, petsc_options: Sequence[str]
 ) -> None:
@@ -63,7 +58,7 @@ def write_attributes(
         "title": model.title, "pbem_version": __version__, "petsc_version": petsc_version, "case": model.source,
         "units_length": model.units_length, "units_stress": model.units_stress, "status": "running",
         "ranks": np.int32(ranks), "configuration": dump_configuration(model),
-        "petsc_options": " ".join(petsc_options),
+        "petsc_options": " ".join(petsc_options), "custom_laws": json.dumps(dict(model.law_texts)),
     }
     for name, value in attributes.items():
         file.attrs[name] = value
@@ -90,11 +85,14 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     together = file.create_group("all")
     _write_reactions(file.create_group("reactions"), together, list(model.conditions))
     _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
-    _write_tips(file.create_group("tips"), together.create_group("tips"), list(model.crack_tips))
+    _write_tips(file.create_group("tips"), together.create_group("tips"), model, mesh)
     energy = file.create_group("energy")
     for name in ENERGIES:
         create_energy(energy, name)
     create_balance(file, mesh)
+    _write_estimates(file.create_group("estimates"), model, mesh)
+    if model.analysis.accuracy is not None:
+        _write_fractions(file.create_group("mesh"), model)
     if model.interior_points:
         interior = file.create_group("interior")
         interior["position"] = to_columns(np.array(model.interior_points))
@@ -135,15 +133,50 @@ def _write_reactions(group: h5py.Group, together: h5py.Group, names: list[str]) 
         source.create_view(group.id, name, number)
 
 
-def _write_tips(group: h5py.Group, together: h5py.Group, names: list[str]) -> None:
+def _write_tips(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
+    names = list(list_tip_curves(model, mesh))
     group.attrs["names"] = _text(names)
     if not names:
         return
-    sources = {factor: Columns(_create_growing(together, factor, (len(names), 2), "f8")) for factor in FACTORS}
+    of_crack = {name: region.material.plane_modulus for region in model.regions for name in region.cracks}
+    together["plane_modulus"] = np.array([of_crack.get(name, np.nan) for name in names])
+    sources = {kind: Columns(_create_growing(together, kind, (len(names), 2), "f8")) for kind in TIP_DATASETS}
     for number, name in enumerate(names):
         crack = create_group(group.id, name)
-        for factor, source in sources.items():
-            source.create_view(crack, factor, number)
+        for kind, source in sources.items():
+            source.create_view(crack, kind, number)
+
+
+def _write_fractions(group: h5py.Group, model: Model) -> None:
+    """Where the elements of all legs end, as the mesh may have been refined: leg after leg, curve after curve."""
+    legs = [(number, leg) for number, curve in enumerate(model.curves.values()) for leg in curve.legs]
+    group["curve"] = np.array([number for number, _ in legs], dtype="i4")
+    group["elements"] = np.array([leg.elements for _, leg in legs], dtype="i4")
+    group["fractions"] = np.concatenate([leg.element_fractions() for _, leg in legs])
+
+
+def read_fractions(file: h5py.File) -> Fractions | None:
+    """The element ends that the mesh of a result file was made with, if it may have been refined."""
+    if "mesh" not in file:
+        return None
+    group, names = file["mesh"], file["nodes/curve"].attrs["names"]
+    counts = group["elements"][...] + 1
+    parts = np.split(group["fractions"][...], np.cumsum(counts)[:-1])
+    ends: dict[str, list[tuple[float, ...]]] = {str(name): [] for name in names}
+    for number, part in zip(group["curve"][...], parts, strict=True):
+        ends[str(names[number])].append(tuple(float(t) for t in part))
+    return {name: tuple(legs) for name, legs in ends.items()}
+
+
+def _write_estimates(group: h5py.Group, model: Model, mesh: Mesh) -> None:
+    """Estimated errors: a dataset a quantity, its second axis the curves, interfaces or cracks of the attributes."""
+    for name, shape in list_datasets(model, mesh).items():
+        if 0 not in shape:
+            _create_growing(group, name, shape, "f8")
+    group.attrs["curves"] = _text(list(model.conditions))
+    group.attrs["interfaces"] = _text(list(sort_pairs(mesh)))
+    group.attrs["cracks"] = _text(list(model.crack_tips))
+    group.attrs["missing"] = ""
 
 
 def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mesh: Mesh) -> None:
@@ -193,6 +226,28 @@ def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: 
     row = max(1, int(np.prod(shape))) * np.dtype(kind).itemsize
     chunk = (max(1, min(64, CHUNK_BYTES // row)), *(max(1, length) for length in shape))
     return group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=chunk)
+
+
+def count_steps(file: h5py.File) -> int:
+    """How many steps were stored completely: the shortest of all that grows with them."""
+    counts: list[int] = []
+
+    def count(_: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.maxshape[:1] == (None,):
+            counts.append(len(item))
+
+    for group in find_growing(file):
+        group.visititems(count)
+    return min(counts)
+
+
+# Groups of what does not grow, or of views of what does.
+OTHERS = ("nodes", "elements", "contact", "reactions", "tips")
+
+
+def find_growing(file: h5py.File) -> list[h5py.Group]:
+    """The groups of what grows with the steps."""
+    return [item for name, item in file.items() if name not in OTHERS and isinstance(item, h5py.Group)]
 
 
 def create_energy(group: h5py.Group, name: str) -> h5py.Dataset:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +13,9 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+from pbem.errors import ResultFileError
+from pbem.results.journal import DamageError, OverlaidFile, find_unapplied
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -184,9 +189,51 @@ def _read_contact(path: Path, file: h5py.File, name: str, steps: int) -> Contact
     )
 
 
-def open_quietly(path: Path) -> h5py.File:
-    """A file to be read, without locks: a run that is going on may be looked at, and goes on writing."""
-    return h5py.File(path, "r", locking=False)
+@contextmanager
+def open_quietly(path: Path) -> Iterator[h5py.File]:
+    """A file to be read, without locks: a run that is going on may be looked at, and goes on writing.
+
+    Raises ResultFileError where the file is damaged.
+    """
+    with refuse_damage(path), _open(path) as file:
+        yield file
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[h5py.File]:
+    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        tail = find_unapplied(disk)
+    finally:
+        os.close(disk)
+    if tail is None:
+        with h5py.File(path, "r", locking=False) as file:
+            yield file
+        return
+    # Its run was killed while it wrote the pages of its journal to their places.
+    with closing(OverlaidFile(path, tail)) as committed, h5py.File(committed, "r") as file:
+        yield file
+
+
+@contextmanager
+def refuse_damage(path: Path) -> Iterator[None]:
+    """Raise ResultFileError for what h5py raises in the block when a file is none of HDF5's, cut off or damaged."""
+    try:
+        yield
+    except DamageError as error:
+        raise ResultFileError(str(path), str(error.strerror)) from error
+    except OSError as error:
+        raise ResultFileError(str(path), f"is not an HDF5 file, or is cut off ({_shorten(error)})") from error
+    except DAMAGE as error:
+        raise ResultFileError(str(path), f"is not a complete result file ({_shorten(error)})") from error
+
+
+def _shorten(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]
+
+
+# What h5py and NumPy raise when a file holds other kinds of things than it should.
+DAMAGE = (KeyError, ValueError, RuntimeError, TypeError, AttributeError, IndexError, MemoryError, OverflowError)
 
 
 def read_names(item: h5py.HLObject) -> tuple[str, ...]:

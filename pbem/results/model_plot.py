@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model
 from pbem.results.describe import describe_condition
+from pbem.results.level_plot import draw_levels
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns, trace_elements
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
 
@@ -25,14 +26,16 @@ MOST_NAMES = 30
 CRACK = "#A51C30"
 
 
-def plot_model(model: Model, mesh: Mesh, path: str | os.PathLike[str]) -> None:
-    """Write the picture of a model; the ending of `path` says the format."""
+def plot_model(
+    model: Model, mesh: Mesh, path: str | os.PathLike[str], levels: NDArray[np.int64] | None = None
+) -> None:
+    """Write the picture of a model; the ending of `path` says the format. levels (e,): see `draw_model`."""
     with style():
-        draw_model(model, mesh).savefig(path, dpi=200)
+        draw_model(model, mesh, levels).savefig(path, dpi=200)
 
 
-def draw_model(model: Model, mesh: Mesh) -> Figure:
-    """The figure of `plot_model`."""
+def draw_model(model: Model, mesh: Mesh, levels: NDArray[np.int64] | None = None) -> Figure:
+    """The figure of `plot_model`; levels (e,): how often each element was halved, to be shown by colours."""
     figure = Figure(figsize=(7.2, 5.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -58,7 +61,10 @@ def draw_model(model: Model, mesh: Mesh) -> Figure:
     axes.set_ylabel(label("$y$", model.units_length))
     axes.set_title(f"{model.title}\n{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, "
                    f"{mesh.pairs.count} contact pairs", loc="left", fontsize=9)
-    axes.legend(handles=_list_handles(model, few), loc="center left", bbox_to_anchor=(1.01, 0.5))
+    handles = _list_handles(model, few)
+    if levels is not None:
+        handles += draw_levels(axes, mesh, levels)
+    axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
 
 

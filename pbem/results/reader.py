@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,15 +17,27 @@ from numpy.typing import NDArray
 
 from pbem.case.generation import Group
 from pbem.errors import ResultFileError
+from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
-from pbem.results.contents import Balances, Elements, Energies, Nodes, Steps, Tips, Units
-from pbem.results.layout import ENERGIES, FACTORS
-from pbem.results.lazy import AllPairs, Contact, Interfaces, Interior, freeze, open_quietly, read_names
+from pbem.results.contents import Balances, Elements, Energies, Errors, Nodes, Steps, Tips, Units
+from pbem.results.journal import check_pages, is_being_written
+from pbem.results.layout import ENERGIES, TIP_DATASETS, count_steps, read_fractions
+from pbem.results.lazy import (
+    AllPairs,
+    Contact,
+    Interfaces,
+    Interior,
+    freeze,
+    open_quietly,
+    read_names,
+    refuse_damage,
+)
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
-STATUSES = ("running", "finished", "failed")
+STATUSES = ("running", "finished", "failed", "stopped")
+ATTEMPTS = 5
 
 
 @dataclass(frozen=True)
@@ -32,11 +45,11 @@ class Results:
     """What a result file holds. k stored steps, n nodes.
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; pairs: all of them at
-    once; groups: interfaces that a table [[generate]] made; tips: per crack its stress-intensity factors; energy: the
+    once; groups: interfaces that a table [[generate]] made; tips: per crack what its tips carry; energy: the
     energies; balance: of the forces on every region, None in files of earlier versions; interior: points inside, None
     if the case has none; convergence: one row per Newton iteration with the fields step, iteration, residual, changed,
     stick, slip, open, seconds.
-    failure: why the run ended early (status "failed"), otherwise empty.
+    failure: why the run ended early (status "failed" or "stopped"), empty if it did not, or was killed.
     """
 
     path: Path
@@ -77,6 +90,18 @@ class Results:
         """(k, n) normal stress along the boundary, at the nodes, in units of stress."""
         return self._load("fields/hoop_stress")
 
+    @cached_property
+    def fractions(self) -> Fractions | None:
+        """Where the elements of each curve's legs end, if the mesh may have been refined (`analysis.accuracy`)."""
+        with open_quietly(self.path) as file:
+            return read_fractions(file)
+
+    @cached_property
+    def errors(self) -> Errors:
+        """Estimated discretisation errors."""
+        with open_quietly(self.path) as file:
+            return _read_errors(file, len(self.steps))
+
     def displacement_at(self, step: int) -> Real:
         """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
         with open_quietly(self.path) as file:
@@ -103,31 +128,41 @@ def open_results(path: str | os.PathLike[str]) -> Results:
     source = Path(path)
     if not source.is_file():
         raise ResultFileError(str(path), "no such file")
+    for attempt in range(ATTEMPTS):
+        try:
+            with refuse_damage(source):
+                return _open(source)
+        except ResultFileError:
+            # Of a run that is going on, the pages of a step may just be on their way to their places.
+            if attempt + 1 == ATTEMPTS or not is_being_written(source):
+                raise
+            time.sleep(0.1)
+    raise AssertionError
+
+
+def _open(path: Path) -> Results:
+    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
-        with open_quietly(source) as file:
-            if "pbem_version" not in file.attrs:
-                raise ResultFileError(str(path), "is an HDF5 file, but not a result file of pbem")
-            if "nodes" in file and "all" not in file:
-                raise ResultFileError(str(path), "was written by an older version of pbem")
-            return _read(source, file)
-    except OSError as error:
-        raise ResultFileError(str(path), f"is not an HDF5 file, or is cut off ({error})") from error
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise ResultFileError(str(path), f"is not a complete result file ({error})") from error
+        check_pages(disk)
+    finally:
+        os.close(disk)
+    with open_quietly(path) as file:
+        if "pbem_version" not in file.attrs:
+            raise ResultFileError(str(path), "is an HDF5 file, but not a result file of pbem")
+        if "nodes" in file and "all" not in file:
+            raise ResultFileError(str(path), "was written by an older version of pbem")
+        return _read(path, file)
 
 
 def _read(path: Path, file: h5py.File) -> Results:
     attributes = dict(file.attrs)
     steps = _read_steps(file)
     k = len(steps)
-    for name in ("fields/displacement", "fields/traction"):
-        if len(file[name]) < k:
-            raise ValueError(f"/{name} holds fewer steps than /steps")
     nodes, elements = file["nodes"], file["elements"]
     return Results(
         path=path,
         **{name: str(attributes[name]) for name in ("title", "case", "pbem_version", "petsc_version")},
-        status=_read_status(attributes), failure=str(attributes.get("failure", "")),
+        status=_read_status(path, attributes), failure=str(attributes.get("failure", "")),
         configuration=str(attributes.get("configuration", "")), ranks=int(attributes["ranks"]),
         units=Units(str(attributes["units_length"]), str(attributes["units_stress"])),
         nodes=Nodes(
@@ -155,11 +190,12 @@ def _read(path: Path, file: h5py.File) -> Results:
     )
 
 
-def _read_status(attributes: Mapping[str, Any]) -> str:
+def _read_status(path: Path, attributes: Mapping[str, Any]) -> str:
+    """The status in the file; of a run that was killed, and could not change it, "stopped"."""
     status = str(attributes["status"])
     if status not in STATUSES:
         raise ValueError(f"unknown status {status}")
-    return status
+    return "stopped" if status == "running" and not is_being_written(path) else status
 
 
 def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
@@ -171,7 +207,7 @@ def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
 def _read_steps(file: h5py.File) -> Steps:
     group = file["steps"]
     columns = ("number", "stage", "factor", "iterations", "residual")
-    k = min(len(group[name]) for name in columns)
+    k = count_steps(file)
     values = {name: freeze(group[name][:k].astype(float if name in ("factor", "residual") else int))
               for name in columns}
     return Steps(**values, stage_names=read_names(group["stage"]))
@@ -189,8 +225,38 @@ def _read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
     names = read_names(file["tips"])
     if not names:
         return {}
-    KI, KII = (freeze(file["all/tips"][kind][:steps]) for kind in FACTORS)
-    return {name: Tips(KI[:, number], KII[:, number]) for number, name in enumerate(names)}
+    group = file["all/tips"]
+    unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
+    values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
+    moduli = group["plane_modulus"][...] if "plane_modulus" in group else np.full(len(names), np.nan)
+    return {
+        name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
+        for number, name in enumerate(names)
+    }
+
+
+def _read_errors(file: h5py.File, steps: int) -> Errors:
+    """Empty where the file has none."""
+    nothing = np.full(steps, np.nan)
+    if "estimates" not in file:
+        return Errors({}, {}, {}, {}, {}, {}, {}, nothing, {}, "written by a version that estimates no errors")
+    group = file["estimates"]
+
+    def read(quantity: str, names: str) -> dict[str, Real]:
+        if quantity not in group:
+            return {}
+        values = freeze(group[quantity][:steps])
+        return {str(name): values[:, number] for number, name in enumerate(group.attrs[names])}
+
+    return Errors(
+        reactions=read("reactions", "curves"),
+        **{name: read(name, "interfaces") for name in ("opening", "slip", "traction_n", "traction_s")},
+        **{name: read(name, "cracks") for name in ("KI", "KII")},
+        displacement=freeze(group["displacement"][:steps]),
+        relative={name.removeprefix("relative_"): freeze(data[:steps]) for name, data in group.items()
+                  if name.startswith("relative_")},
+        missing=str(group.attrs["missing"]),
+    )  # fmt: skip
 
 
 def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:

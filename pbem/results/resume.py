@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -10,8 +12,21 @@ import numpy as np
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.model.refinement import Fractions
 from pbem.results.energy import Energy
-from pbem.results.layout import ENERGIES, PAIR_DATASETS, STEP_DATASETS, create_energy, extend, join_pairs, to_columns
+from pbem.results.layout import (
+    ENERGIES,
+    PAIR_DATASETS,
+    TIP_DATASETS,
+    count_steps,
+    create_energy,
+    extend,
+    find_growing,
+    join_pairs,
+    read_fractions,
+    to_columns,
+)
+from pbem.results.lazy import open_quietly
 from pbem.solve.step import ContactState, Step
 
 
@@ -22,7 +37,14 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
     if file.attrs["case"] != model.source:
         raise ResultFileError(path, "holds the results of another case, or the case file was changed since; "
                                     "run without resuming, or name another output file")
+    before = json.loads(str(file.attrs.get("custom_laws", "{}")))
+    for name, text in model.law_texts.items():
+        if before.get(name) != text and text not in before.values():
+            raise ResultFileError(path, f"was computed with another text of the law {name}; run without resuming, or "
+                                        "name another output file")
     if "all" not in file:
+        raise ResultFileError(path, "was written by another version of pbem; run without resuming")
+    if model.crack_tips and not set(TIP_DATASETS) <= set(file["all/tips"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     position = to_columns(list_faces(mesh).position)
     stored = file["nodes/position"][...]
@@ -34,7 +56,7 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
 def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
     """The last step that was stored completely, without its iterations; None if there is none."""
     steps = file["steps"]
-    k = min(len(steps[name]) for name in STEP_DATASETS)
+    k = count_steps(file)
     if k == 0:
         return None
     contact = {name: np.zeros(mesh.pairs.count, dtype=kind) for name, kind in PAIR_DATASETS.items()}
@@ -48,9 +70,21 @@ def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
     )
 
 
+def read_mesh_fractions(path: Path) -> Fractions | None:
+    """Where the elements end in a result file that is to be gone on with; None if it does not say.
+
+    Raises ResultFileError if it cannot be read.
+    """
+    try:
+        with open_quietly(path) as file:
+            return read_fractions(file)
+    except (OSError, KeyError, ValueError) as error:
+        raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
+
+
 def read_last_energy(file: h5py.File) -> Energy:
     """The energies at the last step that was stored completely."""
-    k = min(len(file["steps"][name]) for name in STEP_DATASETS)
+    k = count_steps(file)
     group = file["energy"]
     if "released" not in group:  # a file of an earlier version
         extend(create_energy(group, "released"), np.zeros(len(group["external"])))
@@ -59,14 +93,13 @@ def read_last_energy(file: h5py.File) -> Energy:
 
 def truncate(file: h5py.File, last_number: int) -> None:
     """Cut everything that goes beyond the last step that was stored completely."""
-    k = min(len(file["steps"][name]) for name in STEP_DATASETS)
+    k = count_steps(file)
 
     def cut(_: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.maxshape[0] is None:
+        if isinstance(item, h5py.Dataset) and item.maxshape[:1] == (None,):
             item.resize(k, axis=0)
 
-    # What is in other groups are views of these.
-    for group in ("steps", "fields", "all", "energy", *(name for name in ("interior", "balance") if name in file)):
-        file[group].visititems(cut)
+    for group in find_growing(file):
+        group.visititems(cut)
     convergence = file["convergence"]
     convergence.resize(int(np.searchsorted(convergence["step"], last_number, side="right")), axis=0)

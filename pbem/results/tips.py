@@ -1,4 +1,4 @@
-"""Stress-intensity factors at the tips of cracks, from the square root in which the jump of displacement begins."""
+"""Stress-intensity factors, J-integral and T-stress at the tips of cracks, from the jumps of displacement near them."""
 
 from __future__ import annotations
 
@@ -7,105 +7,223 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.bem.background import Background
 from pbem.contact.laws import collect_laws
-from pbem.mesh.interpolation import find_coordinates
+from pbem.mesh.elements import Elements
+from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh, sort_pairs
+from pbem.model.material import Material
 from pbem.model.model import Model
-from pbem.solve.step import ContactState
+from pbem.results.interface_release import InterfaceRelease, prepare_interface_release
+from pbem.results.interface_tips import list_tip_curves
+from pbem.results.tip_field import TipShape
+from pbem.results.tip_path import TipPaths, trace_paths, view_outward
+from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
+from pbem.solve.backgrounds import evaluate_backgrounds
+from pbem.solve.step import ContactState, Step
 
-Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
 
-# Without tip elements: the part of the crack's length next to the tip whose jumps are looked at.
-REACH = 0.1
+# A straight crack of more elements is not taken as a whole.
+MOST_WHOLE = 100
+# Cracks whose elements are the same to this part of their lengths share their forms.
+ALIKE = 1e-9
+
+
+@dataclass(frozen=True)
+class _Alike:
+    """Tips (k,) with the same elements around them, turned and enlarged, in the same material.
+
+    tip: number among the ends of all cracks. direction (k,): unit vector that the tip points along; length (k,): their
+    unit. pair, sense (k, m (p + 1)): pairs of the nodes, from the tip on, and 1 or -1 where the first face is on the
+    left or on the right when leaving the tip. region (k,): index.
+    """
+
+    forms: TipForms
+    material: Material
+    tip: Integer
+    region: Integer
+    direction: Complex
+    length: Real
+    pair: Integer
+    sense: Real
 
 
 @dataclass(frozen=True)
 class TipRules:
-    """How the factors follow from the jumps at the pairs: K of an end is the sum of coefficient (stress/sqrt(length))
-    times the jump, for each of its components, over the terms (t,) with its number.
+    """How the values at the tips follow from the pairs and from the displacement of the faces.
 
-    cracks: their names. is_tip (2 cracks,): of the start and the end of the first crack, of the second, ... end (t,):
-    number among these. pair, coefficient (t,). gap (m,): the initial gap of all pairs.
+    cracks: their names, then those of interfaces that end as a crack does. is_tip (2 cracks,): of the start and the end
+    of the first crack, of the second, ...; False on interfaces. gap (m,): the initial gap of all pairs.
     """
 
     cracks: tuple[str, ...]
     is_tip: NDArray[np.bool_]
-    end: Integer
-    pair: Integer
-    coefficient: Real
     gap: Real
+    model: Model
+    mesh: Mesh
+    groups: tuple[_Alike, ...]
+    interfaces: InterfaceRelease
 
     def evaluate(self, contact: ContactState) -> dict[str, tuple[Real, Real]]:
-        """KI and KII (2,) of every crack at its start and its end, as in `evaluate_all`."""
-        return dict(zip(self.cracks, zip(*self.evaluate_all(contact), strict=True), strict=True))
+        """KI and KII (2,) of every crack at its start and its end, as in `evaluate_factors`."""
+        return dict(zip(self.cracks, zip(*self.evaluate_factors(contact), strict=True), strict=True))
 
-    def evaluate_all(self, contact: ContactState) -> tuple[Real, Real]:
+    def evaluate_all(self, step: Step) -> dict[str, Real]:
+        """KI, KII, J and T (cracks, 2) at start and end; of cracks along interfaces J alone."""
+        KI, KII = self.evaluate_factors(step.contact)
+        J = self.evaluate_release(step.contact)
+        for tip, released in zip(self.interfaces.tips, self.interfaces.evaluate(step), strict=True):
+            J[self.cracks.index(tip.name), tip.end] = released
+        return {"KI": KI, "KII": KII, "J": J, "T": self.evaluate_parallel(step)}
+
+    def evaluate_factors(self, contact: ContactState) -> tuple[Real, Real]:
         """KI and KII (cracks, 2) at start and end, stress times sqrt(length); NaN where no tip is.
 
         KI > 0 opens; KII > 0 if the face on the left of the crack's direction moves along it, at both ends. Where no
         pair of the tip's element is open or has an elastic joint, KI is exactly zero.
         """
-        factors = []
-        for jump in (contact.opening - self.gap, -contact.slip):
-            total = np.bincount(self.end, self.coefficient * jump[self.pair], minlength=len(self.is_tip))
-            # No negative zeros.
-            factors.append(np.where(self.is_tip, total + 0.0, np.nan).reshape(-1, 2))
-        return factors[0], factors[1]
+        KI, KII = self._start(), self._start()
+        per_element = self.mesh.order + 1
+        for group in self.groups:
+            modulus = group.material.plane_modulus
+            jumps = self._jumps(contact, group)[:, : group.forms.intensity.shape[1]]
+            factors = (modulus / np.sqrt(group.length))[:, None] * (jumps @ group.forms.intensity.T)
+            first = group.pair[:, :per_element]
+            opens = (contact.opening != self.gap)[first].any(axis=1)
+            slides = (contact.slip != 0)[first].any(axis=1)
+            KI[group.tip] = np.where(opens, factors[:, 0], 0.0)
+            KII[group.tip] = np.where(slides, factors[:, 1], 0.0)
+        return KI.reshape(-1, 2) + 0.0, KII.reshape(-1, 2) + 0.0  # no negative zeros
 
+    def evaluate_release(self, contact: ContactState) -> Real:
+        """J (cracks, 2), stress times length: the energy released per length of growth straight ahead; NaN on
+        interfaces, whose J needs all of the boundary."""
+        J = self._start()
+        for group in self.groups:
+            jumps = self._jumps(contact, group)[:, : len(group.forms.release)]
+            form = np.einsum("ki,ij,kj->k", jumps, group.forms.release, jumps, optimize=True)
+            J[group.tip] = group.material.plane_modulus / group.length * form
+        return J.reshape(-1, 2) + 0.0
 
-Terms = tuple[Integer, Integer, Real]
+    def evaluate_parallel(self, step: Step) -> Real:
+        """T (cracks, 2), stress: what stays finite at the tip of the normal stress along the crack, loads included."""
+        T = self._start()
+        first, opposite = split_faces(self.mesh, step.displacement)
+        mean = 0.5 * (first + opposite)[self.mesh.pairs.first]
+        backgrounds = evaluate_backgrounds(self.model, step.stage, step.factor)
+        for group in self.groups:
+            forms, material = group.forms, group.material
+            modulus = material.plane_modulus
+            jumps = self._jumps(step.contact, group)[:, : len(forms.parallel)]
+            near = group.pair[:, : len(forms.of_normal)]
+            moved = mean[near] * np.conj(group.direction)[:, None]
+            # A motion as a whole has no part in it.
+            moved = (moved - moved.mean(axis=1)[:, None]) @ forms.of_mean
+            value = modulus / group.length * (jumps @ forms.parallel + moved.real)
+            value += step.contact.traction_n[near] @ forms.of_normal
+            T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in backgrounds])
+        return T.reshape(-1, 2)
+
+    def _start(self) -> Real:
+        return np.where(self.is_tip, 0.0, np.nan)
+
+    def _jumps(self, contact: ContactState, group: _Alike) -> Real:
+        """Jumps (k, 2 m (p + 1)) as TipForms takes them, but for the length."""
+        opening, slip = (contact.opening - self.gap)[group.pair], contact.slip[group.pair]
+        jump = -(opening + 1j * slip) * self.mesh.pairs.normal[group.pair]
+        turned = jump * group.sense * np.conj(group.direction)[:, None]
+        return np.stack([turned.real, turned.imag], axis=2).reshape(len(turned), -1)
+
+    def _evaluate_initial(self, group: _Alike, backgrounds: list[Background]) -> Real:
+        """In-situ stress, which has no displacement: what Hooke's law leaves out of the stress along the crack."""
+        kappa = group.material.kappa
+        initial = np.array([backgrounds[region].initial for region in group.region])
+        sxx, syy, sxy = initial.T
+        turned = 0.5 * (sxx - syy) - 1j * sxy  # (s_tt - s_nn)/2 along a direction d: its product with d^2
+        deviator = (turned * group.direction**2).real
+        mean, lateral = 0.5 * (sxx + syy), (3 - kappa) / (1 + kappa)
+        return np.asarray(mean + deviator - lateral * (mean - deviator))
 
 
 def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
-    """How the factors follow from the jumps at the pairs.
+    """How the values at the tips follow from the jumps; the forms are derived once for all cracks that look alike."""
+    cracks = list_tip_curves(model, mesh)
+    interfaces = prepare_interface_release(model, mesh)
+    is_tip = np.array([model.crack_tips.get(name, (False, False)) for name in cracks], dtype=bool).ravel()
+    number = np.flatnonzero(is_tip)
+    sorted_pairs = sort_pairs(mesh)
+    own = [sorted_pairs[cracks[tip // 2]][-1 if tip % 2 else 0] for tip in number]
+    element = mesh.pairs.first[np.array(own, dtype=np.int64)] // (mesh.order + 1)
+    gap = collect_laws(model, mesh).gap
+    if not len(number):
+        return TipRules(cracks, is_tip, gap, model, mesh, (), interfaces)
+    pair_of = np.full(mesh.nodes, -1)
+    pair_of[mesh.pairs.first[mesh.pairs.crack]] = np.flatnonzero(mesh.pairs.crack)
+    groups: list[_Alike] = []
+    for paths in trace_paths(mesh, element, number % 2, MOST_WHOLE):
+        groups += _gather_alike(model, mesh, paths, number, pair_of)
+    return TipRules(cracks, is_tip, gap, model, mesh, tuple(groups), interfaces)
 
-    Near a tip the jump is (8/E') K sqrt(rho/(2 pi)), rho being the distance from the tip along the crack. On a tip
-    element its components along the normal and the crack are sums of t^(k + 1/2), and rho tends to t times the distance
-    of the element's ends, on arcs too (the derivative of the arc length by t at the tip is the chord). Without tip
-    elements the jump over sqrt(rho) is extrapolated linearly to the tip from its neighbourhood, the last element left
-    out, which cannot follow the root.
+
+def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pair_of: Integer) -> list[_Alike]:
+    """Sort paths by what they look like."""
+    seen, direction, length = _see_from_tip(mesh, paths)
+    region = mesh.region[paths.elements[:, 0]]
+    tip = np.where(paths.outward, mesh.tip[paths.elements], np.array([0, 2, 1])[mesh.tip[paths.elements]])
+    chord = seen.end - seen.start
+    columns = np.column_stack([
+        np.round(chord[:, 1:] / chord[:, :-1] / ALIKE), np.round(seen.sweep / ALIKE), np.round(paths.cut_at / ALIKE),
+        paths.cut, paths.near, paths.whole, tip,
+    ]) + 0.0  # fmt: skip
+    alike: dict[tuple[Material, bytes], list[int]] = {}
+    for place, row in enumerate(np.ascontiguousarray(columns, dtype=complex)):
+        alike.setdefault((model.regions[int(region[place])].material, row.tobytes()), []).append(place)
+    groups = []
+    for (material, _), places in alike.items():
+        at, first = np.array(places), places[0]
+        shape = TipShape(
+            Elements(seen.start[first], seen.end[first], seen.center[first], seen.sweep[first]), tip[first],
+            mesh.crack_local, material.kappa, bool(paths.whole[first]), int(paths.near[first]), int(paths.cut[first]),
+            float(paths.cut_at[first]),
+        )  # fmt: skip
+        pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])]
+        sense = np.repeat(np.where(paths.outward[at], 1.0, -1.0), mesh.order + 1, axis=1)
+        groups.append(_Alike(derive_forms(shape), material, number[paths.tip[at]], region[at], direction[at],
+                             length[at], pair, sense))
+    return groups
+
+
+def _see_from_tip(mesh: Mesh, paths: TipPaths) -> tuple[Elements, Complex, Real]:
+    """The elements (k, m) of paths in the tips' frames; the directions (k,) of the tips, and the units of length."""
+    elements = view_outward(mesh, paths.elements, paths.outward)
+    tip = elements.start[:, :1]
+    length = np.abs(elements.end[:, 0] - tip[:, 0])
+    direction = _find_directions(elements)
+    turned = (np.conj(direction) / length)[:, None]
+    start, end, center = ((points - tip) * turned for points in (elements.start, elements.end, elements.center))
+    return Elements(start, end, np.where(elements.sweep == 0, 0, center), elements.sweep), direction, length
+
+
+def _find_directions(elements: Elements) -> Complex:
+    """The directions (k,) in which the tips of cracks with these elements (k, m) point.
+
+    Of a straight crack it is that of all of it: the ends of a short element have lost digits if it lies far from the
+    origin.
     """
-    modulus = {name: region.material.plane_modulus for region in model.regions for name in region.cracks}
-    cracks = tuple(model.crack_tips)
-    is_tip = np.array(list(model.crack_tips.values()), dtype=bool).ravel()
-    pairs = sort_pairs(mesh)
-    per_element = mesh.order + 1
-    on_elements, along = [], []
-    for number in np.flatnonzero(is_tip):
-        name, end = cracks[number // 2], int(number % 2)
-        own = pairs[name][::-1] if end else pairs[name]  # from the tip on
-        element = int(mesh.pairs.first[own[0]]) // per_element
-        if mesh.tip[element] == end + 1 or len(own) == per_element:
-            on_elements.append((number, element, end, own[:per_element]))
-        else:
-            along.append(_extrapolate(number, mesh.pairs.arc_length[own], model.curves[name].length, end, own, mesh))
-    terms = [_read_from_elements(mesh, on_elements), *along] if on_elements else along
-    nothing = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0))
-    numbers, at, coefficient = (np.concatenate(parts) for parts in zip(nothing, *terms, strict=True))
-    scale = np.repeat([modulus[name] / 8 * np.sqrt(2 * np.pi) for name in cracks], 2)
-    coefficient = scale[numbers] * coefficient if len(numbers) else coefficient
-    return TipRules(cracks, is_tip, numbers, at, coefficient, collect_laws(model, mesh).gap)
+    start, end, sweep = elements.start, elements.end, elements.sweep
+    chord = end - start
+    rounding = 16 * np.finfo(float).eps * np.abs(end) / np.abs(chord)
+    longest = np.take_along_axis(chord, np.argmax(np.abs(chord), axis=1)[:, None], axis=1)
+    straight = ~(np.abs(np.angle(chord / longest)) > STRAIGHT + rounding).any(axis=1) & ~sweep.any(axis=1)
+    leading = np.where(straight, end[:, -1] - start[:, 0], chord[:, 0] * np.exp(-0.5j * sweep[:, 0]))
+    return np.asarray(-leading / np.abs(leading))
 
 
-def _read_from_elements(mesh: Mesh, tips: list[tuple[int, int, int, Integer]]) -> Terms:
-    """Terms of ends with a tip element, or with one element alone; their numbers, elements, which ends, and pairs."""
-    number, element, end = (np.array(column) for column in list(zip(*tips, strict=True))[:3])
-    s = find_coordinates(mesh.start[element], mesh.end[element], mesh.sweep[element],
-                         mesh.position.reshape(mesh.elements, -1)[element])
-    t = np.where(end[:, None] == 0, 0.5 * (1 + s), 0.5 * (1 - s[:, ::-1]))
-    first_shapes = np.linalg.inv(t[..., None] ** (np.arange(mesh.order + 1) + 0.5))[:, 0]
-    coefficient = first_shapes / np.sqrt(abs(mesh.end[element] - mesh.start[element]))[:, None]
-    pairs = np.array([own for *_, own in tips])
-    return np.repeat(number, mesh.order + 1), pairs.ravel(), coefficient.ravel()
-
-
-def _extrapolate(number: int, arc_length: Real, length: float, end: int, pairs: Integer, mesh: Mesh) -> Terms:
-    """Terms of an end without a tip element: pairs and their arc lengths from the tip on."""
-    per_element = mesh.order + 1
-    distance = length - arc_length if end else arc_length
-    near = np.flatnonzero(distance < REACH * length)
-    wanted = max(2 * per_element, near[-1] + 1 if len(near) else 0)
-    chosen = np.arange(per_element, min(max(wanted, per_element + 2), len(pairs)))
-    line = np.linalg.pinv(np.stack([np.ones(len(chosen)), distance[chosen]], axis=1))
-    return np.full(len(chosen), number), pairs[chosen], line[0] / np.sqrt(distance[chosen])
+def _list_outward(mesh: Mesh, elements: Integer, outward: NDArray[np.bool_]) -> Integer:
+    """The nodes (k, m (p + 1)) of elements (k, m) in the order in which they are met when leaving the tip."""
+    within = np.arange(mesh.order + 1)
+    along = np.where(outward[..., None], within, within[::-1])
+    return np.asarray((elements[..., None] * (mesh.order + 1) + along).reshape(len(elements), -1))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hoop import evaluate_hoop_stress
-from pbem.errors import ConvergenceError, ResultFileError, StorageError
+from pbem.contact.custom import find_fault
+from pbem.errors import ConvergenceError, LawError, ResultFileError, StopError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.balance import append_balance
@@ -22,26 +23,26 @@ from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance, describe_runaway
 from pbem.results.layout import (
     ENERGIES,
-    FACTORS,
     ITERATION,
     PAIR_DATASETS,
     STEP_DATASETS,
     append_row,
     extend,
     join_pairs,
-    open_file,
     to_columns,
     write_attributes,
     write_header,
 )
+from pbem.results.lazy import refuse_damage
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
+from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Interior, Iteration, Step
 
-# Bytes that HDF5 may need beyond the data of a step, and to close the file.
-ROOM_TO_CLOSE = 2_000_000
+# What ends a run though nothing is wrong with it.
+STOPPED = (MemoryError, StorageError, BrokenPipeError)
 
 
 class ResultWriter:
@@ -49,10 +50,12 @@ class ResultWriter:
 
     The header is written under a temporary name and moved to `path` when complete, so that a file of that name always
     can be read. Every `model.output_every`-th step is stored, and the last of each stage; when the run ends early, the
-    last one reached as well. Steps are on the disk when `append` returns.
+    last one reached as well. Steps are on the disk when `append` returns; whatever ends the process before, the file
+    holds the steps before. Nobody else can write the file meanwhile.
 
-    Leaving the context sets the status to "finished"; leaving it by an exception, to "failed" with the attribute
-    `failure` (text) and `failure_reason` (short name).
+    Leaving the context sets the status to "finished"; leaving it by an exception, to "failed" or "stopped" (by the
+    user, the system, or for want of memory or room) with the attributes `failure` (text) and `failure_reason` (short
+    name).
 
     interior_region (q,): index of the region of every interior point (-1 outside of all), from `InteriorField`; needed
     if the model has such points.
@@ -62,26 +65,28 @@ class ResultWriter:
 
     def __init__(
         self, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
-        petsc_options: Sequence[str] = (), interior_region: NDArray[np.int64] | None = None,
+        petsc_options: Sequence[str] = (), interior_region: NDArray[np.int64] | None = None, *, force: bool = False,
     ) -> None:
-        """Raises ResultFileError if the file cannot be written there."""
-        target = check_output_path(path)
-        temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+        """force: the file takes the place of results that are there.
+
+        Raises ResultFileError if the file cannot be written there, is there already, or another run is writing it.
+        """
+        target = check_output_path(path, force=force)
+
+        def fill(file: h5py.File) -> None:
+            regions = np.full(len(model.interior_points), -1) if interior_region is None else interior_region
+            write_header(file, model, mesh, regions)
+            write_attributes(file, model, ranks, petsc_version, petsc_options)
+
         try:
-            file = open_file(temporary, "w")
-            try:
-                regions = np.full(len(model.interior_points), -1) if interior_region is None else interior_region
-                write_header(file, model, mesh, regions)
-                write_attributes(file, model, ranks, petsc_version, petsc_options)
-                file.flush()
-                temporary.replace(target)
-            except BaseException:
-                file.close()
-                temporary.unlink(missing_ok=True)
-                raise
+            storage = create_store(target, force, fill)
         except OSError as error:
             raise ResultFileError(str(path), f"cannot be written ({error})") from error
-        self._start(target, file, model, mesh, None, None)
+        try:
+            self._start(target, storage, model, mesh, None, None)
+        except BaseException:
+            storage.drop()
+            raise
 
     @classmethod
     def resume(
@@ -90,38 +95,39 @@ class ResultWriter:
     ) -> ResultWriter:
         """A writer that goes on after the last step stored in an existing file of the same case.
 
-        Raises ResultFileError if there is no such file, it cannot be read, or it holds another case or mesh.
+        Raises ResultFileError if there is no such file, it cannot be read, was damaged, holds another case or mesh, or
+        another run is writing it.
         """
-        target = check_output_path(path)
-        if not target.exists():
-            raise ResultFileError(str(path), "there is no such file to resume; run without resuming")
+        target = check_output_path(path, resume=True)
+        remove_stale_parts(target)
+        with refuse_damage(target):
+            storage = Store(target)
         try:
-            file = open_file(target, "r+")
+            with refuse_damage(target):
+                file = storage.file
+                check_same_case(str(path), file, model, mesh)
+                last_step = read_last_step(file, mesh)
+                reached = None if last_step is None else read_last_energy(file)
+                truncate(file, 0 if last_step is None else last_step.number)
+                write_attributes(file, model, ranks, petsc_version, petsc_options)
+            writer = cls.__new__(cls)
+            writer._start(target, storage, model, mesh, last_step, reached)
+            storage.commit()
         except OSError as error:
-            raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
-        try:
-            check_same_case(str(path), file, model, mesh)
-            last_step = read_last_step(file, mesh)
-            reached = None if last_step is None else read_last_energy(file)
-            truncate(file, 0 if last_step is None else last_step.number)
-            write_attributes(file, model, ranks, petsc_version, petsc_options)
-            file.flush()
-        except BaseException as error:
-            file.close()
-            if isinstance(error, KeyError | OSError | ValueError):
-                raise ResultFileError(str(path), f"is not a complete result file ({error})") from error
+            storage.drop()
+            raise ResultFileError(str(path), f"cannot be written ({error})") from error
+        except BaseException:
+            storage.drop()
             raise
-        writer = cls.__new__(cls)
-        writer._start(target, file, model, mesh, last_step, reached)
         return writer
 
     def _start(
-        self, path: Path, file: h5py.File, model: Model, mesh: Mesh, last_step: Step | None, reached: Energy | None
+        self, path: Path, storage: Store, model: Model, mesh: Mesh, last_step: Step | None, reached: Energy | None
     ) -> None:
         self.path = path
         self._model, self._mesh = model, mesh
         self.last_step = last_step
-        self._file = file
+        self._storage = storage
         self._every = max(1, model.output_every)
         faces = list_faces(mesh)
         self._weight = faces.weight
@@ -133,34 +139,40 @@ class ResultWriter:
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         self._pending: Step | None = None
 
-    def append(self, step: Step) -> tuple[str, ...]:
-        """Store the step if it is its turn, and its iterations in any case; flush. Gives what the user should know.
+    @property
+    def _file(self) -> h5py.File:
+        return self._storage.file
 
-        Raises StorageError if the disk has no room for it: HDF5 would leave a file that cannot be read.
+    def append(
+        self, step: Step, estimates: Mapping[str, NDArray[np.float64]] | None = None
+    ) -> tuple[str, ...]:
+        """Store the step if it is its turn, and its iterations in any case; all of it is on the disk, or nothing.
+
+        estimates: its estimated errors, of `pbem.results.estimates.to_rows`; NaN is stored without.
+        Gives what the user should know.
+
+        Raises StorageError if the disk has no room for it, LawError if a custom law fails; the file then holds the
+        steps before.
         """
-        self._require_room(step)
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
         self._energy = self._balance.add(step)
+        self._estimates = estimates or {}
+        fault = find_fault(group.law for group in self._balance.laws.strengths)
+        if fault:
+            raise LawError(fault)
         if step.is_due(self._every):
             self._store(step)
         else:
             self._pending = step
-        self._file.flush()
+        try:
+            self._storage.commit()
+        except OSError as error:
+            raise StorageError(str(self.path), f"no room for step {step.number} ({error.strerror or error})") from error
         notes = [] if self._balance.runaway is None else [describe_runaway(step, self._balance.runaway)]
         if step.last_of_stage and step.stage == len(self._model.stages) - 1:
             notes += describe_sparse_contacts(self._model, self._mesh, step.contact.mode)
         return tuple(notes)
-
-    def _require_room(self, step: Step) -> None:
-        state = os.statvfs(self.path.parent)
-        free = state.f_bavail * state.f_frsize
-        fields = (step.displacement, step.traction, *vars(step.contact).values())
-        inside = 0 if step.interior is None else step.interior.displacement.nbytes + step.interior.stress.nbytes
-        needed = 3 * (sum(field.nbytes for field in fields) + inside) + ROOM_TO_CLOSE
-        if free < needed:
-            sizes = f"{free / 1e6:.3g} MB are free, {needed / 1e6:.3g} MB may be needed"
-            raise StorageError(str(self.path), f"no room for step {step.number}: {sizes}")
 
     def complete(self, interior: Interior) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""
@@ -173,7 +185,7 @@ class ResultWriter:
         append_row(file["fields/hoop_stress"], self._evaluate_hoop_stress(step))
         if "interior" in file:
             count = len(self._model.interior_points)
-            none = Interior(np.full(count, np.nan + 0j), np.full((count, 3), np.nan))
+            none = Interior(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
             interior = step.interior or none
             append_row(file["interior/displacement"], to_columns(interior.displacement))
             append_row(file["interior/stress"], interior.stress)
@@ -184,9 +196,12 @@ class ResultWriter:
             append_row(together["reactions"], to_columns(self._sum_reactions(step.traction)))
         for quantity in PAIR_DATASETS if len(self._pairs) else ():
             append_row(together["contact"][quantity], getattr(step.contact, quantity)[self._pairs])
-        if self._model.crack_tips:
-            for kind, factors in zip(FACTORS, self._tip_rules.evaluate_all(step.contact), strict=True):
-                append_row(together["tips"][kind], factors)
+        if self._tip_rules.cracks:
+            for kind, at_tips in self._tip_rules.evaluate_all(step).items():
+                append_row(together["tips"][kind], at_tips)
+        for name, dataset in file["estimates"].items():
+            unknown = np.full(dataset.shape[1:], np.nan)
+            append_row(dataset, np.asarray(self._estimates.get(name, unknown)))
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         append_balance(file, step)
@@ -194,6 +209,21 @@ class ResultWriter:
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
             append_row(file["steps"][quantity], np.array(value))
+
+    def note_missing(self, reason: str) -> None:
+        """Say in the file why errors are not estimated."""
+        if self._file["estimates"].attrs["missing"] != reason:
+            self._file["estimates"].attrs["missing"] = reason
+            self._storage.commit()
+
+    @property
+    def relative_errors(self) -> dict[str, NDArray[np.float64]]:
+        """The estimated relative errors (k,) of the steps stored so far, by kind."""
+        if self._pending is not None:
+            self._store(self._pending)
+            self._storage.commit()
+        group = self._file["estimates"]
+        return {name.removeprefix("relative_"): group[name][...] for name in group if name.startswith("relative_")}
 
     def _evaluate_hoop_stress(self, step: Step) -> NDArray[np.float64]:
         """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
@@ -214,23 +244,29 @@ class ResultWriter:
         return np.bincount(of, force.real, count) + 1j * np.bincount(of, force.imag, count)
 
     def finish(self) -> None:
-        """Set the status to "finished" and close the file."""
+        """Set the status to "finished" and close the file. Raises StorageError if the disk has no room."""
         self._close("finished")
 
-    def fail(self, reason: str, detail: str) -> None:
-        """Set the status to "failed", with the reason (a short name) and its detail (sentences); close the file."""
-        if self._file:
-            self._file.attrs["failure"] = f"{reason}: {detail}" if detail else reason
-            self._file.attrs["failure_reason"] = reason
-        self._close("failed")
+    def fail(self, reason: str, detail: str, status: str = "failed") -> None:
+        """Set the status, with the reason (a short name) and its detail (sentences); close the file."""
+        self._close(status, {"failure": f"{reason}: {detail}" if detail else reason, "failure_reason": reason})
 
-    def _close(self, status: str) -> None:
-        if not self._file:
+    def _close(self, status: str, reasons: Mapping[str, str] = MappingProxyType({})) -> None:
+        if not self._storage.is_open:
             return
-        if self._pending is not None:
-            self._store(self._pending)
-        self._file.attrs["status"] = status
-        self._file.close()
+        try:
+            if self._pending is not None:
+                self._store(self._pending)
+                self._storage.commit()
+        except OSError as error:
+            self._pending = None
+            self._storage.roll_back()
+            if status == "finished":
+                self.fail("StorageError", str(error), "stopped")
+                raise StorageError(str(self.path), f"no room for the last step ({error.strerror or error})") from error
+        for name, value in {**reasons, "status": status}.items():
+            self._file.attrs[name] = value
+        self._storage.close()
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -243,13 +279,16 @@ class ResultWriter:
             return
         # What ended the run must be what the user hears of, not that its last words could not be written.
         with suppress(Exception):
-            if isinstance(error, ConvergenceError):
-                self.fail(error.reason, error.detail)
+            if self._storage.is_open and self._storage.dirty:
+                self._storage.roll_back()  # it ended within a step
+            if isinstance(error, ConvergenceError | StopError):
+                self.fail(error.reason, error.detail, "stopped" if isinstance(error, StopError) else "failed")
             elif isinstance(error, KeyboardInterrupt):
-                self.fail("interrupted", "the run was stopped by the user or the batch system")
+                self.fail("interrupted", "the run was stopped by the user or the batch system", "stopped")
             else:
-                self.fail(type(error).__name__, str(error))
-        self._file.close()
+                stopped = isinstance(error, STOPPED)
+                self.fail(type(error).__name__, str(error), "stopped" if stopped else "failed")
+        self._storage.drop()
 
 
 def _iteration_row(step: int, iteration: Iteration) -> tuple[float, ...]:

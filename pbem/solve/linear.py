@@ -33,6 +33,7 @@ MOST_WORKSPACE = 10_000  # per cent
 
 # PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
 ZERO_PIVOT, LIBRARY_ERROR = 71, 76
+NOT_CONVERGED = 91
 
 
 def choose_method(requested: str, regions: int) -> Method:
@@ -45,6 +46,16 @@ def choose_method(requested: str, regions: int) -> Method:
 def petsc_version() -> str:
     """Version of the PETSc library in use."""
     return ".".join(str(part) for part in PETSc.Sys.getVersion())
+
+
+@contextmanager
+def pass_over_divergence() -> Iterator[None]:
+    """Leave to the caller what the option ksp_error_if_not_converged makes an error: it asks for the reason itself."""
+    try:
+        yield
+    except PETSc.Error as error:
+        if error.ierr != NOT_CONVERGED:
+            raise
 
 
 @contextmanager
@@ -213,7 +224,8 @@ class LinearSolver:
             self.solver.setTolerances(max_it=most)
             self.solver.setGMRESRestart(max(most, 1))
         self.right.setArray(self._share(rhs, self.outer, self.inner))
-        self.solver.solve(self.right, self.left)
+        with pass_over_divergence():
+            self.solver.solve(self.right, self.left)
         self.solver.setTolerances(*limits)
         self.iterations = max(1, int(self.solver.getIterationNumber()))
         self.iteration_seconds = self._slowest(time.perf_counter() - begin) / self.iterations

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
@@ -73,7 +74,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     hold = Hold(problem)
     modes = hold.apply(memory.modes, laws.gap, np.zeros(laws.count))
     normal_traction, slip = memory.normal_traction, memory.slip
-    search = Search(MOST_PIVOTED_BY_GMRES if problem.groups else MOST_PIVOTED, laws.follows)
+    hierarchical = isinstance(problem.operator, HierarchicalOperator)
+    search = Search(MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED, laws.follows)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -117,6 +119,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         chosen = cascade.modes if cascade else _pivot(
             hold, tangent, constraints, modes, memory, load, law, solved, search
         )
+        if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
+            raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():

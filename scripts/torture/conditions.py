@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.model.sliver import Tie
 from pbem.results.reader import Results
 
 from .history import evaluate_loads
@@ -41,8 +42,13 @@ def measure_scales(results: Results, tables: Tables) -> Scales:
     return Scales(stress, max(*map(float, jumps), stress / hardest * size))
 
 
-def measure_contact(results: Results, tables: Tables, scales: Scales) -> dict[str, float]:
-    """The largest violation of each condition over all steps, relative to the scales (0: none)."""
+def measure_contact(
+    results: Results, tables: Tables, scales: Scales, ties: Sequence[Tie] = ()
+) -> dict[str, float]:
+    """The largest violation of each condition over all steps, relative to the scales (0: none).
+
+    ties: bits of curves in the corners of narrow wedges, whose pairs take the mode of their neighbour, are left out.
+    """
     worst: dict[str, float] = {}
     first = 0
     for name in results.pairs.names:
@@ -55,7 +61,11 @@ def measure_contact(results: Results, tables: Tables, scales: Scales) -> dict[st
             evaluate_loads(tables, int(stage), float(factor)).pressure.get(name, 0.0)
             for stage, factor in zip(results.steps.stage, results.steps.factor, strict=True)
         ])  # fmt: skip
-        found = _measure_pairs(contact, law, broken, pressure[:, None])
+        tied = np.zeros(contact.mode.shape[1], dtype=bool)
+        for tie in ties:
+            if tie.curve in (name, contact.first):
+                tied |= (contact.arc_length > tie.start) & (contact.arc_length < tie.end)
+        found = _measure_pairs(contact, law, broken, pressure[:, None], ~tied)
         for rule, (value, is_length) in found.items():
             relative = value / (scales.jump if is_length else scales.stress)
             worst[rule] = max(worst.get(rule, 0.0), relative)
@@ -63,9 +73,9 @@ def measure_contact(results: Results, tables: Tables, scales: Scales) -> dict[st
 
 
 def _measure_pairs(
-    contact: Any, law: Tables, broken: NDArray[np.bool_], pressure: Real
+    contact: Any, law: Tables, broken: NDArray[np.bool_], pressure: Real, counted: NDArray[np.bool_]
 ) -> dict[str, tuple[float, bool]]:
-    """Largest violations at the pairs of one curve, and whether they are lengths (or stresses)."""
+    """Largest violations at the counted pairs (m,) of one curve, and whether they are lengths (or stresses)."""
     mode, p_n, p_s = contact.mode, contact.traction_n, contact.traction_s
     stick, slips, is_open = (mode == kind for kind in (STICK, SLIP, OPEN))
     rigid_n = contact.opening - (p_n / law["normal_stiffness"] if "normal_stiffness" in law else 0.0)
@@ -84,7 +94,7 @@ def _measure_pairs(
     far = np.where(intact, np.inf, 0.0)  # an intact bond neither slips nor parts
 
     def largest(values: Real, where: NDArray[np.bool_]) -> float:
-        return float(np.max(values, where=where, initial=0.0))
+        return float(np.max(values, where=where & counted, initial=0.0))
 
     return {
         "penetration": (largest(-contact.opening, np.ones(mode.shape, dtype=bool)) if "normal_stiffness" not in law

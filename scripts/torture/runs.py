@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from typing import Any
 import numpy as np
 
 import pbem
+from pbem.contact.strength import read_checked_model
 from pbem.errors import CaseError, ConvergenceError, PbemError
+from pbem.model.sliver import Tie
 from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve.step import Iteration, SilentReporter, Step
@@ -132,10 +135,10 @@ def run_sample(seed: int, variant: int, folder: Path, kinds: tuple[str, ...]) ->
     )  # fmt: skip
     if world.rank == 0:
         if results is not None:
-            judge(record, results, sample.draft.tables(units))
+            judge(record, results, sample.draft.tables(units), read_checked_model(case).ties)
         elif world.size == 1:
             record.verdict = judge_end(sample, record.status, watch.target, stem.with_suffix(".open.toml"))
-            if record.status not in NAMED_REASONS or record.verdict == "squeezed":
+            if record.status not in NAMED_REASONS or (record.status, record.verdict) == ("free motion", "squeezed"):
                 record.faults.append(f"ended: {record.status} ({record.verdict})")
         for path in (case, output):
             path.unlink(missing_ok=True)
@@ -143,14 +146,14 @@ def run_sample(seed: int, variant: int, folder: Path, kinds: tuple[str, ...]) ->
     return record
 
 
-def judge(record: Record, results: Results, tables: dict[str, Any]) -> None:
-    """Complete the record of a settled run with what its results obey."""
+def judge(record: Record, results: Results, tables: dict[str, Any], ties: Sequence[Tie]) -> None:
+    """Complete the record of a settled run with what its results obey; ties: see measure_contact."""
     if not is_finite(results):
         record.faults.append("not finite")
         return
     scales = measure_scales(results, tables)
     record.pairs = results.pairs.count
-    record.contact = measure_contact(results, tables, scales)
+    record.contact = measure_contact(results, tables, scales, ties)
     record.balance = measure_balance(results, tables)
     record.energy = measure_energy(results, tables)
     record.marks, record.values = describe(results)

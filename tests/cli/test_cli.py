@@ -221,8 +221,9 @@ def test_interrupting_a_run_is_said_in_a_line(folder: Path, capsys: Capture, mon
     assert main(["blocks.toml"]) == 130
     err = capsys.readouterr().err
     assert "interrupted" in err and "--resume" in err and "Traceback" not in err
-    assert main(["blocks.toml", "--quiet"]) == 130
-    assert open_results("blocks.h5").failure.startswith("interrupted")
+    assert main(["blocks.toml", "--quiet", "--force"]) == 130
+    stopped = open_results("blocks.h5")
+    assert stopped.status == "stopped" and stopped.failure.startswith("interrupted")
 
 
 def run_into_closed_pipe(*arguments: str) -> subprocess.CompletedProcess[str]:

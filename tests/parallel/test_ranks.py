@@ -29,8 +29,10 @@ ROUNDING = 1e-9
 SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
-    "KI": "intensity", "KII": "intensity", "reactions": "force", "resultant": "force", "relative": "share",
-    "carried": "share",
+    "KI": "intensity", "KII": "intensity", "reactions": "force", "resultant": "force",
+    # Parts of the largest value, and of the sums of forces.
+    **dict.fromkeys(("penetration", "tension", "cone", "relative", "carried"), "part"),
+    **{f"relative_{kind}": "part" for kind in ("reactions", "jumps", "tractions", "factors", "displacement")},
 }  # fmt: skip
 GROUPS = {"reactions": "force", "energy": "energy"}
 
@@ -60,7 +62,7 @@ def read_results(path: Path) -> dict[str, Array]:
 
 def measure_scales(results: dict[str, Array]) -> dict[str, float]:
     """The largest magnitude of each kind of field."""
-    scales = {"share": 1.0}
+    scales: dict[str, float] = {"part": 1.0}
     for name, values in results.items():
         kind = find_kind(name)
         if kind:

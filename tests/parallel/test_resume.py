@@ -134,7 +134,7 @@ def test_a_stopped_run_is_resumed_on_other_ranks(
     stopped = mpirun_snippet(before, STOPPING, how, str(number), "run", "case.toml", "--quiet", cwd=folder)
     assert stopped.returncode == (3 if how == "fail" else 137), stopped.stderr
     results = open_results(folder / "case.h5")
-    assert (results.status, len(results.steps)) == ("failed" if how == "fail" else "running", number - 1)
+    assert (results.status, len(results.steps)) == ("failed" if how == "fail" else "stopped", number - 1)
     done = mpirun(after, "run", "case.toml", "--resume", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert f"step {number} of {STEPS}" in done.stdout and f"step {number - 1} of {STEPS}" not in done.stdout
@@ -177,5 +177,5 @@ def test_an_interrupt_keeps_the_steps_for_a_resumption(folder: Path, whole: Resu
     assert process.returncode == 130, error
     assert "Traceback" not in error and "--resume goes on" in error
     stopped = open_results(folder / "case.h5")
-    assert stopped.status == "failed" and 2 <= len(stopped.steps) < STEPS
+    assert stopped.status == "stopped" and 2 <= len(stopped.steps) < STEPS
     expect_equal(pbem.run(folder / "case.toml", folder / "case.h5", resume=True), whole)

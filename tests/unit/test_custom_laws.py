@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pbem.contact.strength import read_checked_model
+from pbem.contact.custom import CustomLaw, find_fault
+from pbem.contact.strength import coulomb, read_checked_model
 from pbem.errors import CaseError
 from tests.unit.case_sample import BLOCKS, change
 
@@ -39,8 +41,8 @@ def test_a_sound_law_is_accepted(tmp_path: Path) -> None:
         ("x = 1", "no function named strength"),
         ("def strength(p_n, slip): return p_n", "unexpected keyword argument"),
         ("def strength(p_n, slip, friction): return -friction * p_n", "bound"),
-        (GOOD.replace("-friction * p_n,", "-0.3,"), "at two pairs"),
-        (GOOD.replace("-friction * p_n,", "0 * p_n + float('nan'),"), "at two pairs"),
+        (GOOD.replace("-friction * p_n,", "-0.3,"), "a bound of shape () for a p_n of shape (2,)"),
+        (GOOD.replace("-friction * p_n,", "0 * p_n + float('nan'),"), "gives bound = nan at p_n = -1"),
     ],
 )
 def test_a_law_that_fails_is_a_fault_with_its_place(tmp_path: Path, law: str, text: str) -> None:
@@ -49,3 +51,61 @@ def test_a_law_that_fails_is_a_fault_with_its_place(tmp_path: Path, law: str, te
     (fault,) = caught.value.faults
     assert fault.place.startswith("interfaces.")
     assert text in fault.found
+
+
+def test_a_law_that_ends_the_program_is_a_fault(tmp_path: Path) -> None:
+    for law in ("import sys; sys.exit(0)", GOOD.replace("return Strength", "raise SystemExit\n    return Strength")):
+        with pytest.raises(CaseError, match="SystemExit"):
+            read_checked_model(write_case(tmp_path, law))
+
+
+def make_law(text: str) -> CustomLaw:
+    return CustomLaw("my_law.py", "import numpy as np\n" + text)
+
+
+ARGUMENTS = {"p_n": np.array([-2.0, -1.0, 0.0]), "slip": np.array([0.0, 0.1, 0.2]), "friction": np.full(3, 0.5)}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("p_n *= 0", "read-only"), ("slip += 1", "read-only"), ("friction[0] = 9", "read-only"),
+        ("np.ndarray.sort(p_n)", "read-only"), ("1 / 0", "ZeroDivisionError"), ("exit(3)", "SystemExit"),
+        ("return None", "no attribute 'bound'"), ("friction = friction[:2]; p_n = p_n[:2]", "shape (2,) for a p_n of"),
+        ("p_n = np.where(p_n < -1.5, np.nan, p_n)", "bound = nan at p_n = -2 and slip = 0"),
+        ("friction = friction / 0", "bound = inf"), ("friction = 'much'", "TypeError: bad operand"),
+        ("return Strength(p_n > -1, p_n * 1j, p_n)", "complex numbers"),
+    ],
+)
+def test_what_a_law_does_wrong_is_kept_with_its_file(change: str, said: str) -> None:
+    law = make_law(GOOD.replace("    return", f"    {change}\n    return"))
+    given = {name: values.copy() for name, values in ARGUMENTS.items()}
+    with np.errstate(all="ignore"):
+        answer = law(**given)
+    assert law.fault.startswith("the law my_law.py ") and said in law.fault, law.fault
+    np.testing.assert_array_equal(answer.bound, np.zeros(3))
+    for name, values in ARGUMENTS.items():
+        np.testing.assert_array_equal(given[name], values)
+    assert find_fault([coulomb, law]) == law.fault
+
+
+def test_what_a_law_keeps_of_its_answers_does_not_change_them() -> None:
+    law = make_law(GOOD.replace("def ", "kept = []\ndef ").replace(
+        "return ", "[each.fill(7.0) for each in kept]; bound = -friction * p_n; kept.append(bound); return ").replace(
+        "Strength(-friction * p_n,", "Strength(bound,"))
+    first = law(**ARGUMENTS)
+    law(**ARGUMENTS)
+    assert law.fault == ""
+    np.testing.assert_array_equal(first.bound, [1.0, 0.5, 0.0])
+
+
+def test_sums_tell_answers_apart() -> None:
+    one, same, other = (make_law(GOOD.replace("0 * p_n - friction", text))
+                        for text in ("0 * p_n - friction", "-friction + 0 * slip", "-1.00001 * friction"))
+    for law in (one, same, other):
+        law(**ARGUMENTS)
+    np.testing.assert_array_equal(one.sums, same.sums)
+    assert abs(one.sums - other.sums)[1] > 1e-6 * one.sums[3:].max()
+    swapped = make_law(GOOD)
+    swapped(ARGUMENTS["p_n"][::-1], ARGUMENTS["slip"], friction=ARGUMENTS["friction"])
+    assert abs(one.sums - swapped.sums)[0] > 0.1

@@ -211,7 +211,26 @@ def test_what_is_made_is_what_could_be_written() -> None:
 def test_one_of_many_can_have_its_own_law() -> None:
     model = build(CRACKS + "[interfaces.crack_7]\nfriction = 0.1\n")
     assert [model.interfaces[name].law.friction for name in ("crack_6", "crack_7")] == [0.6, 0.1]
-    assert [model.interfaces[name].law.cohesion for name in ("crack_6", "crack_7")] == [0.01, 0.0]
+    assert [model.interfaces[name].law.cohesion for name in ("crack_6", "crack_7")] == [0.01, 0.01]
+
+
+@pytest.mark.parametrize(
+    ("own", "kind", "friction", "cohesion", "gap"),
+    [
+        ("gap = 0.001", "coulomb", 0.6, 0.01, 0.001), ("cohesion = 0.0", "coulomb", 0.6, 0.0, 0.0),
+        ("friction_angle = 45.0", "coulomb", 1.0, 0.01, 0.0), ('law = "open"', "open", 0.0, 0.0, 0.0),
+        ('law = "frictionless"', "coulomb", 0.0, 0.0, 0.0), ('law = "bonded"', "bonded", 0.0, 0.0, 0.0),
+        ('law = "coulomb"\nfriction = 0.2', "coulomb", 0.2, 0.01, 0.0),
+    ],
+)  # fmt: skip
+def test_one_of_many_keeps_what_its_own_law_does_not_name(
+    own: str, kind: str, friction: float, cohesion: float, gap: float
+) -> None:
+    model = build(CRACKS + f"[interfaces.crack_7]\n{own}\n")
+    law = model.interfaces["crack_7"].law
+    assert (law.kind, law.friction, law.cohesion, law.gap) == (kind, pytest.approx(friction), cohesion, gap)
+    other = model.interfaces["crack_8"].law
+    assert (other.kind, other.friction, other.cohesion) == ("coulomb", 0.6, 0.01)
 
 
 def test_a_stage_can_press_on_all_or_on_one() -> None:

@@ -259,6 +259,7 @@ def test_curved_boundaries_divide_inside_from_outside() -> None:
 def test_points_outside_of_all_regions_have_no_field() -> None:
     found = find_interior(make_plane((1.0, 0.0, 0.0), hole=make_circle(1.0, 16), points=[0.5j, 1.5j]))[2]
     assert np.isnan(found.stress[0]).all() and np.isnan(found.displacement[0])
+    assert np.isnan(found.displacement[0].real) and np.isnan(found.displacement[0].imag)
     assert np.isfinite(found.stress[1]).all() and np.isfinite(found.displacement[1])
 
 

@@ -1,0 +1,109 @@
+"""Friction laws from users' Python files: what they are given cannot be changed, and what they answer is checked.
+
+On several ranks a law that fails on one of them must not leave the others waiting. So a `CustomLaw` does not raise: it
+keeps what went wrong and answers with no strength, until all ranks ask together (`pbem.solve.watch`).
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.contact.strength_type import Strength
+
+Real = NDArray[np.float64]
+
+PARTS = ("bound", "by_traction", "by_slip")
+EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays of the shape of p_n"
+
+
+class CustomLaw:
+    """The function `strength` of a file, called as any law.
+
+    file: its path; text: its contents, which are run once. fault: what went wrong at the first call that failed, a
+    sentence that names the file, "" if none did. sums (6,): weighted sums of the parts of all answers since they were
+    set to zero, and of their sizes, to compare with other ranks.
+    """
+
+    def __init__(self, file: str, text: str) -> None:
+        """Raises ValueError if the file does not run or has no such function."""
+        self.file = file
+        self.fault = ""
+        self.sums = np.zeros(6)
+        self._function = _run(file, text).get("strength")
+        if not callable(self._function):
+            raise ValueError(f"{file} defines no function named strength")
+
+    def __call__(self, p_n: Real, slip: Real, **parameters: Real) -> Strength:
+        """As of any law; of one that fails, zeros (see `fault`)."""
+        answer = None if self.fault else self._ask(p_n, slip, parameters)
+        if answer is None:
+            nothing = np.zeros_like(p_n)
+            return Strength(nothing, nothing, nothing)
+        parts = np.array([getattr(answer, part) for part in PARTS])
+        weight = 1.5 + np.cos(np.arange(len(p_n)))
+        self.sums += np.concatenate([parts @ weight, np.abs(parts) @ weight])
+        return answer
+
+    def _ask(self, p_n: Real, slip: Real, parameters: Mapping[str, Real]) -> Strength | None:
+        try:
+            answer = self._function(_protect(p_n), _protect(slip),  # type: ignore[misc]
+                                    **{name: _protect(values) for name, values in parameters.items()})
+            parts = {name: _read_part(getattr(answer, name)) for name in PARTS}
+        except (Exception, SystemExit) as error:  # a user's file may raise anything
+            self.fault = f"the law {self.file} fails ({type(error).__name__}: {error}); expected {EXPECTED}"
+            return None
+        for name, values in parts.items():
+            wrong = _judge(name, values, p_n, slip)
+            if wrong:
+                self.fault = f"the law {self.file} {wrong}; expected {EXPECTED}"
+                return None
+        return Strength(**parts)
+
+
+def _run(file: str, text: str) -> dict[str, Any]:
+    module = types.ModuleType(Path(file).stem)
+    module.__file__ = file
+    try:
+        exec(compile(text, file, "exec"), module.__dict__)
+    except SystemExit as error:
+        raise ValueError(f"{file} ends the program (SystemExit: {error})") from error
+    return module.__dict__
+
+
+def _protect(values: Real) -> Real:
+    """The same values, read-only, in an array of their own."""
+    own = np.array(values, dtype=float)
+    own.setflags(write=False)
+    return own
+
+
+def _read_part(values: Any) -> Real:
+    if np.iscomplexobj(values):
+        raise TypeError("complex numbers")
+    return np.array(values, dtype=float)
+
+
+def _judge(name: str, values: Real, p_n: Real, slip: Real) -> str:
+    if values.shape != p_n.shape:
+        return f"gives a {name} of shape {values.shape} for a p_n of shape {p_n.shape}"
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        first = wrong[0]
+        return f"gives {name} = {values[first]:g} at p_n = {p_n[first]:.6g} and slip = {slip[first]:.6g}"
+    return ""
+
+
+def read_law_texts(files: Iterable[str | None]) -> dict[str, str]:
+    """The contents of law files, by path. Raises OSError or ValueError if one is no text."""
+    return {file: Path(file).read_text(encoding="utf-8") for file in dict.fromkeys(files) if file is not None}
+
+
+def find_fault(laws: Iterable[Callable[..., Strength]]) -> str:
+    """What went wrong in a custom law, if it did; else ""."""
+    return next((law.fault for law in laws if isinstance(law, CustomLaw) and law.fault), "")

@@ -1,0 +1,87 @@
+"""Values from one mesh at the nodes of another, each of whose elements is made of whole elements of the first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from pbem.mesh.elements import divide_curve
+from pbem.mesh.interpolation import find_coordinates, interpolate, interpolate_tips, locate_nodes
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import group_elements
+
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# Nodes this far beyond an element's end, in half-lengths, still lie on it: rounding of places far from the origin.
+BEYOND = 1e-2
+
+
+@dataclass(frozen=True)
+class Carry:
+    """What takes values at the fine mesh's nodes (n,) to the coarse mesh's nodes (c,).
+
+    plain (c, n): by the polynomials of the fine elements; rooted (c, n): with the square-root shape on crack-tip
+    elements, for jumps. nearest (c,): the fine node nearest to each coarse node on its element.
+    """
+
+    plain: sparse.csr_matrix
+    rooted: sparse.csr_matrix
+    nearest: Integer
+
+
+def list_curve_elements(model: Model, mesh: Mesh) -> list[tuple[str, Integer]]:
+    """The mesh's elements chain by chain, each in the direction of its curve: the curve's name, and their numbers."""
+    chains = []
+    key = np.stack([mesh.region, mesh.curve, mesh.crack])
+    borders = np.flatnonzero((np.diff(key, axis=1) != 0).any(axis=0)) + 1
+    starts = {name: divide_curve(curve) for name, curve in model.curves.items()}
+    for chain in np.split(np.arange(mesh.elements), borders):
+        name = mesh.curve_names[mesh.curve[chain[0]]]
+        elements = starts[name]
+        forward = mesh.start[chain[0]] == elements.start[0] and mesh.end[chain[0]] == elements.end[0]
+        chains.append((name, chain if forward else chain[::-1]))
+    return chains
+
+
+def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh) -> Carry:
+    """How values on the fine mesh are read at the nodes of the coarse one (see `pbem.model.refinement`)."""
+    groups = {name: group_elements(curve, coarse_model.curves[name]) for name, curve in fine_model.curves.items()}
+    element = np.empty((coarse.elements, coarse.order + 1), dtype=np.int64)
+    local = np.full((coarse.elements, coarse.order + 1), np.inf)
+    points = coarse.position.reshape(coarse.elements, -1)
+    chains = zip(list_curve_elements(fine_model, fine), list_curve_elements(coarse_model, coarse), strict=True)
+    for (name, own), (_, others) in chains:
+        first = groups[name]
+        for offset in range(int(np.diff(first).max())):
+            at = np.flatnonzero(first[:-1] + offset < first[1:])
+            source, target = own[first[:-1][at] + offset], others[at]
+            s = find_coordinates(fine.start[source], fine.end[source], fine.sweep[source], points[target])
+            better = np.abs(s) < np.abs(local[target])
+            local[target] = np.where(better, s, local[target])
+            element[target] = np.where(better, source[:, None], element[target])
+    assert (np.abs(local) <= 1 + BEYOND).all()
+    return _build_carry(fine, element.ravel(), local.ravel())
+
+
+def _build_carry(fine: Mesh, element: Integer, s: Real) -> Carry:
+    per_element = fine.order + 1
+    nodes = element[:, None] * per_element + np.arange(per_element)
+    places = locate_nodes(fine)[element]
+    plain = interpolate(places, s[:, None])[:, 0]
+    rooted = plain.copy()
+    tips = np.flatnonzero(fine.tip[element] > 0)
+    if len(tips):
+        inside = np.clip(s[tips], -1.0, 1.0)[:, None]
+        rooted[tips] = interpolate_tips(fine.tip[element[tips]], places[tips], inside)[:, 0]
+    rows = np.repeat(np.arange(len(s)), per_element)
+
+    def build(values: Real) -> sparse.csr_matrix:
+        return sparse.csr_matrix((values.ravel(), (rows, nodes.ravel())), shape=(len(s), fine.nodes))
+
+    nearest = nodes[np.arange(len(s)), np.argmin(np.abs(places - s[:, None]), axis=1)]
+    return Carry(build(plain), build(rooted), nearest)

@@ -1,0 +1,223 @@
+"""The same model on other elements: fewer of them to compare with, or more where an error is large."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.model.curve import Curve, Leg
+from pbem.model.model import Model
+from pbem.model.shape import WIDEST_ARC
+
+Bool = NDArray[np.bool_]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# Per curve the fractions of the length at which the elements of each of its legs end.
+Fractions = Mapping[str, tuple[tuple[float, ...], ...]]
+
+# A model is coarse enough to be compared with if it has at most this part of the elements.
+COARSE = 0.8
+# Errors on interfaces that stay as they are would not be seen: of their elements at most this part.
+KEPT = 0.05
+# Of elements that meet the longer is at most so many times as long, where elements are halved.
+WIDEST_RATIO = 2.0
+# The jump follows the root of the distance over the elements next to a tip, which are halved together: with unequal
+# ones K and the jumps are off by far more.
+EQUAL_AT_TIPS = 3
+
+
+@dataclass(frozen=True)
+class CoarseModel:
+    """A model with fewer unknowns, and how it was made: pairs of elements merged, or the order lowered by one."""
+
+    model: Model
+    kind: Literal["merged", "order"]
+
+
+def coarsen_model(model: Model) -> CoarseModel | None:
+    """The model with neighbouring elements of each leg merged in pairs; None if there is nothing to make coarser.
+
+    Where an arc would turn too far, or a crack with two tips would have one element, elements are kept. Where that
+    leaves too many of them, or whole interfaces, the order is lowered instead.
+    """
+    curves = {name: _merge_pairs(curve, _least_elements(model, name)) for name, curve in model.curves.items()}
+    before, after = (sum(count_elements(curve) for curve in each.values()) for each in (model.curves, curves))
+    faces = {*model.interfaces, *(name for each in model.contacts.values() for name in (each.first, each.second))}
+    numbers = {name: count_elements(model.curves[name]) for name in faces}
+    kept = sum(number for name, number in numbers.items() if count_elements(curves[name]) == number)
+    if after <= COARSE * before and kept <= KEPT * sum(numbers.values()):
+        return CoarseModel(replace(model, curves=curves), "merged")
+    if model.analysis.order == 0:
+        return None
+    return CoarseModel(replace(model, analysis=replace(model.analysis, order=model.analysis.order - 1)), "order")
+
+
+def count_elements(curve: Curve) -> int:
+    """The number of elements on all legs of a curve."""
+    return sum(leg.elements for leg in curve.legs)
+
+
+def list_fractions(model: Model) -> Fractions:
+    """Where the elements of all legs end; see `impose_fractions`."""
+    return {
+        name: tuple(tuple(float(t) for t in leg.element_fractions()) for leg in curve.legs)
+        for name, curve in model.curves.items()
+    }
+
+
+def impose_fractions(model: Model, fractions: Fractions) -> Model:
+    """The model with the element ends of `list_fractions`.
+
+    Raises ValueError where they are not those of the model's curves and legs.
+    """
+    if list(fractions) != list(model.curves):
+        raise ValueError("element ends of other curves")
+    curves = {}
+    for name, curve in model.curves.items():
+        if len(fractions[name]) != len(curve.legs):
+            raise ValueError(f"element ends of other legs on curve {name}")
+        legs = [_divide_leg(leg, ends) for leg, ends in zip(curve.legs, fractions[name], strict=True)]
+        curves[name] = Curve(name, tuple(legs))
+    return replace(model, curves=curves)
+
+
+def bisect_elements(model: Model, marked: Mapping[str, Bool], gently: bool = False) -> Model:
+    """The model with the marked elements halved, and neighbours until no ratio of lengths is wide.
+
+    marked: per curve, whether each of its elements (along all legs) is to be halved; both sides of the curve follow.
+    Neighbours are elements that meet at a point, of the same curve or not; a ratio that is wide already is not made
+    wider. Elements next to a crack tip are halved together, and any element once at most.
+    gently: two marked neighbours on a leg become three elements in place of four.
+    """
+    names = list(model.curves)
+    ends = [divide_ends(model.curves[name]) for name in names]
+    lengths = np.concatenate([length for _, length in ends])
+    halved = np.concatenate([marked[name] for name in names])
+    first, second = _find_neighbours([points for points, _ in ends])
+    # Of neighbours that differ more from the start, the ratio is kept.
+    widest = np.where(_mark_tips(model)[first] & _mark_tips(model)[second], 1.0, WIDEST_RATIO)
+    allowed = np.maximum(widest, np.maximum(lengths[first] / lengths[second], lengths[second] / lengths[first]))
+    while halved.any():
+        now = np.where(halved, 0.5, 1.0) * lengths
+        more = halved.copy()
+        more[first[now[first] > allowed * (1 + 1e-9) * now[second]]] = True
+        more[second[now[second] > allowed * (1 + 1e-9) * now[first]]] = True
+        if (more == halved).all():
+            break
+        halved = more
+    curves, begin = {}, 0
+    for name in names:
+        legs = []
+        for leg in model.curves[name].legs:
+            legs.append(_divide_marked(leg, halved[begin : begin + leg.elements], gently))
+            begin += leg.elements
+        curves[name] = Curve(name, tuple(legs))
+    return replace(model, curves=curves)
+
+
+def _mark_tips(model: Model) -> Bool:
+    """Whether an element, of all curves together, is among the few next to the tip of a crack."""
+    marks = []
+    for name, curve in model.curves.items():
+        own = np.zeros(count_elements(curve), dtype=bool)
+        at_start, at_end = model.crack_tips.get(name, (False, False))
+        own[: EQUAL_AT_TIPS * at_start] = True
+        own[len(own) - min(len(own), EQUAL_AT_TIPS * at_end) :] = True
+        marks.append(own)
+    return np.concatenate(marks)
+
+
+def divide_ends(curve: Curve) -> tuple[list[tuple[complex, complex]], Real]:
+    """Start and end of each element of a curve (along all legs), and their lengths."""
+    points = [leg.element_ends() for leg in curve.legs]
+    ends = [(complex(a), complex(b)) for each in points for a, b in pairwise(each)]
+    return ends, np.concatenate([leg.length * np.diff(leg.element_fractions()) for leg in curve.legs])
+
+
+def _find_neighbours(curves: Sequence[Sequence[tuple[complex, complex]]]) -> tuple[Integer, Integer]:
+    """Numbers of the elements, of all curves together, that have a point in common: each pair once."""
+    at: dict[complex, list[int]] = {}
+    number = 0
+    for elements in curves:
+        for ends in elements:
+            for point in ends:
+                at.setdefault(point, []).append(number)
+            number += 1
+    pairs = [(a, b) for meeting in at.values() for k, a in enumerate(meeting) for b in meeting[:k] if a != b]
+    found = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    return found[:, 0], found[:, 1]
+
+
+def count_levels(first: Curve, refined: Curve) -> Integer:
+    """How often each element (along all legs) of a refined curve was halved since it was the first one."""
+    levels = []
+    for leg, finer in zip(first.legs, refined.legs, strict=True):
+        before, after = leg.element_fractions(), finer.element_fractions()
+        middle = 0.5 * (after[1:] + after[:-1])
+        origin = np.clip(np.searchsorted(before, middle, side="right") - 1, 0, leg.elements - 1)
+        levels.append(np.rint(np.log2(np.diff(before)[origin] / np.diff(after))))
+    return np.concatenate(levels).astype(np.int64)
+
+
+def group_elements(fine: Curve, coarse: Curve) -> Integer:
+    """First element of the fine curve in each element of the coarse one, and the number of the fine (coarse + 1,).
+
+    The ends of the coarse elements have to be among those of the fine ones.
+    """
+    first, groups = 0, []
+    for one, other in zip(fine.legs, coarse.legs, strict=True):
+        groups.append(first + np.searchsorted(one.element_fractions(), other.element_fractions()[:-1]))
+        first += one.elements
+    return np.concatenate([*groups, [first]]).astype(np.int64)
+
+
+def _least_elements(model: Model, name: str) -> int:
+    """A crack with two tips needs an element for each."""
+    tips = model.crack_tips.get(name, (False, False))
+    return 2 if model.analysis.tips and all(tips) else 1
+
+
+def _merge_pairs(curve: Curve, least: int) -> Curve:
+    merged = Curve(curve.name, tuple(_merge_leg(leg) for leg in curve.legs))
+    return merged if count_elements(merged) >= least else curve
+
+
+def _merge_leg(leg: Leg) -> Leg:
+    """Pairs from both ends on; of an odd number one in the middle is kept."""
+    count = leg.elements
+    if count == 1:
+        return leg
+    middle = count // 2 // 2 * 2
+    kept = [*range(0, middle + 1, 2), *range(middle + count % 2, count + 1, 2)]
+    ends = leg.element_fractions()
+    merged = ends[sorted(set(kept))]
+    if leg.center is not None and math.degrees(abs(leg.sweep)) * np.diff(merged).max() > WIDEST_ARC * (1 + 1e-9):
+        return leg
+    return _divide_leg(leg, merged)
+
+
+def _divide_leg(leg: Leg, ends: Sequence[float] | Real) -> Leg:
+    return replace(leg, elements=len(ends) - 1, fractions=tuple(float(t) for t in ends))
+
+
+def _divide_marked(leg: Leg, marked: Bool, gently: bool) -> Leg:
+    if not marked.any():
+        return leg
+    at: list[float] = [0.0]  # new ends, in numbers of elements
+    number = 0
+    while number < leg.elements:
+        if gently and marked[number : number + 2].sum() == 2:
+            at += [number + 2 / 3, number + 4 / 3, number + 2.0]
+            number += 2
+            continue
+        at += [number + 0.5, number + 1.0] if marked[number] else [number + 1.0]
+        number += 1
+    ends = np.interp(at, np.arange(leg.elements + 1), leg.element_fractions())
+    return _divide_leg(leg, ends)

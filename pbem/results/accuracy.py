@@ -1,0 +1,154 @@
+"""Whether a run is as accurate as was asked for, and which elements to refine if it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.carry import list_curve_elements
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import count_elements
+from pbem.results.estimator import Estimator
+
+Bool = NDArray[np.bool_]
+Real = NDArray[np.float64]
+
+# What `analysis.accuracy` is asked of, and how it is called.
+ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"}
+# Below this all errors asked for are rounding, and those of the displacements are looked at in their place.
+ROUNDING = 1e-13
+
+# The estimates are to be so many times below the accuracy: they are within a factor, and too small more often.
+SAFETY = 1.5
+
+# Passes at most, and unknowns at most over those of the first mesh.
+MOST_PASSES = 20
+MOST_GROWTH = 40.0
+
+# Part of the estimated energy of the error in the elements that are refined: near the goal, and far from it.
+PART, LARGE_PART = 0.7, 0.9
+FAR = 8.0
+# Elements with this part of the largest energy are refined in any case: where errors are spread evenly, to refine some
+# of them alone brings nothing.
+ALIKE = 0.1
+# Elements shorter by this factor bring the error below the accuracy if it falls with the power order + 1: then there is
+# no need to halve.
+NEAR = 1.5
+# With more than this part of its elements a whole leg is refined: lengths that change by leaps cost more than they
+# save.
+MOST_OF_LEG = 0.4
+# A kind of energy with less than this part of all is left out.
+SMALL_KIND = 1e-3
+# Of the largest error of a jump: elements beyond are refined.
+NEAR_WORST = 0.3
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The largest estimated relative errors over the steps, by the names in ASKED (or "displacements")."""
+
+    errors: Mapping[str, float]
+
+    @property
+    def worst(self) -> float:
+        """The largest of all; NaN if one is unknown."""
+        return float(np.max(list(self.errors.values())))
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {error:.1e}" for name, error in self.errors.items())
+
+
+def measure_reached(relative: Mapping[str, Real]) -> Reached:
+    """The accuracy of a run by its /estimates/relative_... (k,) over the steps.
+
+    Kinds of which the model has none, or whose errors are rounding, are left out; where all are, the displacements are
+    looked at.
+    """
+    errors = {text: float(np.max(relative[kind], initial=0.0)) for kind, text in ASKED.items()}
+    kept = {text: error for text, error in errors.items() if not error <= ROUNDING}
+    return Reached(kept or {"displacements": float(np.max(relative["displacement"], initial=0.0))})
+
+
+@dataclass(frozen=True)
+class Pass:
+    """The number of a pass, from 1 on, and the unknowns of the first one."""
+
+    number: int
+    first_unknowns: int
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`), None if
+    there is no further pass; why the accuracy cannot be reached, empty if it was or was not asked for."""
+
+    notes: tuple[str, ...] = ()
+    marked: Mapping[str, Bool] | None = None
+    gently: bool = False
+    failure: str = ""
+
+
+def decide(
+    model: Model, mesh: Mesh, relative: Mapping[str, Real], estimator: Estimator, one: Pass
+) -> Decision:
+    """Whether a pass has met `analysis.accuracy`; decided on one rank for all.
+
+    relative: the estimated relative errors (k,) of all stored steps, NaN where unknown.
+    """
+    accuracy = model.analysis.accuracy
+    if accuracy is None:
+        return Decision()
+    reached = measure_reached(relative)
+    unknowns = 2 * mesh.nodes
+    head = f"accuracy, pass {one.number}: {unknowns} unknowns"
+    says = f"{head}; estimated relative errors: {reached} (asked: {SAFETY:g} times these below {accuracy:g})"
+    if reached.worst * SAFETY <= accuracy:
+        return Decision((says,))
+    over = ", ".join(f"{name} {error:.1e}" for name, error in reached.errors.items() if not error * SAFETY <= accuracy)
+    failure = ""
+    if np.isnan(reached.worst):
+        failure = f"errors cannot be estimated ({estimator.missing}): whether {accuracy:g} is reached is not known"
+    elif one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns:
+        limit = f"{one.number} passes" if one.number >= MOST_PASSES else f"{MOST_GROWTH:g} times the first unknowns"
+        failure = (
+            f"{accuracy:g} is not reached within {limit} ({unknowns} unknowns): {over}; the file holds the last pass"
+        )
+    if failure:
+        return Decision((says,), failure=failure)
+    comparison = estimator.comparison
+    if not comparison.energy.any():  # gone on with after its last step: where errors are is not in the file
+        return Decision((says,), {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()})
+    marked = mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst)
+    return Decision((says,), marked, gently=reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy)
+
+
+def mark_elements(
+    model: Model, mesh: Mesh, energy: Real, jumps: Real, accuracy: float, worst: float
+) -> dict[str, Bool]:
+    """Per curve the elements (along all its legs) to be halved: those with most of the error's energy (Doerfler 1996),
+    of the displacements and of the tractions, and those whose jumps are too far off themselves.
+
+    energy (2, e), jumps (e,): of each element of the mesh, see `pbem.results.estimates.Comparison`; both sides of a
+    curve count together. accuracy, worst: the largest relative error asked for, and the one that is estimated.
+    """
+    by_curve = {name: np.zeros((3, count_elements(curve))) for name, curve in model.curves.items()}
+    for name, elements in list_curve_elements(model, mesh):
+        by_curve[name][:2] += energy[:, elements]
+        by_curve[name][2] = np.maximum(by_curve[name][2], jumps[elements])
+    *kinds, local = np.concatenate(list(by_curve.values()), axis=1)
+    part = LARGE_PART if worst > FAR * accuracy else PART
+    chosen = local > max(accuracy, NEAR_WORST * local.max(initial=0.0))
+    for each in kinds:
+        if each.sum() >= SMALL_KIND * energy.sum():
+            order = np.argsort(-each, kind="stable")
+            chosen[order[: np.searchsorted(np.cumsum(each[order]), part * each.sum()) + 1]] = True
+            chosen |= each >= ALIKE * each.max()
+    legs = [leg.elements for curve in model.curves.values() for leg in curve.legs]
+    leg = np.repeat(np.arange(len(legs)), legs)
+    chosen |= (np.bincount(leg, chosen) > MOST_OF_LEG * np.array(legs))[leg]
+    ends = np.cumsum([each.shape[1] for each in by_curve.values()])[:-1]
+    return dict(zip(by_curve, np.split(chosen, ends), strict=True))

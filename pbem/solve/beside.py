@@ -1,0 +1,83 @@
+"""A coarser model and mesh beside those of a run, on which a second solution measures the discretisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.bem.choice import is_hierarchical
+from pbem.mesh.carry import Carry, carry_nodes
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import CoarseModel, coarsen_model
+
+Bool = NDArray[np.bool_]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# The second solution starts from the modes of the first, so that it settles soon or never.
+MOST_ITERATIONS = 12
+# Of a hierarchical operator a difference of meshes asks for less than the solution itself.
+TOLERANCE, NEWTON_TOLERANCE = 1e-6, 1e-7
+
+NOTHING_COARSER = "elements cannot be merged in pairs, and the order cannot be lowered"
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A coarser model and mesh beside those of a run, and how values of the run are read there.
+
+    kind: how it was made, see `pbem.model.refinement`. carry: to the coarse mesh's nodes. seen (c,): of each of its
+    pairs, whether all fine pairs that it is compared with are there. pair_of_node (n,): the fine pair whose slot node
+    a fine node is, or -1. nearest (c,): the nearest fine pair, or -1.
+    """
+
+    kind: str
+    model: Model
+    mesh: Mesh
+    fine: Mesh
+    carry: Carry
+    seen: Bool
+    pair_of_node: Integer
+    nearest: Integer
+
+    def carry_pairs(self, values: Real, jumps: bool) -> Real:
+        """Values (m,) of the fine pairs at the coarse pairs (c,); zero where there is no pair.
+
+        jumps: on crack-tip elements with the shape of the square root.
+        """
+        at_nodes = np.zeros(self.fine.nodes)
+        at_nodes[self.fine.pairs.slot] = values
+        matrix = self.carry.rooted if jumps else self.carry.plain
+        return np.asarray((matrix @ at_nodes)[self.mesh.pairs.slot])
+
+
+def put_beside(model: Model, mesh: Mesh) -> Beside | None:
+    """A coarser model beside a given one; None if there is none (NOTHING_COARSER)."""
+    coarse = coarsen_model(model)
+    if coarse is None:
+        return None
+    second = _ease_solver(coarse, is_hierarchical(model, mesh))
+    second_mesh = generate_mesh(second)
+    carry = carry_nodes(model, mesh, second, second_mesh)
+    pair_of_node = np.full(mesh.nodes, -1)
+    pair_of_node[mesh.pairs.slot] = np.arange(mesh.pairs.count)
+    slot = second_mesh.pairs.slot
+    lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slot]
+    nearest = pair_of_node[carry.nearest[slot]]
+    return Beside(coarse.kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, nearest)
+
+
+def _ease_solver(coarse: CoarseModel, hierarchical: bool) -> Model:
+    solver = coarse.model.solver
+    eased = replace(
+        solver,
+        operator="hierarchical" if hierarchical else "dense",
+        tolerance=max(solver.tolerance, TOLERANCE) if hierarchical else solver.tolerance,
+        newton_tolerance=max(solver.newton_tolerance, NEWTON_TOLERANCE) if hierarchical else solver.newton_tolerance,
+        newton_max_iterations=min(solver.newton_max_iterations, MOST_ITERATIONS),
+    )
+    return replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=())

@@ -1,0 +1,470 @@
+#!/usr/bin/env python3
+"""Mutants of cases, result files and command lines: each is accepted, or refused with its place, never a traceback.
+
+    .venv/bin/python scripts/fuzz.py cases --count 20000 [--seed 1]
+    .venv/bin/python scripts/fuzz.py results --count 1000
+    .venv/bin/python scripts/fuzz.py commands --count 2000
+
+cases: what `pbem check` does, in this process. results: damaged files are read, described, drawn and resumed in
+processes of their own, since HDF5 may crash. commands: the command line, but for runs. Prints each new kind of failure
+(exception and place in the program) with the number of the mutant, which --only makes again; exit code 1 if there are
+any. Anything that lasts more than a minute is a failure, and so are control characters in what is said.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import os
+import random
+import re
+import signal
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from pbem import cli
+from pbem.contact.strength import read_checked_model
+from pbem.errors import PbemError, is_control
+from pbem.mesh.generate import generate_mesh
+from pbem.results.describe import describe_model, describe_results
+
+ROOT = Path(__file__).resolve().parent.parent
+PATIENCE = 60
+NUMBERS = ["0", "-1", "1", "2", "0.5", "1e-300", "1e300", "-1e308", "inf", "nan", "1e99", "-0.0", "1e-12", "123456789",
+           "9" * 400, "3.0", "1_000", "0x10"]
+TEXTS = ['""', '"a"', '"\\u0000"', '"\\u001b[31m"', '"a/b"', '".."', '"\\n"', '"\\u202e"', '"x*y"', '"sin(x"',
+         '"' + "a" * 3000 + '"', "'''\n'''",
+         '"bonded"', '"custom"', '"x**x**x**9"', '"1/0"', '"$\\\\frac{$"', '"\\ud7ff"']
+OTHERS = ["true", "[]", "{}", "[[]]", "[1]", "[1, 2]", "[[0, 0], [1, 1]]", "{ a = 1 }", "1979-05-27", "[nan, inf]",
+          "{ expression = \"x\" }", "{ expression = 3 }", "[\"a\", \"a\"]", "[0, 0, 1, 1]", "[" * 60 + "]" * 60]
+VALUE = re.compile(r"=\s*([^#\n{\[]+|\[.*\]|\{.*\})")
+NUMBER = re.compile(r"(?<![\w.\"])-?\d+\.?\d*(?:e-?\d+)?(?![\w\"])")
+WORD = re.compile(r"[A-Za-z_]\w+")
+
+
+class HangError(Exception):
+    """Raised by the alarm."""
+
+
+@contextlib.contextmanager
+def alarm(seconds: int) -> Iterator[None]:
+    """Raise HangError in the block after so many seconds."""
+
+    def ring(*_: object) -> None:
+        raise HangError
+
+    former = signal.signal(signal.SIGALRM, ring)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, former)
+
+
+def read_seeds() -> list[str]:
+    """The cases of the program that are checked fast, one after the other, and small ones that have what these lack."""
+    texts = [path.read_text(encoding="utf-8") for path in sorted((ROOT / "cases").glob("*.toml"))]
+    return [text for text in texts if len(text) < 6000] + [SMALL]
+
+
+SMALL = """\
+title = "Everything"
+units = { length = "m", stress = "kPa" }
+[materials]
+m = { young = 1000.0, poisson = 0.2, density = 2.0 }
+n = { young = 2000.0, poisson = 0.1, plane = "stress" }
+[curves]
+bottom = { points = [[0, 0], [2, 0]], elements = 3 }
+right = { points = [[2, 0], [2, 1]], elements = 2 }
+top = { points = [[2, 1], [0, 1]], elements = [3] }
+left = { points = [[0, 1], [0, 0]], size = 0.5 }
+hole = { center = [0.5, 0.5], radius = 0.2, elements = 8 }
+crack = { points = [[1, 0.3], [1.5, 0.6]], elements = 4, grading = "end", power = 2.0 }
+wavy = { expression = ["1.0 + 0.5*t", "0.8 + 0.05*sin(2*pi*t)"], elements = 6 }
+base = { points = [[0, -1], [2, -1]], elements = 3 }
+side = { points = [[2, -1], [2, -0.5]], elements = 2 }
+face = { points = [[2, -0.5], [0, -0.5]], elements = 3 }
+wall = { points = [[0, -0.5], [0, -1]], elements = 2 }
+[regions.body]
+material = "m"
+boundary = ["bottom", "right", "top", "left", "hole"]
+cracks = ["crack", "wavy"]
+[regions.foot]
+material = "n"
+boundary = ["base", "side", "face", "wall"]
+[boundary]
+base = { ux = 0.0, uy = 0.0 }
+left = { un = 0.0, spring = { ks = 1.0 } }
+[interfaces]
+crack = { friction_angle = 20.0, cohesion = 0.1, gap = { expression = "0.001*x" } }
+wavy = { friction = 0.3, pressure = 0.5, pressurised = "all", tangential_stiffness = 1e5 }
+[contacts.seat]
+between = ["bottom", "face"]
+friction = 0.3
+gap = 0.0
+[gravity]
+gy = -0.1
+[initial_stress.m]
+syy = -0.2
+[[stages]]
+name = "press"
+steps = 2
+[stages.boundary.top]
+uy = -0.6
+ux = 0.0
+[[stages]]
+name = "more"
+[stages.interfaces.wavy]
+pressure = 1.0
+[analysis]
+scheme = "SST"
+order = 2
+[solver]
+linear = "auto"
+min_step = 0.01
+[petsc]
+ksp_rtol = 1e-12
+[output]
+interior = { box = [0, 0, 2, 1], shape = [3, 3] }
+points = [[0.3, 0.2]]
+every = 2
+"""
+
+Change = Callable[[random.Random, str, list[str]], str]
+
+
+def replace_value(chance: random.Random, text: str, seeds: list[str]) -> str:
+    """A value by another of any kind."""
+    found = list(VALUE.finditer(text))
+    if not found:
+        return text
+    at = chance.choice(found)
+    kind = chance.random()
+    new = chance.choice(NUMBERS if kind < 0.4 else TEXTS if kind < 0.6 else OTHERS if kind < 0.8 else
+                        [each[1] for each in VALUE.finditer(chance.choice(seeds))] or ["1"])
+    return f"{text[: at.start()]}= {new}{text[at.end() :]}"
+
+
+def replace_number(chance: random.Random, text: str, seeds: list[str]) -> str:
+    """A number within a value."""
+    found = list(NUMBER.finditer(text))
+    if not found:
+        return text
+    at = chance.choice(found)
+    scaled = f"{float(at[0]) * chance.choice([-1, 0, 0.5, 2, 1e-9, 1e9, 1 + 1e-9]):.17g}"
+    new = chance.choice([*NUMBERS, scaled, scaled, scaled, chance.choice(found)[0]])
+    return text[: at.start()] + new + text[at.end() :]
+
+
+def replace_word(chance: random.Random, text: str, seeds: list[str]) -> str:
+    """A name or key by another one."""
+    found = list(WORD.finditer(text))
+    if not found:
+        return text
+    at = chance.choice(found)
+    new = chance.choice([chance.choice(found)[0], chance.choice(list(WORD.findall(chance.choice(seeds)))), at[0][:-1]])
+    return text[: at.start()] + new + text[at.end() :]
+
+
+def change_lines(chance: random.Random, text: str, seeds: list[str]) -> str:
+    """Delete, repeat, move or add lines."""
+    lines = text.splitlines()
+    if not lines:
+        return text
+    at, other = chance.randrange(len(lines)), chance.randrange(len(lines))
+    kind = chance.randrange(5)
+    if kind == 0:
+        del lines[at]
+    elif kind == 1:
+        lines.insert(other, lines[at])
+    elif kind == 2:
+        lines.insert(other, lines.pop(at))
+    elif kind == 3:
+        lines.insert(at, chance.choice(chance.choice(seeds).splitlines()))
+    else:
+        del lines[min(at, other) : max(at, other)]
+    return "\n".join(lines) + "\n"
+
+
+def change_characters(chance: random.Random, text: str, seeds: list[str]) -> str:
+    """Delete, insert or repeat some characters."""
+    at = chance.randrange(len(text) + 1)
+    kind = chance.randrange(4)
+    if kind == 0:
+        return text[:at] + text[at + chance.randint(1, 5) :]
+    if kind == 1:
+        return text[:at] + chance.choice("[]{}\"'=.,#\n\\ \t-+eE0\0\x1b\u202e\ufeffä") + text[at:]
+    if kind == 2:
+        return text[:at] + text[max(0, at - 20) :]
+    return text[:at] + ".".join(["a"] * chance.choice([5, 50, 3000])) + " = 1\n" + text[at:]
+
+
+CHANGES: tuple[Change, ...] = (replace_value, replace_value, replace_number, replace_number, replace_word,
+                               change_lines, change_characters)
+
+
+def mutate(seed: int, number: int, seeds: list[str]) -> str:
+    """The mutant of this number."""
+    chance = random.Random(f"{seed}/{number}")
+    text = chance.choice(seeds)
+    for _ in range(chance.choice([1, 1, 1, 2, 3, 6])):
+        text = chance.choice(CHANGES)(chance, text, seeds)
+    return text
+
+
+def check_case(text: str, folder: Path) -> bool:
+    """What `pbem check` does; whether the case is accepted.
+
+    Raises AssertionError if what it says would steer a terminal.
+    """
+    path = folder / "mutant.toml"
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
+    accepted = True
+    try:
+        model = read_checked_model(path)
+        said = describe_model(model, generate_mesh(model))
+    except PbemError as error:
+        accepted, said = False, str(error)
+        assert said.count("\n  ") >= 1 and ": found " in said, f"a fault without its place: {said}"
+    wrong = [f"U+{ord(each):04X}" for each in said if is_control(each) and each != "\n"]
+    assert not wrong, f"control characters: {wrong}"
+    return accepted
+
+
+def describe_failure(error: BaseException) -> str:
+    """Exception and the last place in the program."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "/pbem/" in frame.filename]
+    place = f"{Path(frames[-1].filename).name}:{frames[-1].lineno} {frames[-1].name}" if frames else "?"
+    return f"{type(error).__name__} at {place}: {str(error)[:120]!r}"
+
+
+class Failures:
+    """The kinds of failures that were found, each with the number of its first mutant."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, tuple[str, int]] = {}
+        self.count = 0
+
+    def add(self, number: int, error: BaseException) -> None:
+        """Keep it if its kind is new."""
+        self.count += 1
+        text = describe_failure(error)
+        kind = text.split(":", 2)[0] + text.split(":", 2)[1] if ":" in text else text
+        if kind not in self.found:
+            self.found[kind] = (text, number)
+            print(f"mutant {number}: {text}", flush=True)
+
+
+def fuzz_cases(seed: int, numbers: range, failures: Failures) -> int:
+    """Check so many mutants; returns how many were accepted."""
+    seeds = read_seeds()
+    accepted = 0
+    with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for number in numbers:
+            text = mutate(seed, number, seeds)
+            try:
+                with alarm(PATIENCE):
+                    accepted += check_case(text, Path(name))
+            except Exception as error:
+                failures.add(number, error)
+    return accepted
+
+
+def damage(chance: random.Random, whole: bytes) -> bytes:
+    """The file cut off, with other bits, bytes, pages; sometimes without its checksums, as other programs leave it."""
+    data = bytearray(whole)
+    if chance.random() < 0.3:
+        del data[-chance.randint(1, 2000) :]
+    for _ in range(chance.choice([1, 1, 2, 8])):
+        at = chance.randrange(len(data))
+        kind = chance.randrange(7)
+        if kind == 0:
+            data[at] ^= 1 << chance.randrange(8)
+        elif kind == 1:
+            data[at] = chance.choice([0, 255, 1, 128])
+        elif kind == 2:
+            length = chance.choice([8, 64, 512, 4096])
+            data[at : at + length] = bytes(len(data[at : at + length]))
+        elif kind == 3:
+            other = chance.randrange(len(data))
+            data[at : at + 512], data[other : other + 512] = data[other : other + 512], data[at : at + 512]
+        elif kind == 4:
+            del data[at : at + chance.randint(1, 100)]
+        elif kind == 5:
+            data[at:at] = bytes(chance.randint(1, 100))
+        else:
+            del data[chance.randrange(len(data)) :]
+        if not data:
+            break
+    return bytes(data)
+
+
+def use_results(path: Path, draw: bool, resume: Callable[[], object]) -> None:
+    """Read, describe, draw, resume: each may say that the file is damaged."""
+    from pbem.results.plots import plot_results
+    from pbem.results.reader import open_results
+
+    with contextlib.suppress(PbemError):
+        results = open_results(path)
+        describe_results(results)
+        if draw:
+            plot_results(results, path.with_suffix(".png"))
+    with contextlib.suppress(PbemError):
+        resume()
+
+
+def in_child(action: Callable[[], None]) -> BaseException | None:
+    """Run the action in a process of its own; what it raised, or how the process ended, None if all was well."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reader)
+        code = 0
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process, also within HDF5
+        signal.alarm(PATIENCE)
+        try:
+            action()
+        except BaseException as error:
+            os.write(writer, describe_failure(error).encode()[:4000])
+            code = 1
+        os._exit(code)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        said = pipe.read().decode(errors="replace")
+    _, status = os.waitpid(child, 0)
+    if status == 0:
+        return None
+    return RuntimeError(said if said else f"the process ended with status {status}")
+
+
+def fuzz_results(seed: int, numbers: range, failures: Failures) -> int:
+    """Use so many damaged files; returns how many were used. None may give other numbers than those written."""
+    import pbem
+    from pbem.results.reader import open_results
+    from pbem.results.writer import ResultWriter
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        case = folder / "case.toml"
+        case.write_text(SMALL.replace('name = "more"', 'name = "more"\nsteps = 2'), encoding="utf-8")
+        whole = pbem.run(case, folder / "whole.h5")
+        expected = (whole.traction, whole.contact["seat"].slip, whole.energy.elastic)
+        model = read_checked_model(case)
+        mesh = generate_mesh(model)
+        data = (folder / "whole.h5").read_bytes()
+        path = folder / "mutant.h5"
+        for number in numbers:
+            chance = random.Random(f"{seed}/{number}")
+            changed = damage(chance, data)
+            path.write_bytes(changed)
+            sound = changed[-60:] == data[-60:]  # it still has its checksums
+
+            def resume(sound: bool = sound) -> None:
+                writer = ResultWriter.resume(path, model, mesh, 1, "", (), np.zeros(len(model.interior_points), int))
+                writer.finish()
+                if sound:
+                    found = open_results(path)
+                    for one, other in zip(expected, (found.traction, found.contact["seat"].slip, found.energy.elastic),
+                                          strict=True):
+                        np.testing.assert_array_equal(one, other)
+
+            error = in_child(partial(use_results, path, chance.random() < 0.1, resume))
+            if error is not None:
+                failures.add(number, error)
+    return len(numbers)
+
+
+def make_command(chance: random.Random) -> list[str]:
+    """A command line of right and wrong pieces, which computes nothing."""
+    files = ["case.toml", "none.toml", "a.h5", "none.h5", ".", "", "case.toml/x", "\x1b[31m.toml", "a" * 300, "-", "--",
+             "law.py", "\udc80.h5", "/dev/null", "/proc/x.h5", "two_blocks", "b.png", "b.pdf", "x\ny"]
+    options = ["--plot", "-o", "--output", "--step", "--field", "--magnify", "--resume", "--force", "--quiet", "--help",
+               "--version", "--operator", "--count", "--seed", "--name", "--half-length", "--plate", "-pbem_ksp_rtol",
+               "-pbem_", "-pbem_ksp_view=", "--nonsense", "-x", "--young", "--poisson", "--distance", "--density",
+               "--explicit", "--orientation", "--exponent", "--largest", "--distribution", "--shape", "--steps"]
+    values = ["1", "0", "-1", "nan", "inf", "1e300", "ux", "mises", "dense", "abc", "", "\x1b[2J", "1e-300",
+              "99999999999", "power", "lognormal", "square", "uniform", "90", "a\"b\\c", "a b", "ä"]
+    command = chance.choice(["check", "info", "plot", "plot", "make", "make", "chek", "", "run"])
+    rest = [chance.choice(["cracks", "inclusions"]), "-o", "made.toml", "--count", chance.choice(["1", "5", "0", "x"])]
+    parts = rest if command == "make" else [chance.choice([*files, "case.toml", "a.h5", "a.h5"])]
+    for _ in range(chance.choice([0, 1, 2, 3, 4])):
+        parts.append(chance.choice(options))
+        if chance.random() < 0.7:
+            parts.append(chance.choice(values + files))
+    if command == "run":  # nothing is to be computed here
+        parts = [part for part in parts if part not in ("case.toml", "two_blocks", "--resume")] + ["--nonsense"]
+    return [command, *parts]
+
+
+def fuzz_commands(seed: int, numbers: range, failures: Failures) -> int:
+    """Try so many command lines; returns how many went well."""
+    import pbem
+
+    accepted, here = 0, Path.cwd()
+    with tempfile.TemporaryDirectory() as name:
+        os.chdir(name)
+        try:
+            Path("case.toml").write_text(SMALL, encoding="utf-8")
+            Path("law.py").write_text("import sys; sys.exit(0)")
+            pbem.run("case.toml", "a.h5")
+            for number in numbers:
+                arguments = make_command(random.Random(f"{seed}/{number}"))
+                Path("made.toml").unlink(missing_ok=True)
+                out, err = io.StringIO(), io.StringIO()
+                try:
+                    with alarm(PATIENCE), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                        code = cli.main(arguments)
+                    said = out.getvalue() + err.getvalue()
+                    assert "Traceback" not in said, f"{arguments}: {said[-300:]}"
+                    assert code in (0, 2), f"{arguments}: exit code {code}"
+                    wrong = [each for each in said if is_control(each) and each != "\n"]
+                    assert not wrong, f"{arguments}: control characters {wrong}"
+                    accepted += code == 0
+                except (Exception, SystemExit) as error:
+                    failures.add(number, error)
+        finally:
+            os.chdir(here)
+    return accepted
+
+
+KINDS: dict[str, Callable[[int, range, Failures], int]] = {
+    "cases": fuzz_cases, "results": fuzz_results, "commands": fuzz_commands,
+}
+
+
+def fuzz(kind: str, count: int, seed: int, only: int | None = None) -> tuple[int, Failures]:
+    """Mutants of one kind; how many were accepted, and what failed."""
+    os.environ.setdefault("MPLBACKEND", "Agg")
+    failures = Failures()
+    numbers = range(count) if only is None else range(only, only + 1)
+    return KINDS[kind](seed, numbers, failures), failures
+
+
+def main() -> int:
+    """The script; returns its exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", type=int, help="number of one mutant; of cases, its text is printed")
+    options = parser.parse_args()
+    if options.only is not None and options.kind == "cases":
+        print(mutate(options.seed, options.only, read_seeds()))
+    accepted, failures = fuzz(options.kind, options.count, options.seed, options.only)
+    print(f"{options.kind}: {options.count} mutants, {accepted} accepted, {failures.count} failures of "
+          f"{len(failures.found)} kinds")
+    return 1 if failures.count else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,79 @@
+"""Custom laws that go wrong in the midst of a run end it on all ranks, with one message that names their file."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.results.reader import open_results
+from tests.cli.cli_sample import BLOCKS
+from tests.parallel.launch import launch
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+
+CUSTOM = 'law = "custom"\nfile = "law.py"\nparameters = { friction = 0.2 }'
+CASE = BLOCKS.replace('law = "coulomb"\nfriction = 0.2', CUSTOM)
+
+LAW = """
+import os, sys
+import numpy as np
+from pbem.contact.strength import Strength
+
+calls = 0
+rank = int(os.environ.get("OMPI_COMM_WORLD_RANK", 0))
+
+def strength(p_n, slip, friction):
+    global calls
+    calls += 1
+    CHANGE
+    return Strength(-friction * p_n, -friction + 0 * p_n, 0 * p_n)
+"""
+
+WRONG = {
+    "not finite": ("if calls > 3: p_n = p_n * np.nan", "law.py gives bound = nan"),
+    "changed": ("if calls > 3: slip += 1e9", "law.py fails (ValueError: output array is read-only)"),
+    "exits": ("if calls > 3: sys.exit(0)", "law.py fails (SystemExit: 0)"),
+    "exits on one rank": ("if calls > 3 and rank == 1: sys.exit(0)", "law.py fails (SystemExit: 0)"),
+    "other shape": ("if calls > 3: friction = 0.2; p_n = p_n[:1]", "law.py gives a bound of shape (1,)"),
+    "other ranks": ("friction = friction * (1 + 0.1 * rank)", "law.py answers differently on different ranks"),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A working directory with the case, whose law is right."""
+    assert "law.py" in CASE
+    (tmp_path / "case.toml").write_text(CASE)
+    (tmp_path / "law.py").write_text(LAW.replace("CHANGE", "pass"))
+    return tmp_path
+
+
+@pytest.mark.parametrize(("what", "ranks"), [("not finite", 1), ("exits", 1), *((what, 2) for what in WRONG)])
+def test_a_law_that_goes_wrong_ends_all_ranks(what: str, ranks: int, folder: Path) -> None:
+    change, said = WRONG[what]
+    (folder / "law.py").write_text(LAW.replace("CHANGE", change))
+    done = launch(ranks, "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count(said) == 1 and "Traceback" not in done.stderr, done.stderr
+    results = open_results(folder / "case.h5")
+    assert results.status == "failed" and said in results.failure
+    assert np.isfinite(results.traction).all()
+
+
+def test_the_text_of_a_law_is_stored_and_compared(folder: Path) -> None:
+    whole = pbem.run(folder / "case.toml", folder / "case.h5")
+    assert np.isfinite(whole.traction).all()
+    with pytest.raises(pbem.ResultFileError, match="another text of the law"):
+        (folder / "law.py").write_text(LAW.replace("CHANGE", "pass  # changed"))
+        pbem.run(folder / "case.toml", folder / "case.h5", resume=True)
+    (folder / "law.py").write_text(LAW.replace("CHANGE", "pass"))
+    again = pbem.run(folder / "case.toml", folder / "case.h5", resume=True)
+    np.testing.assert_array_equal(again.traction, whole.traction)
+    coulomb = folder / "coulomb.toml"
+    coulomb.write_text(BLOCKS)
+    np.testing.assert_allclose(whole.traction, pbem.run(coulomb, folder / "coulomb.h5").traction, rtol=0, atol=1e-9)

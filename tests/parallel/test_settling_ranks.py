@@ -1,0 +1,47 @@
+"""The search for modes comes to the same by the same steps on any number of ranks, pivoting included."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbem.results.reader import open_results
+from pbem.solve.search import Search
+from tests.verification.test_settling import make_junction, run, write_plane
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+
+TEXT = write_plane(make_junction(0, 30, 60, elements=8), {"friction": 0.8}, (0.2, -1.0, 0.6))
+OPERATORS = {"dense": TEXT, "hierarchical": TEXT.replace('"dense"', '"hierarchical"')}
+
+
+def test_this_model_takes_pivoting(monkeypatch: pytest.MonkeyPatch) -> None:
+    groups = []
+    choose = Search.choose_group
+
+    def watch(search: Search) -> np.ndarray:
+        groups.append(choose(search))
+        return groups[-1]
+
+    monkeypatch.setattr(Search, "choose_group", watch)
+    run(TEXT)
+    assert max(map(len, groups)) > 0
+
+
+@pytest.mark.parametrize(("operator", "most"), [("dense", 3), ("hierarchical", 2)])
+def test_modes_and_iterations_are_the_same_on_all_ranks(
+    operator: str, most: int, tmp_path: Path, mpirun: Launch
+) -> None:
+    (tmp_path / "junction.toml").write_text(OPERATORS[operator])
+    (alone,) = run(OPERATORS[operator])
+    for ranks in range(2, most + 1):
+        done = mpirun(ranks, "run", "junction.toml", "-o", f"{ranks}.h5", "--quiet", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        results = open_results(tmp_path / f"{ranks}.h5")
+        assert results.steps.iterations.tolist() == [len(alone.iterations)]
+        modes = np.concatenate([results.contact[name].mode[-1] for name in ("b0", "b1", "b2")])
+        np.testing.assert_array_equal(modes, alone.contact.mode)

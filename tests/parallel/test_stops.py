@@ -1,0 +1,145 @@
+"""What ends a run from outside - kills, signals, limits of memory and of files - leaves a file that resumes."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import pbem
+from pbem.results.reader import Results, open_results
+from tests.parallel.launch import launch_snippet
+from tests.parallel.test_resume import CASE, STEPS, expect_equal
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+
+# The command line with some ranks doing something when a step of this number is about to be solved.
+DISTURBED = """
+import os, resource, signal, subprocess, sys
+from pbem.cli import main
+import pbem.solve.march as solving
+from pbem.parallel import world
+
+rank, number, what, *arguments = sys.argv[1:]
+whole = solving.solve_step
+done = 0
+
+def solve(*given, **named):
+    global done
+    done += 1
+    if done == int(number) and int(rank) in (-1, world.rank):
+        exec(what)
+    return whole(*given, **named)
+
+solving.solve_step = solve
+sys.exit(main(arguments))
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
+    """The results of a run that nothing disturbs, on one rank."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "case.toml").write_text(CASE)
+    yield pbem.run(folder / "case.toml", folder / "case.h5")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A working directory with the case."""
+    (tmp_path / "case.toml").write_text(CASE)
+    return tmp_path
+
+
+def load_script(name: str) -> ModuleType:
+    path = Path(__file__).parents[2] / "scripts" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_killed_runs_are_resumed_and_end_alike(tmp_path: Path) -> None:
+    """At random moments and within random write calls, on one and two ranks; scripts/kill_runs.py does hundreds."""
+    runs, largest, wrong = load_script("kill_runs").kill_runs(tmp_path, 5, [1, 2], 5)
+    assert wrong == []
+    assert runs >= 1 and largest < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "ranks", "rank"),
+    [("SIGTERM", 1, 0), ("SIGHUP", 1, 0), ("SIGTERM", 2, 1), ("SIGINT", 2, 0), ("SIGHUP", 3, 2)],
+)
+def test_a_signal_to_one_rank_stops_all_with_one_message(
+    name: str, ranks: int, rank: int, folder: Path, whole: Results
+) -> None:
+    number = int(getattr(signal, name))
+    what = f"os.kill(os.getpid(), signal.{name})"
+    done = launch_snippet(ranks, DISTURBED, str(rank), "4", what, "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 128 + number, done.stderr
+    said = [line for line in done.stderr.splitlines() if line.startswith("pbem: ")]
+    assert len(said) == 1 and "--resume goes on" in said[0], done.stderr
+    assert (name in said[0] or "interrupted" in said[0]) and "Traceback" not in done.stderr
+    results = open_results(folder / "case.h5")
+    assert (results.status, len(results.steps)) == ("stopped", 3)
+    assert name in results.failure
+    expect_equal(pbem.run(folder / "case.toml", folder / "case.h5", resume=True), whole)
+
+
+def test_a_signal_that_is_ignored_stays_ignored(folder: Path, whole: Results) -> None:
+    """As nohup does with SIGHUP."""
+    what = "os.kill(os.getpid(), signal.SIGHUP)"
+    code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n" + DISTURBED
+    done = subprocess.run([sys.executable, "-c", code, "0", "4", what, "run", "case.toml", "--quiet"],
+                          cwd=folder, capture_output=True, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"})
+    assert (done.returncode, done.stderr) == (0, "")
+    expect_equal(open_results(folder / "case.h5"), whole)
+
+
+# Memory ends really: the process may not have more than it has.
+STARVED = "import numpy; resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30)); numpy.ones(2**31)"
+
+
+@pytest.mark.parametrize(("ranks", "rank"), [(1, 0), (2, 1), (2, -1)])
+def test_too_little_memory_is_told_in_one_message(ranks: int, rank: int, folder: Path, whole: Results) -> None:
+    done = launch_snippet(ranks, DISTURBED, str(rank), "4", STARVED, "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("out of memory") == 1 and "Traceback" not in done.stderr, done.stderr
+    results = open_results(folder / "case.h5")
+    # The first rank may not have come to write the third step when the other ends it.
+    assert results.status == "stopped" and 2 <= len(results.steps) <= 3
+    expect_equal(pbem.run(folder / "case.toml", folder / "case.h5", resume=True), whole)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_file_that_may_not_grow_is_told_in_one_message(ranks: int, folder: Path, whole: Results) -> None:
+    """The limit of the size of files acts as a disk that is full, or a quota."""
+    what = ("size = os.path.getsize('case.h5') if world.rank == 0 else 0; "
+            "resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)) if size else None")
+    done = launch_snippet(ranks, DISTURBED, "0", "4", what, "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("no room for step") == 1 and "Traceback" not in done.stderr, done.stderr
+    results = open_results(folder / "case.h5")
+    assert results.status == "stopped" and len(results.steps) >= 3
+    assert len(results.steps) < STEPS
+    expect_equal(pbem.run(folder / "case.toml", folder / "case.h5", resume=True), whole)
+
+
+def test_a_second_run_on_the_same_file_is_refused(folder: Path, whole: Results) -> None:
+    """While the first goes on, and is not disturbed by it."""
+    what = ("done = [subprocess.run([sys.executable, '-m', 'pbem', 'run', 'case.toml', how], "
+            "capture_output=True, text=True) for how in ('--resume', '--force')]; "
+            "print([each.returncode for each in done], *[each.stderr for each in done])")
+    done = subprocess.run([sys.executable, "-c", DISTURBED, "0", "4", what, "run", "case.toml", "--quiet"],
+                          cwd=folder, capture_output=True, text=True, env=os.environ | {"OMP_NUM_THREADS": "1"})
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("[2, 2] ") and done.stdout.count("is being written by another run") == 2
+    expect_equal(open_results(folder / "case.h5"), whole)

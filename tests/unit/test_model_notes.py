@@ -1,0 +1,43 @@
+"""What a case leaves out, and may not have been meant to, is noted."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbem.model.build import parse_model
+from tests.unit.case_sample import BLOCKS, change
+
+CRACK = """\
+materials.m = { young = 1000.0, poisson = 0.2, density = 1.0 }
+curves.crack = { points = [[0, 0], [1, 0]], elements = 4 }
+regions.plane = { material = "m", infinite = true, cracks = ["crack"] }
+analysis.steps = 1
+"""
+
+
+@pytest.mark.parametrize(
+    ("load", "noted"),
+    [
+        ("", True), ("remote.syy = 0.0", True), ("remote.syy = -1.0", False),
+        ("initial_stress.m = { sxy = 1.0 }", False), ("interfaces.crack = { pressure = 2.0 }", False),
+        ('[[stages]]\nname = "a"\n[[stages]]\nremote.sxx = 1e-12', False), ('[[stages]]\nname = "a"', True),
+    ],
+)  # fmt: skip
+def test_a_case_without_loads_is_noted(load: str, noted: bool) -> None:
+    _, model = parse_model(CRACK + load + "\n")
+    assert any(note.startswith("No load: ") for note in model.notes) == noted
+
+
+@pytest.mark.parametrize(
+    ("law", "noted"),
+    [
+        ('law = "coulomb"', True), ('law = "coulomb"\ntensile_strength = 1.0', True), ('law = "frictionless"', False),
+        ('law = "coulomb"\nfriction = 0.0', False), ('law = "coulomb"\ncohesion = 1.0', False),
+        ('law = "coulomb"\nfriction_angle = 30.0', False), ('law = "bonded"', False),
+    ],
+)  # fmt: skip
+def test_a_coulomb_law_without_friction_is_noted(law: str, noted: bool) -> None:
+    _, model = parse_model(change(BLOCKS, ('law = "coulomb"\nfriction = 0.5', law)))
+    found = [note for note in model.notes if note.startswith("No friction or cohesion")]
+    assert len(found) == noted
+    assert all("'interface'" in note and "frictionless" in note for note in found)

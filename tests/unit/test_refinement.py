@@ -1,0 +1,154 @@
+"""Meshes of the same model with fewer or more elements, and values carried from one to the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbem.mesh.carry import carry_nodes, list_curve_elements
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.interpolation import locate_nodes
+from pbem.model.build import parse_model
+from pbem.model.curve import Curve, Leg
+from pbem.model.model import Model
+from pbem.model.refinement import (
+    bisect_elements,
+    coarsen_model,
+    count_elements,
+    count_levels,
+    group_elements,
+    impose_fractions,
+    list_fractions,
+)
+
+PLATE = """
+[materials.rock]
+young = 1000.0
+poisson = 0.2
+[curves]
+bottom = { points = [[0, 0], [2, 0]], elements = 7 }
+right = { points = [[2, 0], [2, 1]], elements = 4, grading = "both" }
+round = { center = [1, 1], radius = 1, angles = [0, 180], elements = 8 }
+left = { points = [[0, 1], [0, 0]], elements = 3 }
+crack = { points = [[0.5, 0.5], [1.5, 0.7]], elements = 5 }
+[regions.plate]
+material = "rock"
+boundary = ["bottom", "right", "round", "left"]
+cracks = ["crack"]
+[boundary.bottom]
+ux = 0.0
+uy = 0.0
+"""
+
+
+@pytest.fixture(scope="module")
+def plate() -> Model:
+    return parse_model(PLATE)[1]
+
+
+def test_elements_are_merged_in_pairs(plate: Model) -> None:
+    coarse = coarsen_model(plate)
+    assert coarse is not None and coarse.kind == "merged"
+    counts = {name: count_elements(curve) for name, curve in coarse.model.curves.items()}
+    assert counts == {"bottom": 4, "right": 2, "round": 4, "left": 2, "crack": 3}
+    for name, curve in plate.curves.items():
+        ends = [set(leg.element_fractions()) for leg in curve.legs]
+        assert all(set(leg.element_fractions()) <= own for leg, own in
+                   zip(coarse.model.curves[name].legs, ends, strict=True))  # fmt: skip
+
+
+def test_arcs_that_would_turn_too_far_are_kept(plate: Model) -> None:
+    leg = plate.curves["round"].legs[0]
+    curves = plate.curves | {"round": Curve("round", (replace(leg, elements=5, fractions=None),))}
+    coarse = coarsen_model(replace(plate, curves=curves))
+    assert coarse is not None
+    assert count_elements(coarse.model.curves["round"]) == 5
+
+
+@pytest.mark.parametrize(("elements", "order"), [(2, 2), (3, 2), (2, 0)])
+def test_a_crack_with_two_tips_keeps_two_elements(plate: Model, elements: int, order: int) -> None:
+    leg = replace(plate.curves["crack"].legs[0], elements=elements)
+    model = replace(plate, curves=plate.curves | {"crack": Curve("crack", (leg,))},
+                    analysis=replace(plate.analysis, order=order))
+    coarse = coarsen_model(model)
+    if elements == 3:
+        assert coarse is not None and count_elements(coarse.model.curves["crack"]) == 2
+    elif order:  # its error would not be seen with the same elements
+        assert coarse is not None and coarse.kind == "order"
+        assert coarse.model.analysis.order == order - 1
+    else:
+        assert coarse is None
+
+
+def test_element_ends_come_back(plate: Model) -> None:
+    imposed = impose_fractions(plate, list_fractions(plate))
+    one, other = generate_mesh(plate), generate_mesh(imposed)
+    assert np.array_equal(one.position, other.position)
+    with pytest.raises(ValueError, match="other curves"):
+        impose_fractions(plate, {"bottom": ((0.0, 1.0),)})
+
+
+def test_marked_elements_are_halved_and_neighbours_follow(plate: Model) -> None:
+    model = plate
+    for _ in range(4):
+        marked = {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()}
+        marked["crack"][0] = marked["bottom"][-1] = True
+        before = model
+        model = bisect_elements(model, marked)
+        for name, curve in before.curves.items():
+            groups = np.diff(group_elements(model.curves[name], curve))
+            assert set(groups) <= {1, 2}
+            assert (groups[marked[name]] == 2).all()
+    lengths = np.diff(model.curves["crack"].legs[0].element_fractions())
+    assert np.allclose(lengths[0], 0.2 / 16)
+    assert (np.maximum(lengths[1:] / lengths[:-1], lengths[:-1] / lengths[1:]) <= 2 + 1e-9).all()
+    # Around the corner the side of the plate follows: its last element was a fourth of the bottom's at most.
+    corner = np.diff(model.curves["right"].legs[0].element_fractions())[0]
+    bottom = 2 * np.diff(model.curves["bottom"].legs[0].element_fractions())[-1]
+    ratio = [corner / bottom, bottom / corner]
+    first = [0.0625 / (2 / 7), (2 / 7) / 0.0625]
+    assert max(ratio) <= max(2.0, *first) + 1e-9
+    levels = count_levels(plate.curves["crack"], model.curves["crack"])
+    assert levels[0] == 4 and levels[-1] < 4
+    # Those next to a tip are equal; the other end, where the ratio did not ask for more, is longer.
+    assert np.allclose(lengths[:3], lengths[0]) and lengths[-1] > 3 * lengths[0]
+
+
+def test_two_neighbours_become_three_gently(plate: Model) -> None:
+    marked = {name: np.ones(count_elements(curve), bool) for name, curve in plate.curves.items()}
+    gentle = bisect_elements(plate, marked, gently=True)
+    counts = {name: count_elements(curve) for name, curve in gentle.curves.items()}
+    assert counts == {"bottom": 11, "right": 6, "round": 12, "left": 5, "crack": 8}
+    assert np.allclose(np.diff(gentle.curves["round"].legs[0].element_fractions()), 1 / 12)
+
+
+def test_polynomials_are_carried_exactly(plate: Model) -> None:
+    coarse = coarsen_model(plate)
+    assert coarse is not None
+    fine, other = generate_mesh(plate), generate_mesh(coarse.model)
+    carry = carry_nodes(plate, fine, coarse.model, other)
+
+    def evaluate(points: np.ndarray) -> np.ndarray:
+        return 1 + points.real - 0.3 * points.real * points.imag + points.imag**2
+
+    straight = np.repeat(other.sweep == 0, other.order + 1)
+    error = carry.plain @ evaluate(fine.position) - evaluate(other.position)
+    assert np.abs(error[straight]).max() < 1e-13
+    assert np.abs(carry.plain @ np.ones(fine.nodes) - 1).max() < 1e-13  # on arcs too
+    crack = np.flatnonzero(other.node_crack)
+    along = np.abs(other.position[crack] - plate.curves["crack"].start)
+    root = np.sqrt(np.abs(fine.position - plate.curves["crack"].start))
+    first = crack[along < np.abs(fine.end - fine.start)[fine.crack][0]]
+    assert np.allclose((carry.rooted @ root)[first], np.sqrt(along[: len(first)]), rtol=1e-12)
+    assert (np.abs((carry.plain @ root)[first] - np.sqrt(along[: len(first)])) > 1e-3).any()
+
+
+def test_chains_are_listed_in_the_direction_of_their_curves(plate: Model) -> None:
+    mesh = generate_mesh(plate)
+    for name, elements in list_curve_elements(plate, mesh):
+        leg: Leg = plate.curves[name].legs[0]
+        middle = 0.5 * (mesh.start + mesh.end)[elements]
+        assert (np.diff(np.abs(middle - leg.start)) > 0).all()
+    assert locate_nodes(mesh).shape == (mesh.elements, mesh.order + 1)

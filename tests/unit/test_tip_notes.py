@@ -1,0 +1,62 @@
+"""What a run and `pbem info` say where J and the stress-intensity factors do not agree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.results.describe import describe_results
+from pbem.results.tip_notes import compare_release
+from pbem.solve.step import SilentReporter
+
+CASE = """
+materials.rock = {{ young = {young}, poisson = 0.2 }}
+curves.crack = {{ points = [[-1, 0], [1, 0]], elements = {elements} }}
+curves.other = {{ points = [[-1, 9], [1, 9]], elements = 12 }}
+regions.plane = {{ material = "rock", infinite = true, cracks = ["crack", "other"] }}
+remote = {{ syy = {stress}, sxx = -1.0 }}
+analysis = {{ order = {order}, steps = 1 }}
+"""
+
+
+class Listener(SilentReporter):
+    """Keeps the notes of a run."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+
+def run(tmp_path: Path, **values: float) -> tuple[pbem.results.reader.Results, list[str]]:
+    (tmp_path / "case.toml").write_text(CASE.format(**{"young": 1e3, "stress": 1.0, "order": 2, **values}))
+    listener = Listener()
+    results = pbem.run(tmp_path / "case.toml", tmp_path / "case.h5", reporter=listener)
+    return results, [note for note in listener.notes if "J and" in note]
+
+
+@pytest.mark.parametrize("young", [1e-6, 1e3, 1e12])
+def test_a_poor_mesh_is_told_by_the_run_and_by_info(tmp_path: Path, young: float) -> None:
+    results, notes = run(tmp_path, elements=3, order=0, young=young)
+    tips = results.tips["crack"]
+    ratio = (tips.KI[-1] ** 2 + tips.KII[-1] ** 2) / tips.plane_modulus / tips.J[-1]
+    assert np.abs(ratio - 1).max() > 0.05
+    assert len(notes) == 1 and "'crack' (start)" in notes[0] and "'crack' (end)" in notes[0]
+    assert notes[0] in " ".join(describe_results(results).split())
+
+
+def test_a_good_mesh_is_not_mentioned(tmp_path: Path) -> None:
+    results, notes = run(tmp_path, elements=8)
+    assert notes == compare_release(results) == []
+    tips = results.tips["crack"]
+    np.testing.assert_allclose(tips.J[-1], tips.KI[-1] ** 2 / tips.plane_modulus, rtol=1e-5)
+
+
+def test_closed_cracks_that_release_nothing_are_not_compared(tmp_path: Path) -> None:
+    results, notes = run(tmp_path, elements=3, order=0, stress=-1.0)
+    assert notes == []
+    assert results.tips["crack"].KI[-1].tolist() == [0.0, 0.0]

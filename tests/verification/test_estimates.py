@@ -1,0 +1,198 @@
+"""Estimated errors against true ones, and `analysis.accuracy` against known answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.cli import main
+from pbem.driver import make_estimator
+from pbem.errors import CaseError, ConvergenceError
+from pbem.model.model import Model
+from pbem.results import accuracy as limits
+from pbem.results.reader import open_results
+from tests.verification.proofs import PROOFS, proof
+from tests.verification.proofs.proof import Solved
+
+# Problems of all kinds: what they measure is estimated as this.
+KINDS = {
+    "crack under tension, order 2, 8 elements: KI": "factors",
+    "crack under pressure, order 2, 8 elements: opening": "jumps",
+    "crack under tension, order 3, 16 elements: opening": "jumps",
+    "inclined crack, 30 degrees: KI, KII": "factors",
+    "two collinear cracks, 0.05 to 1: K at the inner tips": "factors",
+    "crack along an arc, 90 degrees: KI, KII": "factors",
+    "edge crack in a large plate: KI": "factors",
+    "kinked crack, 60 degrees: KI, KII": "factors",
+    "closed crack, cohesion 10, eight angles: slip": "jumps",
+    "sheared crack, cohesion growing linearly: KII": "factors",
+    "bonded inclusion, 48 elements: tractions": "tractions",
+    "smooth inclusion, 48 elements: pressure": "tractions",
+    "circular hole, 48 elements: displacement of the wall": "displacement",
+    "ring widened into a ring across a gap: pressure": "tractions",
+    "Hertz, two meshes, block first: pressure": "tractions",
+    "block dragged along a plane: force": "reactions",
+    "panel with friction, 8 elements a side: slip": "jumps",
+}
+
+
+@pytest.fixture
+def estimated() -> Iterator[dict[str, float]]:
+    """The largest estimated relative errors of what the proofs solve while this is in use."""
+    found: dict[str, float] = {}
+    solve = proof.solve_model
+
+    def watch(model: Model) -> Solved:
+        solved = solve(model)
+        estimator = make_estimator(solved.model, solved.mesh)
+        for step in solved.steps:
+            row = estimator.estimate(step)
+        estimator.destroy()
+        for name, value in row.items():
+            if name.startswith("relative_"):
+                kind = name.removeprefix("relative_")
+                found[kind] = max(found.get(kind, 0.0), float(value))
+        return solved
+
+    proof.solve_text.cache_clear()
+    proof.solve_model = watch
+    yield found
+    proof.solve_model = solve
+    proof.solve_text.cache_clear()
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_true_error_is_of_the_size_of_the_estimated_one(name: str, estimated: dict[str, float]) -> None:
+    (one,) = [one for one in PROOFS if one.name == name]
+    ratio = one.run().error / estimated[KINDS[name]]
+    assert 0.3 <= ratio <= 10
+
+
+@pytest.mark.parametrize("first", ["pin", "hole"])
+def test_contact_is_compared_whichever_face_carries_the_pairs(first: str, estimated: dict[str, float]) -> None:
+    (one,) = [one for one in PROOFS if one.name.startswith(f"pin in a hole, mesh ratio 5:1, {first} first")]
+    one.run()
+    assert 1e-5 < estimated["tractions"] < 1e-2
+    assert 1e-9 < estimated["jumps"] < 1e-2
+
+
+GRIFFITH = """
+[materials.rock]
+young = 1000.0
+poisson = 0.2
+[curves]
+crack = {{ points = [[-1.3, 0], [1.3, 0]], elements = 2 }}
+[regions.plane]
+material = "rock"
+infinite = true
+cracks = ["crack"]
+[interfaces.crack]
+law = "frictionless"
+[remote]
+syy = 2.0
+[analysis]
+steps = 1
+accuracy = {accuracy}
+"""
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
+def test_the_accuracy_asked_for_is_met_by_a_crack(accuracy: float, tmp_path: Path) -> None:
+    (tmp_path / "crack.toml").write_text(GRIFFITH.format(accuracy=accuracy))
+    results = pbem.run(tmp_path / "crack.toml", tmp_path / "crack.h5")
+    exact = 2 * math.sqrt(1.3 * math.pi)
+    assert np.abs(results.tips["crack"].KI[-1] / exact - 1).max() < accuracy
+    opening = results.contact["crack"]
+    middle = 4 * 2.0 * 1.3 * (1 - 0.2**2) / 1e3
+    shape = np.sqrt(1 - (opening.position[:, 0] / 1.3) ** 2)
+    assert np.abs(opening.opening[-1] / middle - shape).max() < accuracy
+    assert max(results.errors.relative["jumps"][-1], results.errors.relative["factors"][-1]) < accuracy / 1.5
+    assert results.status == "finished"
+
+
+BLOCK = """
+[materials.soft]
+young = 1000.0
+poisson = 0.3
+[curves]
+bottom = {{ points = [[0, 0], [1, 0]], elements = 3 }}
+right = {{ points = [[1, 0], [1, 1]], elements = 3 }}
+top = {{ points = [[1, 1], [0, 1]], elements = 3 }}
+left = {{ points = [[0, 1], [0, 0]], elements = 3 }}
+[regions.block]
+material = "soft"
+boundary = ["bottom", "right", "top", "left"]
+[boundary.bottom]
+ux = 0.0
+uy = 0.0
+[boundary.top]
+ux = 0.0
+uy = -0.01
+[analysis]
+steps = 2
+accuracy = {accuracy}
+"""
+
+
+def test_the_accuracy_asked_for_is_met_by_a_reaction(tmp_path: Path) -> None:
+    forces = []
+    for accuracy in (1e-2, 1e-3, 1e-5):
+        (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=accuracy))
+        results = pbem.run(tmp_path / "block.toml", tmp_path / f"{accuracy:g}.h5")
+        forces.append(results.reactions["top"][-1, 1])
+    assert abs(forces[0] / forces[2] - 1) < 1e-2
+    assert abs(forces[1] / forces[2] - 1) < 1e-3
+
+
+def test_a_refined_run_is_gone_on_with_and_drawn(tmp_path: Path) -> None:
+    case, whole, part = tmp_path / "block.toml", tmp_path / "whole.h5", tmp_path / "part.h5"
+    case.write_text(BLOCK.format(accuracy=1e-3))
+    results = pbem.run(case, whole)
+    fractions = results.fractions
+    assert fractions is not None and sum(map(len, fractions["bottom"])) > 4
+    assert results.case == case.read_text()
+    part.write_bytes(whole.read_bytes())
+    again = pbem.run(case, part, resume=True)
+    assert again.fractions == fractions
+    assert np.array_equal(again.displacement, results.displacement)
+    assert main(["plot", str(whole), "--mesh"]) == 0
+    assert (tmp_path / "whole_mesh.png").stat().st_size > 10_000
+    assert main(["info", str(whole)]) == 0
+
+
+def test_what_is_not_reached_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MOST_PASSES", 2)
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-6))
+    with pytest.raises(ConvergenceError, match=r"not reached within 2 passes.*reactions") as caught:
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    assert caught.value.reason == "accuracy"
+    results = open_results(tmp_path / "block.h5")
+    assert results.status == "failed" and "accuracy" in results.failure
+    assert len(results.steps) == 2
+
+
+def test_where_nothing_is_coarser_there_is_no_estimate(tmp_path: Path) -> None:
+    text = BLOCK.format(accuracy=1e-3).replace("elements = 3", 'elements = 1, grading = "none"')
+    text = text.replace("steps = 2", "order = 0")
+    (tmp_path / "block.toml").write_text(text.replace("accuracy = 0.001\n", ""))
+    results = pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    assert np.isnan(results.errors.relative["reactions"]).all()
+    assert "cannot be merged" in results.errors.missing
+    (tmp_path / "asked.toml").write_text(text)
+    with pytest.raises(ConvergenceError, match="cannot be estimated"):
+        pbem.run(tmp_path / "asked.toml", tmp_path / "asked.h5")
+
+
+@pytest.mark.parametrize(("line", "fault"), [
+    ("accuracy = 1.5", "analysis.accuracy"), ("accuracy = 0", "analysis.accuracy"), ("acuracy = 0.1", "accuracy"),
+])  # fmt: skip
+def test_wrong_accuracies_are_refused(line: str, fault: str, tmp_path: Path) -> None:
+    text = BLOCK.format(accuracy=1e-3).replace("accuracy = 0.001", line)
+    (tmp_path / "block.toml").write_text(text)
+    with pytest.raises(CaseError, match=fault):
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")

@@ -50,7 +50,8 @@ class Body:
             count = self.elements if isinstance(self.elements, int) else self.elements[name]
             if name in self.circles:
                 center, radius = complex(points[0]), float(np.real(points[1]))
-                lines.append(f"{name} = {{ center = {_pair(center)}, radius = {radius!r}, elements = {count} }}")
+                shape = f"center = {_pair(center)}, radius = {radius!r}"
+                lines.append(f'{name} = {{ {shape}, elements = {count}, grading = "{self.grading}" }}')
                 continue
             vertices = ", ".join(_pair(complex(point)) for point in points)
             counts = [count] * (len(points) - 1)

@@ -93,17 +93,21 @@ def _constrain_outer_nodes(
 
 
 def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation) -> None:
-    """The slot node follows the other side but for the jump; the other side carries the opposite of its traction."""
+    """The slot node follows the other side but for the jump; the other side carries the opposite of its traction.
+
+    The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge.
+    """
     pairs, links = mesh.pairs, mesh.links
     n, s = pairs.normal, 1j * pairs.normal
     givers = links.traction_pair
-    constant_jump = pairs.sense * ((law.offset[:, G_N] - gap) * n + law.offset[:, G_S] * s)
+    led = law.leader
+    constant_jump = pairs.sense * ((law.offset[led, G_N] - gap[led]) * n + law.offset[led, G_S] * s)
     constant_traction = -pairs.sense * (law.offset[:, P_N] * n + law.offset[:, P_S] * s)
     for k in range(2):
         unknown = 2 * pairs.slot + k
-        jump = pairs.sense * (law.tangent[:, G_N, k] * n + law.tangent[:, G_S, k] * s)
+        jump = pairs.sense * (law.tangent[led, G_N, k] * n + law.tangent[led, G_S, k] * s)
         traction = -pairs.sense * (law.tangent[:, P_N, k] * n + law.tangent[:, P_S, k] * s)
-        entries.add(DISPLACEMENT, pairs.slot, unknown, jump)
+        entries.add(DISPLACEMENT, pairs.slot, unknown[led], jump)
         entries.add(TRACTION, pairs.slot, unknown, traction)
         entries.add(TRACTION, links.traction_node, unknown[givers], -links.traction_weight * traction[givers])
         entries.add(DISPLACEMENT, links.carrier, 2 * links.carrier + k, np.full(len(links.carrier), 1j**k))

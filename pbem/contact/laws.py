@@ -222,9 +222,14 @@ def start_memory(laws: PairLaws) -> Memory:
     """Before any load closed pairs stick, or slip if nothing resists; pairs with a gap are open."""
     is_open = laws.parted | (laws.gap > 0) & ~laws.bonded
     closed = np.where(resists_slip(laws) | laws.bonded, STICK, SLIP)
-    modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8), np.ones(laws.count))
+    modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8)[laws.leader], np.ones(laws.count))
     zeros = np.zeros(laws.count)
     return Memory(modes, zeros, zeros, laws.brittle & is_open, zeros)
+
+
+def follow_leaders(laws: PairLaws, modes: ModeState) -> ModeState:
+    """The modes, with those of pairs in the corners of narrow wedges taken from their leaders."""
+    return ModeState(modes.mode[laws.leader], modes.sign[laws.leader])
 
 
 def plastic_slip(laws: PairLaws, state: PairState) -> Real:

@@ -34,15 +34,20 @@ P_N, P_S, G_N, G_S = range(4)
 
 @dataclass(frozen=True)
 class Linearisation:
-    """state = tangent @ (x_n, x_s) + offset, state ordered p_n, p_s, g_n, g_s: tangent (m, 4, 2), offset (m, 4)."""
+    """state = tangent @ (x_n, x_s) + offset, state ordered p_n, p_s, g_n, g_s: tangent (m, 4, 2), offset (m, 4).
+
+    leader (m,): the pair whose jump each pair has, itself but in the corner of a narrow wedge. There the unknowns are the
+    tractions that this takes, and the pair counts as being in the state of its leader.
+    """
 
     tangent: Real
     offset: Real
+    leader: NDArray[np.int64]
 
     def evaluate(self, unknowns: Real) -> PairState:
         """State of the pairs from their unknowns (m, 2)."""
         state = np.einsum("mij,mj->mi", self.tangent, unknowns) + self.offset
-        return PairState(*state.T)
+        return PairState(*state[self.leader].T)
 
 
 def linearise(
@@ -88,7 +93,9 @@ def linearise(
     tangent[is_open, G_N, 0] = 1.0
     tangent[is_open, G_S, 1] = 1.0
     offset[is_open, P_N] = -pressure[is_open]
-    return Linearisation(tangent, offset)
+    tangent[laws.follows], offset[laws.follows] = 0.0, 0.0
+    tangent[laws.follows, P_N, 0] = tangent[laws.follows, P_S, 1] = traction_scale
+    return Linearisation(tangent, offset, laws.leader)
 
 
 def tensile_limit(laws: PairLaws, memory: Memory) -> Real:

@@ -61,13 +61,14 @@ def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     for anchor in anchors:
         add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
     own_cracks = _share_equally(np.flatnonzero(mesh.node_crack), comm)
-    unknowns = find_unknowns_of_regions(mesh, outer, evaluate_load(model, mesh, outer, 0, 1.0))
+    laws = collect_laws(model, mesh)
+    unknowns = find_unknowns_of_regions(mesh, outer, laws.leader, evaluate_load(model, mesh, outer, 0, 1.0))
     return Problem(
         comm=comm,
         model=model,
         mesh=mesh,
         outer=outer,
-        laws=collect_laws(model, mesh),
+        laws=laws,
         operator=operator,
         crack_rows=tuple(assemble_displacement_rows(mesh, materials, own_cracks, needed)),
         crack_nodes=own_cracks,
@@ -175,11 +176,11 @@ def _describe_operator(operator: HierarchicalOperator, groups: int, tolerance: f
     )
 
 
-def find_unknowns_of_regions(mesh: Mesh, outer: OuterNodes, load: Load) -> list[Integer]:
+def find_unknowns_of_regions(mesh: Mesh, outer: OuterNodes, leader: Integer, load: Load) -> list[Integer]:
     """Unknowns, in rising order, on which each region's displacements and tractions can depend in any mode."""
     # A law that depends on everything has the entries of all modes at once.
     everything = np.tile(1 + 0.1 * np.arange(8.0).reshape(4, 2), (mesh.pairs.count, 1, 1))
-    law = Linearisation(everything, np.zeros((mesh.pairs.count, 4)))
+    law = Linearisation(everything, np.zeros((mesh.pairs.count, 4)), leader)
     matrix = build_constraints(mesh, outer, np.zeros(mesh.pairs.count), law, load, 1.0).matrix
     region_of_row = np.tile(np.repeat(mesh.node_region, 2), 2)
     return [

@@ -17,7 +17,7 @@ FEW = 0.25
 
 def make_dense_tangent(problem: Problem) -> AnyTangent:
     """The tangent operator of a problem with a dense operator: condensed, or by GMRES if that is asked for."""
-    varying = ~(problem.laws.bonded | problem.laws.parted)
+    varying = ~(problem.laws.bonded | problem.laws.parted | problem.laws.follows)
     # Options of the Krylov solver are heeded where it does the work.
     if problem.model.solver.linear == "gmres" or any(name.startswith(("ksp_", "pc_type")) for name in list_options()):
         return _release(problem, FactoredTangent(problem))

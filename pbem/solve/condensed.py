@@ -115,11 +115,11 @@ class CondensedTangent:
         problem = self.problem
         self.laws, self.load = None, None
         tangent = self._reference_tangent(law)
-        self.reference.form(problem.constrain(Linearisation(tangent, np.zeros(tangent.shape[:2])), load).matrix)
+        self.reference.form(problem.constrain(Linearisation(tangent, np.zeros(tangent.shape[:2]), law.leader), load).matrix)
         self.bases = PairBases(tangent[self.varying], problem.traction_scale)
         complement = np.zeros_like(tangent)
         complement[self.varying] = self.bases.complement
-        states = problem.constrain(Linearisation(complement, np.zeros(tangent.shape[:2])), load).matrix
+        states = problem.constrain(Linearisation(complement, np.zeros(tangent.shape[:2]), law.leader), load).matrix
         self.columns = PairColumns(self.reference, states[:, self.unknowns], self.unknowns)
         self.effort.restart(self.reference.solver.seconds, problem.unknowns, limited=not self.few)
         if self.few:
@@ -151,7 +151,7 @@ class CondensedTangent:
             offset = law.offset.copy()
             offset[self.varying] = 0.0
             offset[self.varying, G_N] = problem.laws.gap[self.varying]
-            constant = self.load_offset = problem.constrain(Linearisation(self.laws, offset), load).offset
+            constant = self.load_offset = problem.constrain(Linearisation(self.laws, offset, law.leader), load).offset
             self.load_solution, self.load_forces = self.loads.combine(
                 join_load(constant, load, problem.traction_scale),
                 lambda: problem.apply(constant, load), self._solve_load,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, plastic_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
@@ -72,7 +72,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     """
     laws = problem.laws
     hold = Hold(problem)
-    modes = hold.apply(memory.modes, laws.gap, np.zeros(laws.count))
+    modes = follow_leaders(laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count)))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
     search = Search(MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED, laws.follows)
@@ -125,7 +125,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
-        modes = broadcast(problem.comm, hold.apply(chosen, pairs.g_n, plastic_slip(laws, pairs) - memory.slip, modes))
+        held = hold.apply(chosen, pairs.g_n, plastic_slip(laws, pairs) - memory.slip, modes)
+        modes = broadcast(problem.comm, follow_leaders(laws, held))
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
 
 
@@ -161,7 +162,7 @@ def _pivot(
         return None
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[group], sign[group] = found.modes.mode, found.modes.sign
-    return ModeState(mode[problem.laws.leader], sign[problem.laws.leader])
+    return follow_leaders(problem.laws, ModeState(mode, sign))
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

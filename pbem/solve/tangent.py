@@ -95,7 +95,7 @@ def select_states(
     """v (4 nodes, 2 s) of offsets of pairs (s,) along directions (s, 4, 2), and the pairs' own unknowns (2 s,)."""
     spread = np.zeros_like(law.tangent)
     spread[pairs] = directions
-    matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset)), load).matrix
+    matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
     unknowns = number_components(problem.mesh.pairs.slot[pairs])
     # The carriers' displacements are columns of their own: those of the pairs' unknowns are their states alone.
     return matrix[:, unknowns].toarray(), unknowns

@@ -141,7 +141,7 @@ def test_many_pairs_are_solved_by_columns_of_those_that_change_or_by_new_factors
         # Only some pairs change from one law to the next; the others have other slips, too.
         law, base, load = draw_law(problem, seed), draw_law(problem, 0), problem.evaluate_load(0, 0.2 * seed)
         kept = np.arange(count) % 3 > 0
-        law = Linearisation(np.where(kept[:, None, None], base.tangent, law.tangent), 1.5 * base.offset)
+        law = Linearisation(np.where(kept[:, None, None], base.tangent, law.tangent), 1.5 * base.offset, base.leader)
         constraints = problem.constrain(law, load)
         found = tangent.solve(constraints, load, law)
         assert found.checked == (number == 0 or (not allowed and seed != seeds[number - 1]))

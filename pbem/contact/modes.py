@@ -36,8 +36,8 @@ P_N, P_S, G_N, G_S = range(4)
 class Linearisation:
     """state = tangent @ (x_n, x_s) + offset, state ordered p_n, p_s, g_n, g_s: tangent (m, 4, 2), offset (m, 4).
 
-    leader (m,): the pair whose jump each pair has, itself but in the corner of a narrow wedge. There the unknowns are the
-    tractions that this takes, and the pair counts as being in the state of its leader.
+    leader (m,): the pair whose jump each pair has, itself but in the corner of a narrow wedge. There the unknowns are
+    the tractions that this takes, and the pair counts as being in the state of its leader.
     """
 
     tangent: Real

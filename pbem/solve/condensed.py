@@ -115,11 +115,12 @@ class CondensedTangent:
         problem = self.problem
         self.laws, self.load = None, None
         tangent = self._reference_tangent(law)
-        self.reference.form(problem.constrain(Linearisation(tangent, np.zeros(tangent.shape[:2]), law.leader), load).matrix)
+        none = np.zeros(tangent.shape[:2])
+        self.reference.form(problem.constrain(Linearisation(tangent, none, law.leader), load).matrix)
         self.bases = PairBases(tangent[self.varying], problem.traction_scale)
         complement = np.zeros_like(tangent)
         complement[self.varying] = self.bases.complement
-        states = problem.constrain(Linearisation(complement, np.zeros(tangent.shape[:2]), law.leader), load).matrix
+        states = problem.constrain(Linearisation(complement, none, law.leader), load).matrix
         self.columns = PairColumns(self.reference, states[:, self.unknowns], self.unknowns)
         self.effort.restart(self.reference.solver.seconds, problem.unknowns, limited=not self.few)
         if self.few:

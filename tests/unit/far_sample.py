@@ -28,10 +28,10 @@ PLATE = """
 young = 1.0e3
 poisson = 0.2
 [curves]
-bottom = { points = [[0, 0], [10, 0]], elements = 10 }
-right  = { points = [[10, 0], [10, 10]], elements = 10 }
-top    = { points = [[10, 10], [0, 10]], elements = 10 }
-left   = { points = [[0, 10], [0, 0]], elements = 10 }
+bottom = { points = [[0, 0], [10, 0]], elements = 10, grading = "both" }
+right  = { points = [[10, 0], [10, 10]], elements = 10, grading = "both" }
+top    = { points = [[10, 10], [0, 10]], elements = 10, grading = "both" }
+left   = { points = [[0, 10], [0, 0]], elements = 10, grading = "both" }
 [regions.plate]
 material = "plate"
 boundary = ["bottom", "right", "top", "left"]

@@ -52,9 +52,11 @@ def test_split_keeps_one_element_for_each_piece() -> None:
         a="points = [[0.01, 0.7], [0.01, 0]], elements = 8",
         b="points = [[0.02, 0], [0.5, 0.5]], elements = 8",
     )
-    model = build(text)
+    # Its grading is given: else the distance of the cracks would add elements.
+    eight, two = ("[[0, 0], [2, 0]], elements = " + count for count in ("8", '2, grading = "both"'))
+    model = build(change(text, (eight, eight + ', grading = "both"')))
     assert [leg.elements for leg in model.curves["bottom"].legs] == [1, 1, 6]
-    model = build(change(text, ("[[0, 0], [2, 0]], elements = 8", "[[0, 0], [2, 0]], elements = 2")))
+    model = build(change(text, (eight, two)))
     assert [leg.elements for leg in model.curves["bottom"].legs] == [1, 1, 1]
 
 

@@ -60,23 +60,24 @@ def test_the_response_tells_the_states_in_other_modes(text: str, kind: str) -> N
     random = np.random.default_rng(1)
     modes = ModeState(random.choice([STICK, SLIP], laws.count).astype(np.int8), random.choice([-1.0, 1.0], laws.count))
 
-    def solve(chosen: ModeState) -> tuple[object, object, np.ndarray]:
+    def solve(chosen: ModeState) -> tuple[object, object, object, np.ndarray]:
         law = linearise(
             laws, chosen, -np.ones(laws.count), memory.slip, memory, load.pressure, problem.traction_scale
         )  # fmt: skip
-        solved = tangent.solve(problem.constrain(law, load), load, law)
+        constraints = problem.constrain(law, load)
+        solved = tangent.solve(constraints, load, law)
         state = evaluate_pairs(problem.mesh, law, solved.unknowns)
-        return law, solved, np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
+        return constraints, law, solved, np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
 
     pairs = np.array([1, 2, 5, 8])
-    law, solved, before = solve(modes)
-    response = find_response(problem, tangent, load, law, solved, pairs)  # type: ignore[arg-type]
+    constraints, law, solved, before = solve(modes)
+    response = find_response(problem, tangent, constraints, load, law, solved, pairs)  # type: ignore[arg-type]
     units = np.array([response.traction_unit] * 2 + [response.length_unit] * 2)
     np.testing.assert_allclose(response.values * units, before[pairs], rtol=1e-12)
     other = replace(modes, mode=modes.mode.copy(), sign=modes.sign.copy())
     other.mode[pairs] = [OPEN, SLIP, STICK, OPEN]
     other.sign[pairs] = [1.0, -1.0, 1.0, 1.0]
-    _, _, after = solve(other)
+    *_, after = solve(other)
     # There are d for which the pairs' states are those of the other modes: eight numbers for sixteen states.
     change = (after[pairs] / units - response.values).ravel()
     matrix = response.change.reshape(16, 8)

@@ -41,7 +41,8 @@ def test_steps_without_a_change_of_modes_need_no_factors(
     # The load is proportional: the modes of the first step are those of all others.
     assert results.steps.iterations[1:].tolist() == [1] * (steps - 1)
     assert results.steps.iterations[0] > 1
-    assert 1 <= len(factorised) <= (1 if linear != "gmres" else results.steps.iterations[0])
+    # Once for the run, and once for the second solution that its errors are estimated from.
+    assert 1 <= len(factorised) <= 2 * (1 if linear != "gmres" else results.steps.iterations[0])
     whole = results.traction[-1]
     for step in range(steps):
         expected = (step + 1) / steps * whole

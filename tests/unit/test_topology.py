@@ -160,7 +160,9 @@ def test_inclusion_that_touches_a_side_with_a_corner_splits_it() -> None:
     )
     inclusion = '[regions.inclusion]\nmaterial = "soft"\nboundary = ["one", "two"]\n[boundary.bottom]'
     text = change(add_curves(SQUARE, curves), ('"left"]', '"left", "one", "two"]'), ("[boundary.bottom]", inclusion))
-    model = build(text)
+    # Two corners of 45 degrees with the side: its grading is given, else they would add elements.
+    side = "[[0, 0], [2, 0]], elements = 8"
+    model = build(change(text, (side, f'{side}, grading = "both"')))
     assert [leg.elements for leg in model.curves["bottom"].legs] == [4, 4]
     assert find_area(model, "body") == pytest.approx(4 - 0.25)
 

@@ -29,7 +29,8 @@ ROUNDING = 1e-9
 SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
-    "KI": "intensity", "KII": "intensity", "reactions": "force", "resultant": "force",
+    "KI": "intensity", "KII": "intensity", "T": "stress",
+    "reactions": "force", "resultant": "force", "J": "force",  # both per thickness: stress times length
     # Parts of the largest value, and of the sums of forces.
     **dict.fromkeys(("penetration", "tension", "cone", "relative", "carried"), "part"),
     **{f"relative_{kind}": "part" for kind in ("reactions", "jumps", "tractions", "factors", "displacement")},

@@ -149,7 +149,9 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
     behaviour: dict[str, Hashable] = {
-        name: (roles.outer[name], condition.frame, condition.known, condition.stiffness)
+        # A load that jumps is a change of condition, too.
+        name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,
+               tuple(stage.boundary.get(name, (0.0, 0.0)) for stage in loading.stages))
         for name, condition in loading.conditions.items()
     }
     behaviour |= {

@@ -77,8 +77,10 @@ class Wedges:
         ends = [0.0, bit / length]
         while True:
             following = ends[-1] * (1 + growth)
-            within = (places < following) & (places >= ends[1])
-            if following > 0.5 or following - ends[-1] > limits[within].min(initial=np.inf) * (1 + growth):
+            first, last = np.searchsorted(places, (ends[-1], following))
+            # The part in which the element begins reaches back to where less is allowed.
+            allowed = limits[first:last].min(initial=limits[first - 1] * (1 + growth))
+            if following > 0.5 or following - ends[-1] > allowed * (1 + 1e-9):
                 return ends
             ends.append(following)
 

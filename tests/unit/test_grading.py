@@ -30,8 +30,10 @@ def test_smooth_continuation_is_left_alone() -> None:
 def test_smooth_continuation_of_two_curves_with_one_kind_of_condition() -> None:
     curves = "top2 = { points = [[1, 2], [0, 2]], elements = 4 }"
     text = change(add_curves(SQUARE, curves), ("[[2, 2], [0, 2]]", "[[2, 2], [1, 2]]"), ('"left"]', '"left", "top2"]'))
-    model = build(text)
+    model = build(text + "[boundary.top2]\nty = -1.0\n")
     assert refined(model, "top") == [START] and refined(model, "top2") == [END]
+    jump = build(text)
+    assert refined(jump, "top") == [BOTH] and refined(jump, "top2") == [BOTH]
     held = build(text + "[boundary.top2]\nux = 0\n")
     assert refined(held, "top") == [BOTH] and refined(held, "top2") == [BOTH]
 
@@ -51,6 +53,7 @@ def test_line_that_goes_over_into_an_arc_is_smooth() -> None:
         ("top = { points = [[2, 2], [0, 2]]", "top = { points = [[1, 2], [0, 2]]"),
         ('"left"]', '"left", "fillet"]'),
     )
+    text = change(text, ("[boundary.top]\nty = -1.0\n", ""))
     model = build(add_curves(text, "fillet = { center = [1, 1], radius = 1, angles = [0, 90], elements = 8 }"))
     assert (
         refined(model, "right") == [START] and refined(model, "top") == [END] and refined(model, "fillet") == [NEITHER]

@@ -1,0 +1,141 @@
+"""Where the program divides curves anew: notes, limits, what it leaves alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pbem.contact.laws import collect_laws
+from pbem.errors import CaseError
+from pbem.mesh.generate import generate_mesh
+from pbem.model.build import parse_model
+from pbem.model.model import Model
+
+PLANE = """
+[materials]
+rock = {{ young = 1000.0, poisson = 0.25 }}
+[curves]
+{curves}
+[regions]
+plane = {{ material = "rock", infinite = true, cracks = [{names}] }}
+[remote]
+syy = -1.0
+sxy = 0.5
+"""
+
+
+def build(scale: float = 1.0, **curves: str) -> Model:
+    """A plane with cracks: points as text, multiplied by a scale, with further keys."""
+    lines = []
+    for name, text in curves.items():
+        points, keys = text.split(";")
+        scaled = [[float(part) * scale for part in point.split(",")] for point in points.split()]
+        lines.append(f"{name} = {{ points = {scaled}, {keys} }}")
+    names = ", ".join(f'"{name}"' for name in curves)
+    return parse_model(PLANE.format(curves="\n".join(lines), names=names))[1]
+
+
+def lengths(model: Model, name: str) -> np.ndarray:
+    return np.concatenate([leg.length * np.diff(leg.element_fractions()) for leg in model.curves[name].legs])
+
+
+def find_note(model: Model, start: str) -> str:
+    (note,) = [note for note in model.notes if note.startswith(start)]
+    return note
+
+
+def test_curves_far_from_each_other_keep_their_elements() -> None:
+    model = build(a="0,0 1,0; elements = 8", b="0,0.5 1,0.5; elements = 8")
+    assert np.allclose(lengths(model, "a"), 1 / 8, rtol=1e-14)
+    assert all(leg.fractions is None for curve in model.curves.values() for leg in curve.legs)
+    assert not any("Elements" in note for note in model.notes)
+
+
+def test_lengths_are_at_most_twice_the_distance() -> None:
+    model = build(a="0,0 1,0; elements = 8", b="0,0.02 1,0.02; elements = 8")
+    for name in "ab":
+        assert 0.9 * 0.04 < lengths(model, name).max() <= 0.04 * (1 + 1e-9)
+    assert "'a' 8 to " in find_note(model, "Elements added near other faces")
+
+
+@pytest.mark.parametrize("scale", [1e-6, 3.0, 1e7])
+def test_meshes_do_not_depend_on_the_unit_of_length(scale: float) -> None:
+    curves = {"a": "0,0 1,0; elements = 6", "b": "0,0 0.9,0.1; elements = 6", "c": "0.4,-0.03 1,-0.2; elements = 6"}
+    one, other = build(**curves), build(scale, **curves)
+    for name in curves:
+        np.testing.assert_allclose(lengths(other, name), scale * lengths(one, name), rtol=1e-9)
+
+
+def test_both_sides_of_a_wedge_are_divided_alike_and_geometrically() -> None:
+    model = build(a="0,0 1,0; elements = 6", b="0,0 2,0.3; elements = 9")
+    angle = math.atan2(0.3, 2)
+    a, b = lengths(model, "a"), lengths(model, "b")
+    np.testing.assert_allclose(a[:15], b[:15], rtol=1e-9)
+    np.testing.assert_allclose(a[2:15] / a[1:14], 1 + 2 * math.sin(angle), rtol=1e-9)
+    assert "8.53 degrees from 'b'" in find_note(model, "Tied to the contact status")
+
+
+def test_pairs_in_the_last_bit_follow_the_pair_next_to_them() -> None:
+    model = build(a="0,0 1,0; elements = 6", b="0,0 2,0.3; elements = 9")
+    mesh = generate_mesh(model)
+    laws = collect_laws(model, mesh)
+    bit = lengths(model, "a")[0]
+    within = np.abs(mesh.pairs.position) < bit
+    assert within.sum() == 6
+    np.testing.assert_array_equal(laws.follows, within)
+    own = mesh.pairs.interface[laws.leader] == mesh.pairs.interface
+    assert own.all() and not laws.follows[laws.leader].any()
+
+
+def test_wide_corners_are_no_wedges() -> None:
+    model = build(a="0,0 1,0; elements = 6", b="0,0 0,1; elements = 6")
+    assert not model.ties and not any("Tied" in note for note in model.notes)
+
+
+def test_elements_beside_a_tip_are_nearly_equal_whatever_the_grading() -> None:
+    model = build(a='0,0 1,0; elements = 12, grading = "both", power = 6.0')
+    own = lengths(model, "a")
+    assert own[0] > 1e-3 and (own[1:4] / own[:3] < 1.8).all()
+    model = build(a="0,0 0.99,0; elements = 8", b="0.99,0 1,0; elements = 8")
+    assert lengths(model, "b") == pytest.approx(0.01 / 8)
+    # At the distance s from the tip lengths are its element's and half of s.
+    assert lengths(model, "a")[-1] < 0.01 / 8 + 0.5 * (0.01 + 0.01 / 2)
+
+
+def test_a_grading_that_is_given_is_kept_and_said_to_be_too_long() -> None:
+    model = build(a='0,0 1,0; elements = 8, grading = "none"', b="0,0.02 1,0.02; elements = 8")
+    assert np.allclose(lengths(model, "a"), 1 / 8)
+    note = find_note(model, "Elements are longer than the distance to other faces allows")
+    assert "'a' up to 3.1 times" in note
+
+
+def test_curves_that_all_but_coincide_are_refused() -> None:
+    with pytest.raises(CaseError) as error:
+        build(a="0,0 1,0; elements = 8", b="0,1e-6 1,1e-6; elements = 8")
+    (fault,) = error.value.faults
+    assert "'a' and 'b'" in fault.found or "'b' and 'a'" in fault.found
+    assert "at a distance of 1e-06" in fault.found
+
+
+def test_a_jump_of_a_prescribed_traction_is_refined() -> None:
+    text = """
+[materials]
+rock = { young = 1000.0, poisson = 0.25 }
+[curves]
+bottom = { points = [[0, 0], [2, 0]], elements = 8 }
+right = { points = [[2, 0], [2, 2]], elements = 8 }
+loaded = { points = [[2, 2], [1, 2]], elements = 8 }
+free = { points = [[1, 2], [0, 2]], elements = 8 }
+left = { points = [[0, 2], [0, 0]], elements = 8 }
+[regions]
+body = { material = "rock", boundary = ["bottom", "right", "loaded", "free", "left"] }
+[boundary]
+bottom = { ux = 0.0, uy = 0.0 }
+loaded = { ty = -1.0 }
+"""
+    _, model = parse_model(text)
+    assert model.curves["loaded"].legs[0].refine_end and model.curves["free"].legs[0].refine_start
+    _, same = parse_model(text.replace("loaded = { ty = -1.0 }", "loaded = { ty = -1.0 }\nfree = { ty = -1.0 }"))
+    assert not same.curves["loaded"].legs[0].refine_end

@@ -181,6 +181,17 @@ def test_a_loose_inclusion_under_tension_is_held_by_friction(solve: Solve) -> No
     np.testing.assert_allclose(shear[slips], 0.3 * pressure[slips] * np.sign(slip[slips]), atol=1e-9 * largest)
 
 
+# Places
+
+def test_weight_far_from_the_origin(solve: Solve) -> None:
+    far = solve("gravity_far_from_origin")
+    centred = (("1000, -1000", "0, 0"), ("-1002", "-2"), ("1002", "2"), ("-998", "2"), ("998", "-2"))
+    near = solve("gravity_far_from_origin", *centred)
+    for given, expected in ((far.hoop_stress, near.hoop_stress), (far.displacement, near.displacement)):
+        np.testing.assert_allclose(given[-1], expected[-1], rtol=0, atol=1e-9 * np.abs(expected[-1]).max())
+    assert far.energy.elastic[-1] == pytest.approx(near.energy.elastic[-1], rel=1e-9)
+
+
 # Cohesion without tensile strength
 
 def test_a_field_of_cohesive_cracks_under_tension_settles(solve: Solve) -> None:

@@ -9,6 +9,9 @@ from itertools import count
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pbem.contact.strength import read_checked_model
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
@@ -78,7 +81,7 @@ def run(
             with petsc_options(options):
                 _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement)
             results = open_results(target)
-            for note in compare_release(results):
+            for note in compare_release(results) if world.rank == 0 else ():
                 watch.note(note)
             return results
     except StopError as error:
@@ -150,7 +153,6 @@ def _solve(
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     writer = do_on_first(world, PbemError, open_writer, share=False)
     last: Step | None = broadcast(world, writer.last_step if writer else None)
-    decision: Decision | None = None
     try:
         signals.at_once = world.size == 1
         problem = assemble_problem(model, mesh, world)
@@ -169,23 +171,46 @@ def _solve(
             watch.check()  # a law that failed has answered with no strength
             raise
         estimator.destroy()
-        if writer:
-            for note in estimator.list_notes():
-                watch.note(note)
-            decision = decide(model, mesh, writer.relative_errors, estimator, one)
-        decision = broadcast(world, decision)
-        assert decision is not None
+        for note in estimator.list_notes() if writer else ():
+            watch.note(note)
+        decision: Decision = do_on_first(
+            world, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
+        )
         for note in decision.notes:
             watch.note(note)
         if decision.failure:
             raise ConvergenceError("accuracy", decision.failure)
-        do_on_first(world, PbemError, lambda: writer.finish() if writer else None)
+        do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
     except BaseException as error:
         if writer:
             writer.__exit__(type(error), error, error.__traceback__)
         raise
     world.Barrier()
     return decision
+
+
+def _check(writer: ResultWriter | None) -> ResultWriter:
+    assert writer is not None, "the first rank writes"
+    return writer
+
+
+def _end_pass(writer: ResultWriter, decision: Decision) -> None:
+    """What is not accurate yet is not finished."""
+    if decision.marked is None:
+        writer.finish()
+    else:
+        writer.fail("accuracy", "a finer mesh was to follow", "stopped")
+
+
+def _append(
+    writer: ResultWriter | None, step: Step, rows: Mapping[str, NDArray[np.float64]] | None, missing: str
+) -> tuple[str, ...]:
+    if writer is None:
+        return ()
+    notes = writer.append(step, rows)
+    if missing:
+        writer.note_missing(missing)
+    return notes
 
 
 def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:
@@ -215,14 +240,13 @@ def store_steps(
                 step = replace(step, interior=interior.evaluate(step))
             rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
+            missing = "" if estimator is None else estimator.missing
             notes = do_on_first(
                 world, PbemError,
-                lambda due=step, rows=rows: writer.append(due, rows) if writer else (),  # type: ignore[misc]
+                lambda due=step, rows=rows, missing=missing: _append(writer, due, rows, missing),  # type: ignore[misc]
             )
             for note in notes:
                 (listener or SilentReporter()).note(note)
-            if writer and estimator is not None and estimator.missing:
-                writer.note_missing(estimator.missing)
     except ConvergenceError:
         # All ranks are here together: the last step reached is stored as well.
         if interior is not None and waiting is not None:

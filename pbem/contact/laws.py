@@ -145,13 +145,15 @@ def _find_leaders(model: Model, mesh: Mesh) -> Integer:
     pairs = mesh.pairs
     leader = np.arange(pairs.count)
     tied = np.zeros(pairs.count, dtype=bool)
-    curves = [joint.first if isinstance(joint, Contact) else joint.name
-              for joint in (find_joint(model, name) for name in mesh.interface_names)]
-    numbers = {curve: number for number, curve in enumerate(curves)}
-    bounds = np.searchsorted(pairs.interface, np.arange(len(curves) + 1))
+    numbers: dict[str, int] = {}
+    for number, name in enumerate(mesh.interface_names):
+        joint = find_joint(model, name)
+        numbers |= dict.fromkeys((joint.first, joint.second) if isinstance(joint, Contact) else (name,), number)
+    bounds = np.searchsorted(pairs.interface, np.arange(len(mesh.interface_names) + 1))
     own = [(np.arange(*bounds[numbers[tie.curve]:][:2]), tie) for tie in model.ties if tie.curve in numbers]
     for at, tie in own:
-        tied[at] |= (pairs.arc_length[at] > tie.start) & (pairs.arc_length[at] < tie.end)
+        # By place: the pairs of a contact lie on either of its curves.
+        tied[at] |= np.abs(pairs.position[at] - tie.corner) < tie.end - tie.start
     for at, _ in own:
         free, bound = at[~tied[at]], at[tied[at]]
         if len(free):

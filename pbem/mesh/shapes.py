@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 
 
+@cache
 def place_nodes(order: int) -> Real:
-    """Coordinates in (-1, 1) of the order + 1 collocation nodes: the Gauss points."""
+    """Coordinates in (-1, 1) of the order + 1 collocation nodes: the Gauss points; read-only."""
     nodes: Real = legendre.leggauss(order + 1)[0]
+    nodes.flags.writeable = False
     return nodes
 
 

@@ -131,7 +131,10 @@ def _divide(field: LengthField) -> tuple[Cells, Real, Excess | None]:
         if total + np.count_nonzero(~measured.final) > most:
             worst = int(np.argmin(np.where(measured.final | (measured.nearest < 0), np.inf, measured.distance)))
             names = field.surroundings.curve
-            one, other = names[cells.leg[worst]], names[measured.nearest[worst]]
+            if measured.nearest[worst] < 0:  # what adds elements is a tip
+                worst = int(np.argmin(np.where(measured.final, np.inf, allowed)))
+            one = names[cells.leg[worst]]
+            other = names[measured.nearest[worst]] if measured.nearest[worst] >= 0 else one
             return cells, allowed, Excess(one, other, float(measured.distance[worst]), float(allowed[worst]))
         done.append((cells.select(measured.final), measured.allowed[measured.final]))
         cells = cells.select(~measured.final).halve()

@@ -75,25 +75,29 @@ def describe_results(results: Results) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
+# A relative error of this is rounding.
+NOTHING = 1e-13
 # Kinds of estimated errors as they are called.
 ERROR_NAMES = {"reactions": "reactions", "jumps": "slips and openings", "tractions": "tractions", "factors": "K"}
 
 
 def describe_errors(results: Results) -> list[str]:
-    """The estimated errors of the last stored step: relative ones in a line, then the largest of each interface."""
+    """Estimated errors: relative ones of the worst stored step in a line, then the interfaces' of the last step."""
     errors = results.errors
-    relative = {name: errors.relative[kind][-1] for kind, name in ERROR_NAMES.items() if kind in errors.relative}
+    worst_step = {kind: float(np.max(values)) for kind, values in errors.relative.items()}
+    relative = {name: worst_step[kind] for kind, name in ERROR_NAMES.items() if kind in worst_step}
     present = {
         "reactions": bool(errors.reactions), "slips and openings": bool(errors.slip),
         "tractions": bool(errors.traction_n), "K": bool(errors.KI),
     }  # fmt: skip
-    shown = {name: value for name, value in relative.items() if present[name]}
-    if not shown and "displacement" in errors.relative:
-        shown = {"displacements": errors.relative["displacement"][-1]}
+    # What vanishes by symmetry or balance says nothing.
+    shown = {name: value for name, value in relative.items() if present[name] and not value <= NOTHING}
+    if not shown and "displacement" in worst_step:
+        shown = {"displacements": worst_step["displacement"]}
     if errors.missing and not any(np.isfinite(value) for value in shown.values()):
         return [f"none: {errors.missing}"]
     lines = [
-        ", ".join(f"{name} {value:.1e}" for name, value in shown.items()) + " of the largest in the model so far"
+        ", ".join(f"{name} {value:.1e}" for name, value in shown.items()) + " of the largest in the model, at most"
     ]
     if len(errors.slip) > MOST_ERRORS:
         return lines

@@ -42,7 +42,7 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         if before.get(name) != text and text not in before.values():
             raise ResultFileError(path, f"was computed with another text of the law {name}; run without resuming, or "
                                         "name another output file")
-    if "all" not in file:
+    if "all" not in file or "estimates" not in file:
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     if model.crack_tips and not set(TIP_DATASETS) <= set(file["all/tips"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")

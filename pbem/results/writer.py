@@ -165,14 +165,17 @@ class ResultWriter:
             self._store(step)
         else:
             self._pending = step
-        try:
-            self._storage.commit()
-        except OSError as error:
-            raise StorageError(str(self.path), f"no room for step {step.number} ({error.strerror or error})") from error
+        self._commit(f"step {step.number}")
         notes = [] if self._balance.runaway is None else [describe_runaway(step, self._balance.runaway)]
         if step.last_of_stage and step.stage == len(self._model.stages) - 1:
             notes += describe_sparse_contacts(self._model, self._mesh, step.contact.mode)
         return tuple(notes)
+
+    def _commit(self, what: str) -> None:
+        try:
+            self._storage.commit()
+        except OSError as error:
+            raise StorageError(str(self.path), f"no room for {what} ({error.strerror or error})") from error
 
     def complete(self, interior: Interior) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""
@@ -214,14 +217,14 @@ class ResultWriter:
         """Say in the file why errors are not estimated."""
         if self._file["estimates"].attrs["missing"] != reason:
             self._file["estimates"].attrs["missing"] = reason
-            self._storage.commit()
+            self._commit("a note")
 
     @property
     def relative_errors(self) -> dict[str, NDArray[np.float64]]:
         """The estimated relative errors (k,) of the steps stored so far, by kind."""
         if self._pending is not None:
             self._store(self._pending)
-            self._storage.commit()
+            self._commit("the last step")
         group = self._file["estimates"]
         return {name.removeprefix("relative_"): group[name][...] for name in group if name.startswith("relative_")}
 

@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
-# anchors hold it, and that make a result wrong.
+# anchors hold it, and that make a result wrong, where they are more than NOTED of those on the most loaded region too.
 NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
@@ -63,7 +63,8 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
         for motions in group_motions(support.motions):
             own, part = _measure_carried(problem, motions, middle, (force, moment), (forces, moments))
             carried[own] = np.maximum(carried[own], part)
-    return Balance(np.stack([force.real, force.imag, moment], axis=1), relative, carried)
+    weight = _divide(forces, np.full(count, forces.max()))
+    return Balance(np.stack([force.real, force.imag, moment], axis=1), relative, carried, weight)
 
 
 def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
@@ -109,7 +110,8 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
 
     Raises ConvergenceError ("not in balance") where it makes the result wrong.
     """
-    worst = int(np.argmax(balance.relative))
+    wrong = (balance.relative > NOT_IN_BALANCE) & (balance.relative * balance.weight > NOTED)
+    worst = int(np.argmax(np.where(wrong, balance.relative, 0.0) if wrong.any() else balance.relative))
     amount = float(balance.relative[worst])
     if amount <= NOTED:
         return None
@@ -122,6 +124,6 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
     held = float(balance.carried[worst])
     if held > NOTED:
         left += ", which nothing but the condition on its mean motion carries"
-    if amount > NOT_IN_BALANCE:
+    if wrong.any():
         raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
     return left

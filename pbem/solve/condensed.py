@@ -100,11 +100,12 @@ class CondensedTangent:
         for _ in range(1 + MOST_CORRECTIONS):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load)
-            residual = problem.measure(left) / size_residual(scale, unknowns)
+            left_over = problem.measure(left)
+            residual = left_over / size_residual(scale, unknowns)
             if best is not None and not residual < best.residual:
                 break
             best = Solved(unknowns, v, residual)
-            if residual <= GOOD_RESIDUAL or not np.isfinite(residual):
+            if left_over <= GOOD_RESIDUAL * scale or not np.isfinite(residual):
                 break
             unknowns = unknowns + self._condense(self._solve_system(-left), split)[0]
         assert best is not None

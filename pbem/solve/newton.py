@@ -24,7 +24,7 @@ from pbem.contact.modes import (
 )
 from pbem.contact.subset import Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
-from pbem.parallel import broadcast, do_on_first
+from pbem.parallel import do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
 from pbem.solve.problem import Problem
@@ -72,7 +72,9 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     """
     laws = problem.laws
     hold = Hold(problem)
-    modes = follow_leaders(laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count)))
+    comm = problem.comm
+    modes = do_on_first(comm, ConvergenceError, lambda: follow_leaders(
+        laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
     search = Search(MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED, laws.follows)
@@ -90,7 +92,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
                 solved = tangent.check(solved, constraints, load, law)
                 outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
         except ConvergenceError:
-            hold.refuse_free_motion(modes)
+            do_on_first(comm, ConvergenceError, lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
         fails, cascade = outcome.settled and bool(outcome.failing.any()), None
@@ -109,8 +111,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         if driven:
             search.restart()
         elif outcome.settled and not fails:
-            hold.refuse_free_motion(modes)
-            for note in hold.describe(modes):
+            do_on_first(comm, ConvergenceError, lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         search.note(proposal)
@@ -125,15 +127,20 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             chosen = limit_changes(modes, proposal, search.caution.share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
-        held = hold.apply(chosen, pairs.g_n, plastic_slip(laws, pairs) - memory.slip, modes)
-        modes = broadcast(problem.comm, follow_leaders(laws, held))
+        slipped = plastic_slip(laws, pairs) - memory.slip
+        modes = do_on_first(
+            comm, ConvergenceError,
+            lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
+                laws, hold.apply(new, at.g_n, slipped, now)),
+        )
         normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
 
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
-    """The error of a search that does not settle, with the truest reason that is known."""
-    free = hold.describe_free_motion(proposal.modes)
-    return free or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)
+    """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
+    return do_on_first(hold.problem.comm, ConvergenceError, lambda: (
+        hold.describe_free_motion(proposal.modes)
+        or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))
 
 
 def _pivot(

@@ -152,3 +152,6 @@ def test_what_is_left_over_is_measured(tmp_path: Path) -> None:
     assert "region 'b1'" in str(describe_imbalance(problem, worse))
     with pytest.raises(ConvergenceError, match="not in balance: the forces on region 'b1'"):
         describe_imbalance(problem, replace(left, relative=100 * left.relative))
+    # Of a body that hardly carries anything beside the others it is no more than a note.
+    light = replace(left, relative=100 * left.relative, weight=np.array([1.0, 1e-3, 1.0]))
+    assert "region 'b1'" in str(describe_imbalance(problem, light))

@@ -23,13 +23,15 @@ Stress = tuple[float, float, float]
 class Background:
     """remote, initial: uniform stresses sxx, syy, sxy, with and without the displacement of their strain.
 
-    force: body force per volume, complex.
+    force: body force per volume, complex. center: where its stress and its displacement vanish. Any will do, as fields
+    of uniform pressure obey the integral equations too; one in the region keeps rounding as small as the region.
     """
 
     material: Material
     remote: Stress = (0.0, 0.0, 0.0)
     initial: Stress = (0.0, 0.0, 0.0)
     force: complex = 0.0
+    center: complex = 0.0
 
     @property
     def is_zero(self) -> bool:
@@ -38,19 +40,19 @@ class Background:
     def displacement(self, point: Complex) -> Complex:
         """Displacement (complex) at points: of the remote strain about the origin, and of gravity.
 
-        Gravity's stress is isotropic, -(b . x), so that its displacement is an analytic function of the point.
+        Gravity's stress is isotropic, -(b . (x - center)), so that its displacement is an analytic function of x.
         """
         kappa, shear_modulus = self.material.kappa, self.material.shear_modulus
         sxx, syy, sxy = self.remote
         mean, deviator = 0.5 * (sxx + syy), 0.5 * (syy - sxx) + 1j * sxy
         linear = 0.5 * (kappa - 1) * mean * point - np.conj(deviator * point)
-        weight = -0.25 * (kappa - 1) * np.conj(self.force) * point**2
+        weight = -0.25 * (kappa - 1) * np.conj(self.force) * (point - self.center) ** 2
         return (linear + weight) / (2 * shear_modulus)
 
     def stress(self, point: Complex) -> Real:
         """sxx, syy, sxy (n, 3) at points."""
         uniform = np.add(self.remote, self.initial)
-        isotropic = -(self.force.real * point.real + self.force.imag * point.imag)
+        isotropic = -(np.conj(self.force) * (point - self.center)).real
         return uniform + isotropic[:, None] * np.array([1.0, 1.0, 0.0])
 
     def traction(self, point: Complex, normal: Complex) -> Complex:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.background import Background
 from pbem.mesh.mesh import Mesh
+from pbem.model.loop import loop_legs
 from pbem.model.model import Model, Region, Stage
 
 Real = NDArray[np.float64]
@@ -114,7 +115,15 @@ def _sample(mesh: Mesh, backgrounds: Sequence[Background]) -> Complex:
 def balanced_background(model: Model, region: Region, gravity: complex) -> Background:
     """In-situ stress and weight of a region."""
     initial = model.initial_stress.get(region.material.name, (0.0, 0.0, 0.0))
-    return Background(region.material, initial=initial, force=region.material.density * gravity)
+    force = region.material.density * gravity
+    return Background(region.material, initial=initial, force=force, center=_find_center(model, region) if force else 0)
+
+
+def _find_center(model: Model, region: Region) -> complex:
+    """The middle of the points at which the legs of a finite region's boundary begin and end."""
+    points = [point for leg in loop_legs(model.curves, region.loops) for point in (leg.start, leg.end)]
+    x, y = [point.real for point in points], [point.imag for point in points]
+    return complex(0.5 * (min(x) + max(x)), 0.5 * (min(y) + max(y)))
 
 
 def far_background(region: Region, remote: Real) -> Background:

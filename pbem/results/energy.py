@@ -136,7 +136,7 @@ class EnergyBalance:
         self._by_region = np.argsort(self._faces.region, kind="stable")
         self._bounds = np.searchsorted(self._faces.region[self._by_region], np.arange(len(model.regions) + 1))
         self._forces = [
-            self._refer(number, [Background(each.material, force=force) for force in (1, 1j)])
+            self._refer(number, [Background(each.material, force=force) for force in (1, 1j)], within=True)
             for number, each in enumerate(model.regions) if each.material.density and not each.infinite
         ]  # fmt: skip
         self._stresses = [
@@ -257,9 +257,12 @@ class EnergyBalance:
     def _find_faces(self, region: int) -> Integer:
         return self._by_region[self._bounds[region]:self._bounds[region + 1]]
 
-    def _refer(self, region: int, fields: Sequence[Background]) -> _Reference:
+    def _refer(self, region: int, fields: Sequence[Background], within: bool = False) -> _Reference:
+        """Fields about the origin, or about a point `within` a finite region, where rounding is smallest."""
         faces = self._find_faces(region)
         z, n = self._faces.position[faces], self._faces.normal[faces]
+        if within:
+            z = z - z.mean()
         # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
         second_moment = 0.5 * (self._weight[faces] * n * z**2 * np.conj(z)).sum()
         return _Reference(

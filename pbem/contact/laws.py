@@ -220,6 +220,11 @@ def resists_slip(laws: PairLaws) -> Bool:
     return resists
 
 
+def is_linear(laws: PairLaws) -> bool:
+    """Whether all friction bounds are linear in the normal traction alone, as Coulomb's."""
+    return all(group.law is coulomb for group in laws.strengths)
+
+
 def start_memory(laws: PairLaws) -> Memory:
     """Before any load closed pairs stick, or slip if nothing resists; pairs with a gap are open."""
     is_open = laws.parted | (laws.gap > 0) & ~laws.bonded

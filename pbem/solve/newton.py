@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, plastic_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, is_linear, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
@@ -77,7 +77,10 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    search = Search(MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED, laws.follows)
+    most_pivoted = MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED
+    # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
+    # is followed by Newton's steps with the bound of the last iteration.
+    search = Search(most_pivoted if is_linear(laws) else 0, laws.follows)
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -100,7 +103,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             floor = _find_floor(problem, solved)
             cascade = run_cascade(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
-                search.most_pivoted,
+                most_pivoted,
             )
             memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal

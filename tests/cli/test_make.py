@@ -49,7 +49,7 @@ def test_inclusions_can_be_run(capsys: Capture) -> None:
     given = ["--count", "2", "--elements", "8", "--friction", "0.5", "--order", "1"]
     for place in ([], ["--plate", "6", "--plate-elements", "4"]):
         assert main(["make", "inclusions", "-o", "few.toml", "--force", *given, *place]) == 0
-        assert main(["run", "few.toml", "--quiet"]) == 0
+        assert main(["run", "few.toml", "--quiet", "--force"]) == 0
     capsys.readouterr()
     assert main(["info", "few.h5"]) == 0
     assert "inclusion_2" in capsys.readouterr().out

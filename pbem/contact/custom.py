@@ -7,7 +7,8 @@ keeps what went wrong and answers with no strength, until all ranks ask together
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +103,18 @@ def _judge(name: str, values: Real, p_n: Real, slip: Real) -> str:
 def read_law_texts(files: Iterable[str | None]) -> dict[str, str]:
     """The contents of law files, by path. Raises OSError or ValueError if one is no text."""
     return {file: Path(file).read_text(encoding="utf-8") for file in dict.fromkeys(files) if file is not None}
+
+
+@contextmanager
+def asked_by_one_rank(laws: Iterable[Callable[..., Strength]]) -> Iterator[None]:
+    """Within it what laws answer is not compared with other ranks, which do not ask."""
+    custom = [law for law in laws if isinstance(law, CustomLaw)]
+    before = [law.sums.copy() for law in custom]
+    try:
+        yield
+    finally:
+        for law, sums in zip(custom, before, strict=True):
+            law.sums[:] = sums
 
 
 def find_fault(laws: Iterable[Callable[..., Strength]]) -> str:

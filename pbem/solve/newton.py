@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, is_linear, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
@@ -202,14 +203,17 @@ def _judge(
 ) -> _Outcome:
     """By the first rank: another could come to other modes where rounding decides."""
 
+    laws = problem.laws
+
     def judge() -> _Outcome:
-        laws = problem.laws
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
         floor = _find_floor(problem, solved)
-        proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
-        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
+        with asked_by_one_rank(group.law for group in laws.strengths):
+            proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
+            law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
+            failing = find_failures(laws, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-        return _Outcome(pairs, proposal, settled, find_failures(laws, pairs, memory, load.pressure, floor))
+        return _Outcome(pairs, proposal, settled, failing)
 
     return do_on_first(problem.comm, ConvergenceError, judge)
 

@@ -50,8 +50,10 @@ class Body:
             count = self.elements if isinstance(self.elements, int) else self.elements[name]
             if name in self.circles:
                 center, radius = complex(points[0]), float(np.real(points[1]))
+                # A circle has no corners to be refined; "none": the elements asked for, whatever is near.
                 shape = f"center = {_pair(center)}, radius = {radius!r}"
-                lines.append(f'{name} = {{ {shape}, elements = {count}, grading = "{self.grading}" }}')
+                grading = "none" if self.grading == "none" else "auto"
+                lines.append(f'{name} = {{ {shape}, elements = {count}, grading = "{grading}" }}')
                 continue
             vertices = ", ".join(_pair(complex(point)) for point in points)
             counts = [count] * (len(points) - 1)

@@ -26,7 +26,7 @@ for case in sys.argv[2:]:
 ROUNDING = 1e-9
 
 # As much more in derivatives of displacements along elements that are far shorter than the model (as the T-stress is).
-DERIVED = 10
+DERIVED = 100
 
 # What belongs together has one scale: a field that vanishes but for rounding has none of its own.
 SCALES = {

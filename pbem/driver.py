@@ -218,6 +218,8 @@ def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estim
     beside, second, missing = None, None, ""
     try:
         beside = put_beside(model, mesh)
+        if beside is not None:  # it has fewer nodes, perhaps fewer than there are ranks
+            check_shares(beside.model, beside.mesh, world.size)
         second = None if beside is None else SecondSolution(beside, world, start)
         missing = NOTHING_COARSER if beside is None else ""
     except PbemError as error:

@@ -50,7 +50,7 @@ class CondensedTangent:
         self.laws: Real | None = None  # the laws' tangents in the reference (m, 4, 2)
         self.loads = LoadBasis(problem.unknowns, self.reference.rows)
         self.load: Load | None = None
-        self.effort = Effort(problem.comm)
+        self.effort = Effort(problem.comm.size)
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """See AnyTangent. The first solution after a factorisation is checked, others are not."""
@@ -73,7 +73,7 @@ class CondensedTangent:
         if not self.effort.allows(2 * len(missing), 2 * len(changed)) and self._can_refer_better(law):
             return False
         if len(missing):
-            self.effort.measure(2 * len(missing), lambda: self.columns.add(missing))
+            self.columns.add(missing)
         return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
@@ -123,7 +123,7 @@ class CondensedTangent:
         complement[self.varying] = self.bases.complement
         states = problem.constrain(Linearisation(complement, none, law.leader), load).matrix
         self.columns = PairColumns(self.reference, states[:, self.unknowns], self.unknowns)
-        self.effort.restart(self.reference.solver.seconds, problem.unknowns, limited=not self.few)
+        self.effort.restart(self.reference.solver.work, limited=not self.few)
         if self.few:
             self.columns.add(np.arange(len(self.varying)))
         self.loads.renew(self._solve_load)
@@ -200,7 +200,8 @@ class CondensedTangent:
         own = np.searchsorted(self.varying, pairs)
         missing = np.setdiff1d(own, self.columns.known)
         if len(missing):
-            self.effort.measure(2 * len(missing), lambda: self.columns.add(missing))
+            self.effort.count_columns(2 * len(missing))
+            self.columns.add(missing)
         known = self.columns.known
         along = self.bases.inverse[own] @ (directions / self.bases.units[:, None])
         found: Real | None = None

@@ -1,14 +1,23 @@
-"""Whether to go on with old factors or to make new ones: by measured seconds, the same on all ranks."""
+"""Whether to go on with old factors or to make new ones: by counted operations, so that equal runs decide alike."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
+from dataclasses import dataclass
 
-from mpi4py import MPI
+# Operations of the small dense system's factors are done by one rank, and in smaller blocks.
+SMALL = 2.0
 
-# Of a small dense factorisation on one rank, operations in a second: a low estimate.
-DENSE_RATE = 1e10
+
+@dataclass(frozen=True)
+class Work:
+    """What factors have cost and what is done with them costs, in operations of a large LU factorisation.
+
+    factors: to form and factorise the operator; column: one of many columns solved for; iteration: one of GMRES.
+    """
+
+    factors: float
+    column: float
+    iteration: float
 
 
 class Effort:
@@ -17,29 +26,23 @@ class Effort:
     Never more than twice the best is spent in this way, whatever the modes are going to do.
     """
 
-    def __init__(self, comm: MPI.Intracomm) -> None:
-        self.comm = comm
-        self.restart(0.0, 1, limited=False)
+    def __init__(self, ranks: int) -> None:
+        self.ranks = ranks
+        self.restart(Work(0.0, 0.0, 0.0), limited=False)
 
-    def restart(self, factorisation: float, unknowns: int, limited: bool) -> None:
-        """New factors are there, in so many seconds; limited: they may be replaced."""
-        self.factorisation, self.limited = factorisation, limited
-        self.column_seconds = 3.0 * factorisation / unknowns  # 2 n^2 operations beside 2/3 n^3
+    def restart(self, work: Work, limited: bool) -> None:
+        """New factors are there; limited: they may be replaced."""
+        self.work, self.limited = work, limited
         self.spent = 0.0
 
     def allows(self, columns: int, size: int) -> bool:
         """Whether so many columns and a dense system of such a size may be spent; then they are."""
-        cost = columns * self.column_seconds + 2 / 3 * size**3 / DENSE_RATE
-        if self.limited and self.spent + cost > self.factorisation:
+        cost = columns * self.work.column + 2 / 3 * SMALL * self.ranks * size**3
+        if self.limited and self.spent + cost > self.work.factors:
             return False
         self.spent += cost
         return True
 
-    def measure(self, columns: int, compute: Callable[[], None]) -> None:
-        """Compute columns, and remember their time for the next ones."""
-        begin = time.perf_counter()
-        compute()
-        seconds = self.comm.allreduce(time.perf_counter() - begin, op=MPI.MAX)
-        self.spent += seconds - columns * self.column_seconds
-        if columns >= 32:  # fewer tell more of the call than of the columns
-            self.column_seconds = seconds / columns
+    def count_columns(self, columns: int) -> None:
+        """So many columns are computed whatever they cost."""
+        self.spent += columns * self.work.column

@@ -26,7 +26,7 @@ LEAST_ITERATIONS, MOST_ITERATIONS = 4, 100
 class FactoredTangent:
     """The operator of the present modes, solved by GMRES with the factors of the same or of earlier modes.
 
-    Old factors are kept until the further iterations with them have taken as long as new factors would.
+    Old factors are kept until the further iterations with them have taken as many operations as new factors would.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -34,8 +34,7 @@ class FactoredTangent:
         method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
         self.reference = Reference(problem, method)
         self.factored: sparse.csr_matrix | None = None  # the constraint map of the factors
-        self.spent = 0.0  # seconds by which old factors were slower than new ones
-        self.iteration_seconds = 0.0  # of one iteration of GMRES
+        self.spent = 0.0  # operations that old factors took beyond those that new ones would have
 
     def update(self, constraints: ConstraintMap) -> None:
         """Factorise the operator of a constraint map, unless the present factors are its own."""
@@ -100,7 +99,6 @@ class FactoredTangent:
         except ConvergenceError:
             self._refuse_singular(rhs)
             raise
-        self.iteration_seconds = self.reference.solver.iteration_seconds
         return result
 
     def _refuse_singular(self, rhs: Real) -> None:
@@ -118,13 +116,13 @@ class FactoredTangent:
 
     def _solve_by_old(self, rhs: Real) -> Real:
         solver = self.reference.solver
-        most = int((solver.seconds - self.spent) / max(self.iteration_seconds, 1e-9))
+        most = int((solver.work.factors - self.spent) / max(solver.work.iteration, 1.0))
         if most < LEAST_ITERATIONS:
             raise ConvergenceError("linear solver", "new factors are due")
         try:
             return gather_parts(self.problem.comm, self.reference.solve(rhs, min(most, MOST_ITERATIONS)))
         finally:
-            self.spent += (solver.iterations - 1) * solver.iteration_seconds
+            self.spent += (solver.iterations - 1) * solver.work.iteration
 
     def _factorise(self, constraints: ConstraintMap) -> None:
         self.factored, self.spent = None, 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Literal
@@ -18,6 +17,7 @@ from petsc4py import PETSc  # noqa: E402
 
 from pbem.errors import ConvergenceError  # noqa: E402
 from pbem.parallel import gather_parts  # noqa: E402
+from pbem.solve.effort import Work  # noqa: E402
 from pbem.solve.shares import change_shares, find_own_blocks, share_equally  # noqa: E402
 
 Real = NDArray[np.float64]
@@ -34,6 +34,11 @@ MOST_WORKSPACE = 10_000  # per cent
 # PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
 ZERO_PIVOT, LIBRARY_ERROR = 71, 76
 NOT_CONVERGED = 91
+
+# What an operation takes, in those of a large LU factorisation (a tenth of a nanosecond a core): to form and store an
+# entry of the matrix, an operation on one column (it waits for memory), and one on many columns at a time.
+OPERATIONS_OF_AN_ENTRY = 200.0
+SINGLE, MANY = 12.0, {"petsc": 1.5, "scalapack": 4.0, "mumps": 4.0}
 
 
 def choose_method(requested: str, regions: int) -> Method:
@@ -83,7 +88,7 @@ class LinearSolver:
     part of a vector to this rank's part of the product: with the operator that was factorised it ends in one
     iteration, with one near to it in some. All methods are called by all ranks together.
 
-    seconds: of the last factorisation and the filling before it; iterations, iteration_seconds: of the last solution.
+    iterations: of the last solution. work: of the last factorisation, counted, so that equal runs decide alike.
     """
 
     def __init__(
@@ -104,9 +109,8 @@ class LinearSolver:
         self.multiply = multiply
         self.operator.setUp()
         self.right, self.left = self.operator.createVecs()
-        self.seconds = self.iteration_seconds = 0.0
+        self.work = Work(0.0, 0.0, 0.0)
         self.iterations = 0
-        self._filling = 0.0
 
     @property
     def factored(self) -> bool:
@@ -119,7 +123,6 @@ class LinearSolver:
         counts, for MUMPS: numbers (local_rows,) of columns in which each row can be non-zero, inside and outside of the
         columns with the numbers of this rank's rows.
         """
-        self._filling = time.perf_counter()
         self._release()
         if self.factor_type == "scalapack":
             self.matrix = self._make_scattered(self.inner_shape)
@@ -174,13 +177,32 @@ class LinearSolver:
                 raise _explain_factors(code)
             self.workspace = 2 * self.workspace + 50
         assert self.solver is not None
+        self.work = self._count_work()
         if self.factor_type == "mumps":  # it has a copy of its own
             self.solver.setOperators(self.operator, self.operator)
             self.matrix.destroy()
             self.matrix = None
         else:
             self.solver.setOperators(self.operator, self.matrix)
-        self.seconds = self._slowest(time.perf_counter() - self._filling)
+
+    def _count_work(self) -> Work:
+        """Of the factors there are; the same on all ranks."""
+        assert self.solver is not None and self.matrix is not None
+        rows = float(self.shape[0][1])
+        entries, stored, operations = rows**2, rows**2, 2 / 3 * rows**3
+        if self.factor_type == "mumps":
+            entries = float(self.matrix.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
+            stored, operations = entries, 0.0
+            if self._find_mumps_code() is not None:
+                factor = self.solver.getPC().getFactorMatrix()
+                size = factor.getMumpsInfog(29)  # below zero: in millions
+                stored, operations = float(size if size >= 0 else -1e6 * size), factor.getMumpsRinfog(3)
+        # A product is one of known and unknown values: twice the matrix's entries.
+        return Work(
+            operations + OPERATIONS_OF_AN_ENTRY * entries,
+            2.0 * stored * MANY[self.factor_type],
+            SINGLE * (4.0 * entries + 2.0 * stored),
+        )
 
     def _set_up(self) -> bool:
         """Make the Krylov solver and the factors; whether there are any."""
@@ -218,7 +240,6 @@ class LinearSolver:
         Raises ConvergenceError ("linear solver") on all ranks alike.
         """
         assert self.solver is not None
-        begin = time.perf_counter()
         limits = self.solver.getTolerances()
         if most is not None:
             self.solver.setTolerances(max_it=most)
@@ -228,7 +249,6 @@ class LinearSolver:
             self.solver.solve(self.right, self.left)
         self.solver.setTolerances(*limits)
         self.iterations = max(1, int(self.solver.getIterationNumber()))
-        self.iteration_seconds = self._slowest(time.perf_counter() - begin) / self.iterations
         reason = int(self.solver.getConvergedReason())
         if reason <= 0:
             names = {value: name for name, value in vars(PETSc.KSP.ConvergedReason).items() if isinstance(value, int)}
@@ -285,10 +305,6 @@ class LinearSolver:
 
     def _multiply(self, part: Real) -> Real:
         return self._share(self.multiply(self._share(part, self.inner, self.outer)), self.outer, self.inner)
-
-    def _slowest(self, seconds: float) -> float:
-        """The longest time of all ranks, so that all decide alike."""
-        return float(self.comm.allreduce(seconds, op=MPI.MAX))
 
     def _find_mumps_code(self) -> int | None:
         """INFOG(1) of MUMPS: 0 or more if all is well; None where MUMPS is not used."""

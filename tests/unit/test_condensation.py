@@ -19,7 +19,7 @@ from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.condensation import PairBases, Split, solve_pairs
 from pbem.solve.condensed import CondensedTangent
-from pbem.solve.effort import Effort
+from pbem.solve.effort import Effort, Work
 from pbem.solve.factored import FactoredTangent
 from pbem.solve.linear import LinearSolver
 from pbem.solve.load_basis import LoadBasis
@@ -154,16 +154,33 @@ def test_many_pairs_are_solved_by_columns_of_those_that_change_or_by_new_factors
 
 
 def test_old_factors_are_given_up_when_they_have_cost_as_much_as_new_ones() -> None:
-    effort = Effort(world)
-    effort.restart(10.0, 3000, limited=True)
-    assert effort.column_seconds == 0.01
+    work = Work(factors=1e12, column=1e9, iteration=0.0)
+    effort = Effort(ranks=1)
+    effort.restart(work, limited=True)
     assert [effort.allows(400, 0) for _ in range(3)] == [True, True, False]
-    effort.restart(10.0, 3000, limited=True)
-    assert not effort.allows(0, 10_000) and effort.allows(0, 1000)
-    effort.restart(10.0, 3000, limited=False)
+    effort.restart(work, limited=True)
+    assert not effort.allows(0, 10_000) and effort.allows(0, 2000)
+    effort.restart(work, limited=True)
+    effort.count_columns(900)  # whatever they cost
+    assert not effort.allows(101, 0) and effort.allows(99, 0)
+    effort.restart(work, limited=False)
     assert effort.allows(10_000, 10_000)
-    effort.measure(64, lambda: None)
-    assert effort.column_seconds < 1e-3  # as measured
+
+
+def test_operations_are_those_of_the_textbook() -> None:
+    """Of a dense operator 2/3 n^3, 2 n^2 a column; of a sparse one of two regions less than of the dense, but some."""
+    work = {}
+    for linear in ("lu", "mumps"):
+        problem = make_blocks(linear)
+        tangent = condense(problem, few=False)
+        tangent._refer(problem.evaluate_load(0, 1.0), draw_law(problem, 0))
+        work[linear], rows = tangent.reference.solver.work, problem.unknowns
+        tangent.destroy()
+    forming = 200.0 * rows**2
+    assert work["lu"].factors == pytest.approx(2 / 3 * rows**3 + forming, rel=1e-12)
+    assert work["lu"].column == pytest.approx(1.5 * 2 * rows**2, rel=1e-12)
+    assert 0.3 * forming < work["mumps"].factors < work["lu"].factors
+    assert 0.3 < work["mumps"].column / work["lu"].column / (4.0 / 1.5) < 1.0
 
 
 def test_a_solution_that_is_not_good_enough_is_mended(factorisations: list[None]) -> None:

@@ -23,7 +23,9 @@ make_chroot() {
 }
 
 take_settings() {
-    mkdir -p "$chroot/etc/ssl/certs"
+    local own=/usr/local/share/ca-certificates # the bundle of all is made of these and of Debian's
+    mkdir -p "$chroot/etc/ssl/certs" "$chroot$own"
+    [ ! -d $own ] || cp -rL $own/. "$chroot$own/"
     [ ! -f /etc/ssl/certs/ca-certificates.crt ] || cp -L /etc/ssl/certs/ca-certificates.crt "$chroot/etc/ssl/certs/"
     [ ! -f /etc/pip.conf ] || cp /etc/pip.conf "$chroot/etc/"
     cp -L /etc/resolv.conf /etc/hosts "$chroot/etc/"

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Lint, types, tests. Everything runs, also after a failure; the exit code is that of the first failure.
 # Arguments go to pytest: scripts/test.sh tests/unit -k kernel
+# Files of tests are shared out to as many processes as there are cores; more than four would want much memory.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
@@ -12,5 +13,6 @@ check() { "$@" || { local code=$?; [ "$failure" -ne 0 ] || failure=$code; }; }
 
 check .venv/bin/python -m ruff check .
 check .venv/bin/python -m mypy pbem
-check .venv/bin/python -m pytest "$@"
+workers=$(nproc)
+check .venv/bin/python -m pytest -n $((workers < 4 ? workers : 4)) --dist loadfile "$@"
 exit "$failure"

@@ -269,6 +269,19 @@ COMPLIANT: dict[str, tuple[float, float, float, int]] = {
 
 
 @schemes
+@pytest.mark.parametrize(("slip", "friction"), [(0.02, 0.4), (0.1, 0.2)])
+def test_the_elastic_slip_of_a_joint_weakens_nothing(slip: float, friction: float, scheme: str) -> None:
+    # As below, where all slip is plastic; half as much again is elastic here.
+    shear = 0.01 * friction
+    exact = Layers(1.0, -0.01, shear, complex(1.5 * slip))
+    law: dict[str, float | str] = {
+        "law": "coulomb", "friction": FRICTION, "friction_dynamic": 0.2, "slip_distance": 0.06,
+        "tangential_stiffness": shear / (0.5 * slip),
+    }  # fmt: skip
+    expect_layers(exact, make_layers(exact, np.random.default_rng(2), 1.0, law, scheme=scheme), SLIP, 1)
+
+
+@schemes
 @pytest.mark.parametrize("load", COMPLIANT.values(), ids=[name.replace(" ", "_") for name in COMPLIANT])
 def test_elastic_joints_give_way_by_compliance_times_traction(
     load: tuple[float, float, float, int], scheme: str

@@ -72,14 +72,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if launch.ranks > 1:
         # One thread a rank, unless the user wants otherwise: the ranks are the threads.
         os.environ.setdefault("OMP_NUM_THREADS", "1")
-    if rank > 0:
-        # What all ranks would say alike is said by the first.
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a title may have characters that the terminal's encoding has not
-            stream.reconfigure(errors="backslashreplace")
-    petsc, plain = split_petsc_options(sys.argv[1:] if arguments is None else arguments)
-    code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank)
+    with contextlib.ExitStack() as stack:
+        if rank > 0:
+            # What all ranks would say alike is said by the first.
+            stack.enter_context(contextlib.redirect_stdout(stack.enter_context(open(os.devnull, "w"))))
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):  # a title may have characters that the terminal's encoding has not
+                stream.reconfigure(errors="backslashreplace")
+        petsc, plain = split_petsc_options(sys.argv[1:] if arguments is None else arguments)
+        code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank)
     if code and rank > 0:
         # A launcher that sees one rank end with an error ends the others: the first must have spoken by then.
         time.sleep(1.0)

@@ -223,7 +223,7 @@ class _Product:
         self._tangent = tangent
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray()))))
+        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray(readonly=True)))))
 
 
 class _Preconditioning:
@@ -234,7 +234,7 @@ class _Preconditioning:
 
     def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         result = np.zeros(x.getLocalSize())
-        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray())), result)
+        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray(readonly=True))), result)
         y.setArray(result)
 
 

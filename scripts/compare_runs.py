@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Run cases twice and compare the result files bit by bit, times apart: scripts/compare_runs.py [--ranks 1 2] [CASE.toml ...]
+"""Run cases twice and compare the result files bit by bit, times apart.
+
+    .venv/bin/python scripts/compare_runs.py [--ranks 1 2] [CASE.toml ...]
 
 Prints a line per pair of runs, and what differs. Exit code 1 if anything does. Without cases: all of cases/.
 """

@@ -30,6 +30,7 @@ from pbem.model.loading import Loading, read_loading
 from pbem.model.loop import Loops, find_loops
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shape import shape_curves
@@ -109,6 +110,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         for fault in check_gap(case, ("contacts", name), contact.law, model.curves[contact.first])
     ]
     faults += gaps
+    model = move_to_own_origin(model)
     if conditions_known and not gaps:
         wrong, notes = _check_support(case, model)
         faults += wrong

@@ -70,7 +70,7 @@ def find_free_motions(model: Model, ties: Mapping[str, Tie | PairTie] | None = N
     center, scale = _frame(model)
     links = [*_link_to_ground(model, center, scale), *_link_regions(model, names, dict(ties or {}), center, scale)]
     return tuple(
-        describe_motion(vector, [names[body] for body in bodies], center, scale)
+        describe_motion(vector, [names[body] for body in bodies], center, scale, model.origin)
         for bodies, vector in find_moving_bodies(len(names), links)
     )
 
@@ -151,8 +151,12 @@ def _touches(model: Model, joint: Interface | Contact) -> bool:
     return measure_opening(model, joint) <= max(TOUCHING * shorter, ROUNDINGS * sys.float_info.epsilon * largest)
 
 
-def describe_motion(vector: NDArray[np.float64], names: list[str], center: complex, scale: float) -> FreeMotion:
-    """A motion (3 bodies,) of named bodies: along x, along y, and the angle times scale about the center."""
+def describe_motion(
+    vector: NDArray[np.float64], names: list[str], center: complex, scale: float, origin: complex
+) -> FreeMotion:
+    """A motion (3 bodies,) of named bodies: along x, along y, and the angle times scale about the center.
+
+    origin: what is added to places in the text."""
     velocities: dict[str, tuple[complex, float]] = {}
     parts: dict[str, list[str]] = {}
     moving = np.flatnonzero(np.abs(vector.reshape(-1, 3)).max(axis=1) >= 1e-6)
@@ -162,7 +166,7 @@ def describe_motion(vector: NDArray[np.float64], names: list[str], center: compl
         spin = turn / scale
         velocities[name] = (complex(x, y) - 1j * spin * center, spin)
         if abs(turn) > 1e-6:
-            pole = center + 1j * complex(x, y) / spin
+            pole = center + 1j * complex(x, y) / spin + origin
             pole = complex(*(0.0 if abs(part) < 1e-9 * scale else part for part in (pole.real, pole.imag)))
             text = f"rotation about {format_point(pole)}"
         elif abs(y) < 1e-6 * abs(x):

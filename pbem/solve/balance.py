@@ -25,6 +25,8 @@ Complex = NDArray[np.complex128]
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
 # anchors hold it, and that make a result wrong, where they are more than NOTED of those on the most loaded region too.
 NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
+# The same of a net force on an infinite region that prescribed displacements or springs bring about.
+NET_FORCE = 1e-2
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
 # Motions that differ by less than this part of their size are one.
@@ -57,7 +59,9 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
         add((np.conj(lever) * known).imag)
     )
     finite = np.array([not region.infinite for region in problem.model.regions])
-    relative = np.where(finite, np.maximum(_divide(np.abs(force), forces), _divide(np.abs(moment), moments)), 0.0)
+    # An infinite region may carry a moment, which decays.
+    turned = np.where(finite, _divide(np.abs(moment), moments), 0.0)
+    relative = np.maximum(_divide(np.abs(force), forces), turned)
     carried = np.zeros(count)
     if support.acting.shape[1]:
         for motions in group_motions(support.motions):
@@ -108,8 +112,9 @@ def _divide(part: Real, whole: Real) -> Real:
 def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
     """What is left over on the worst region, where that is worth a note; None if all regions are in balance.
 
-    Raises ConvergenceError ("not in balance") where it makes the result wrong.
+    Raises ConvergenceError where it makes the result wrong: "not in balance", or "net force" of an infinite region.
     """
+    _refuse_net_force(problem, balance)
     wrong = (balance.relative > NOT_IN_BALANCE) & (balance.relative * balance.weight > NOTED)
     worst = int(np.argmax(np.where(wrong, balance.relative, 0.0) if wrong.any() else balance.relative))
     amount = float(balance.relative[worst])
@@ -127,3 +132,26 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
     if wrong.any():
         raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
     return left
+
+
+def _refuse_net_force(problem: Problem, balance: Balance) -> None:
+    """Raise ConvergenceError if displacements that are prescribed push against an infinite region.
+
+    What they move it by grows with the logarithm of the distance to which it is looked at, and so does without bound
+    the force that an answer to them would take.
+    """
+    conditions = problem.model.conditions.values()
+    if not any("displacement" in each.known or any(each.stiffness) for each in conditions):
+        return
+    for number, region in enumerate(problem.model.regions):
+        amount = float(balance.relative[number])
+        if region.infinite and amount > NET_FORCE and amount * balance.weight[number] > NET_FORCE:
+            x, y, _ = balance.resultant[number]
+            raise ConvergenceError(
+                "net force",
+                f"prescribed displacements or springs act on the infinite region '{region.name}' with a net force of "
+                f"({x:.6g}, {y:.6g}), {100 * amount:.2g} % of the sum of all forces there without signs; the "
+                "displacement of a net force grows with the logarithm of the distance, so that these conditions "
+                "determine neither it nor their reactions; prescribe displacements whose forces balance, or "
+                "tractions that do, or a stiff inclusion in place of a hole held at rest, or take a finite region",
+            )

@@ -53,8 +53,9 @@ class Balance:
     """What is left over on r regions.
 
     resultant (r, 3): force along x and y (stress times length) and moment about the region's centre, the mean of its
-    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; 0 for infinite
-    regions, which may carry a resultant. carried (r,): as relative, of what the acting anchors carry; 0 without any.
+    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; of infinite
+    regions, which may carry a moment, the force. carried (r,): as relative, of what the acting anchors carry; 0
+    without any.
     weight (r,): the sum of forces without signs, to that of the region with the most.
     """
 

@@ -29,7 +29,7 @@ def describe_cut_motions(model: Model, mesh: Mesh, outer: OuterNodes, parts: Par
     for bodies, vector in find_moving_bodies(len(parts.region), links):
         motion = dict(zip(bodies, vector.reshape(-1, 3), strict=True))
         if _parts_move_apart(parts, motion):
-            names = [_name_part(mesh, parts, body, model.origin) for body in bodies]
+            names = [name_part(mesh, parts, body, model.origin) for body in bodies]
             texts.append(describe_motion(vector, names, center, scale, model.origin).text)
     return "; ".join(texts) or None
 
@@ -44,7 +44,8 @@ def _parts_move_apart(parts: Parts, motion: dict[int, Real]) -> bool:
     return False
 
 
-def _name_part(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
+def name_part(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
+    """The region's name, and of a part the place of its middle; origin: what is added to places."""
     name = mesh.region_names[parts.region[body]]
     if not parts.cut[body]:
         return name

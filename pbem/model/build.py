@@ -111,7 +111,8 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         for fault in check_gap(case, ("contacts", name), contact.law, model.curves[contact.first])
     ]
     faults += gaps
-    model = move_to_own_origin(model)
+    radii = {name: table.radius for name, table in case.curves.items() if table.radius is not None}
+    model = move_to_own_origin(model, radii)
     if conditions_known and not gaps:
         wrong, notes = _check_support(case, model)
         faults += wrong

@@ -121,7 +121,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
 
 
 def _find_topology(case: Case, roles: Roles) -> _Topology:
-    shapes = shape_curves(case)
+    shapes = shape_curves(case, roles)
     split = split_at_junctions(shapes.curves, shapes.tolerance)
     curves = split.curves
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}

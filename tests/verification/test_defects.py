@@ -97,6 +97,15 @@ def test_the_pressure_of_a_pin_with_a_small_clearance(solve: Solve) -> None:
     assert measure_pressure(results, 1e-5, -0.004403466186000604) < 0.01
 
 
+def test_the_pressure_of_a_pin_whose_clearance_is_below_what_joins_ends(solve: Solve) -> None:
+    # 1e-7 of the radius, 1e-9 of the model: the ends of pin and hole were once made one.
+    changes = [(r"-1e-05", "-1e-7"), (r"0\.99999,", "0.9999999,"), (r"0\.9999800000000001", "0.9999998"),
+               (r"0\.04999\]", "0.0499999]"), (r"-0\.050010000000000006", "-0.0500001"),
+               (r"-0\.004403466186000604", "-4.403466186000604e-5")]  # fmt: skip
+    results = solve("pin_small_clearance", *changes)
+    assert measure_pressure(results, 1e-7, -4.403466186000604e-5) < 0.01
+
+
 def test_the_pressure_of_a_pin_whichever_mesh_is_first(solve: Solve) -> None:
     # 8 elements on the pressed quarter of the hole: they do not follow the root at the end of contact, 60 degrees away.
     found = [solve(name) for name in ("pin_finer_first", "pin_coarser_first")]

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 import pbem
-from pbem.errors import PbemError
+from pbem.errors import PbemError, StopError
 from pbem.results.reader import Results
 
 ROOT = Path(__file__).parent.parent
@@ -306,6 +306,8 @@ def study(name: str, moves: list[Move], folder: Path) -> Iterator[dict[str, Any]
             found = compare(_run(move_case(case, move, size), folder / "moved"), still, move)
         except NotMovableError:
             continue
+        except StopError:
+            raise
         except PbemError as error:
             row |= {"worst": math.inf, "what": str(error).split("\n")[-1][:120]}
             yield row

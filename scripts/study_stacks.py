@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 import pbem
-from pbem.errors import PbemError
+from pbem.errors import PbemError, StopError
 from pbem.results.reader import Results
 
 KINDS = ("stack", "grains", "wedge", "pin")
@@ -203,6 +203,8 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
             if sample.kind != "pin":
                 expected = run(sample.elements, True)[1]
                 row["off"] = abs(force - expected) / expected
+        except StopError:
+            raise
         except PbemError as error:
             row["error"] = str(error).split("\n")[-1][:150]
         rows.append(row)

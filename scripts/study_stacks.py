@@ -146,8 +146,11 @@ def _write_wedge(sample: Sample, text: Text, gap: float, elements: int, contact:
         complex(-2, -1), complex(2, -1), complex(2, 1.2), complex(wide * 1.2, 1.2), complex(narrow, foot),
         complex(narrow, 0), complex(-narrow, 0), *notch, complex(-2, 1.2),
     ], "a", 2 * elements)  # fmt: skip
+    # Its edges press between the ends of the notch's faces: where corners meet, pairs would pass each other.
+    low = foot + 0.15
+    edge = low * math.tan(half)
     text.add_body("q", [
-        complex(-narrow, foot + lift), complex(narrow, foot + lift),
+        complex(-edge, low + lift), complex(edge, low + lift),
         complex(wide, top + lift), complex(-wide, top + lift),
     ], "b", elements)  # fmt: skip
     text.add('contacts.k = { between = ["q1", "p3"], ' + contact + " }",

@@ -21,6 +21,7 @@ from pbem.model.model import Model
 from pbem.model.origin import move_back
 from pbem.results.reader import Results
 from pbem.solve.linearity import measure_linearity
+from scripts import study_stacks
 from scripts.study_places import MOVES, study
 
 Solve = Callable[[str], Results]
@@ -81,6 +82,13 @@ regions.a = { material = "m", boundary = ["b", "s"] }
 boundary.b = { ux = 0.0, uy = 0.0 }
 boundary.s = { tn = -1.0, ts = 0.0 }
 """
+
+
+@pytest.mark.parametrize("seed", [16, 18])
+def test_loose_bodies_with_gaps_carry_what_they_do_without(seed: int, tmp_path: Path) -> None:
+    (row,) = study_stacks.study(seed, ["dense"], tmp_path)
+    assert row["left"] < 1e-4
+    assert row["off"] < 1e-2
 
 
 # Infinite planes

@@ -23,8 +23,9 @@ Stress = tuple[float, float, float]
 class Background:
     """remote, initial: uniform stresses sxx, syy, sxy, with and without the displacement of their strain.
 
-    force: body force per volume, complex. center: where its stress and its displacement vanish. Any will do, as fields
-    of uniform pressure obey the integral equations too; one in the region keeps rounding as small as the region.
+    force: body force per volume, complex. center: where the displacement of both vanishes, and the stress of the force.
+    One near the region keeps rounding as small as the region. Any will do for the force, as fields of uniform pressure
+    obey the integral equations too. To the remote strain it is the place that does not move.
     """
 
     material: Material
@@ -38,15 +39,16 @@ class Background:
         return not (any(self.remote) or any(self.initial) or self.force)
 
     def displacement(self, point: Complex) -> Complex:
-        """Displacement (complex) at points: of the remote strain about the origin, and of gravity.
+        """Displacement (complex) at points: of the remote strain about the center, and of gravity.
 
         Gravity's stress is isotropic, -(b . (x - center)), so that its displacement is an analytic function of x.
         """
         kappa, shear_modulus = self.material.kappa, self.material.shear_modulus
         sxx, syy, sxy = self.remote
         mean, deviator = 0.5 * (sxx + syy), 0.5 * (syy - sxx) + 1j * sxy
-        linear = 0.5 * (kappa - 1) * mean * point - np.conj(deviator * point)
-        weight = -0.25 * (kappa - 1) * np.conj(self.force) * (point - self.center) ** 2
+        lever = point - self.center
+        linear = 0.5 * (kappa - 1) * mean * lever - np.conj(deviator * lever)
+        weight = -0.25 * (kappa - 1) * np.conj(self.force) * lever**2
         return (linear + weight) / (2 * shear_modulus)
 
     def stress(self, point: Complex) -> Real:

@@ -27,12 +27,7 @@ def evaluate_hoop_stress(
     there it is the difference between neighbours on the same curve.
     """
     second = second_face_nodes(mesh)
-    first, opposite = split_faces(mesh, displacement)
-    mean = _differentiate_along(mesh, 0.5 * (first + opposite), False)
-    half_jump = _differentiate_along(mesh, 0.5 * (first - opposite), True)
-    along = 1j * mesh.normal
-    stretch = np.concatenate([mean + half_jump, (mean - half_jump)[second]])
-    direction = np.concatenate([along, along[second]])
+    stretch, direction = evaluate_stretch(mesh, displacement)
     region = np.concatenate([mesh.node_region, mesh.node_region[second]])
     position = np.concatenate([mesh.position, mesh.position[second]])
     normal = -1j * direction * np.where(np.arange(len(region)) < mesh.nodes, 1.0, -1.0)
@@ -51,6 +46,20 @@ def evaluate_hoop_stress(
         pressed = (np.conj(n) * traction[own]).real - rest_n
         stress[own] = rest_s + background.material.plane_modulus * strain[own] + lateral * pressed
     return stress
+
+
+def evaluate_stretch(mesh: Mesh, displacement: Complex) -> tuple[Complex, Complex]:
+    """Derivative of the displacement (f,) along the faces at the nodes of `list_faces(mesh)`, and the directions.
+
+    Both are taken along the mesh's elements, so that those of second faces are against their travel.
+    """
+    second = second_face_nodes(mesh)
+    first, opposite = split_faces(mesh, displacement)
+    mean = _differentiate_along(mesh, 0.5 * (first + opposite), False)
+    half_jump = _differentiate_along(mesh, 0.5 * (first - opposite), True)
+    along = 1j * mesh.normal
+    stretch = np.concatenate([mean + half_jump, (mean - half_jump)[second]])
+    return stretch, np.concatenate([along, along[second]])
 
 
 def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Complex:

@@ -29,8 +29,8 @@ def describe_cut_motions(model: Model, mesh: Mesh, outer: OuterNodes, parts: Par
     for bodies, vector in find_moving_bodies(len(parts.region), links):
         motion = dict(zip(bodies, vector.reshape(-1, 3), strict=True))
         if _parts_move_apart(parts, motion):
-            names = [_name_part(mesh, parts, body) for body in bodies]
-            texts.append(describe_motion(vector, names, center, scale).text)
+            names = [name_part(mesh, parts, body, model.origin) for body in bodies]
+            texts.append(describe_motion(vector, names, center, scale, model.origin).text)
     return "; ".join(texts) or None
 
 
@@ -44,12 +44,13 @@ def _parts_move_apart(parts: Parts, motion: dict[int, Real]) -> bool:
     return False
 
 
-def _name_part(mesh: Mesh, parts: Parts, body: int) -> str:
+def name_part(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
+    """The region's name, and of a part the place of its middle; origin: what is added to places."""
     name = mesh.region_names[parts.region[body]]
     if not parts.cut[body]:
         return name
     own = (parts.first == body) | (parts.second == body)
-    middle = complex(0.5 * (mesh.start[own] + mesh.end[own]).mean())
+    middle = complex(0.5 * (mesh.start[own] + mesh.end[own]).mean()) + origin
     return f"{name}: the part around ({middle.real:.4g}, {middle.imag:.4g})"
 
 

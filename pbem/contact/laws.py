@@ -128,7 +128,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
     return PairLaws(
         strengths=_group_strengths(laws, pairs.interface, model.law_texts),
         tensile_strength=spread([law.tensile_strength for law in laws]),
-        gap=_evaluate_gaps(laws, mesh),
+        gap=_evaluate_gaps(laws, mesh, model.origin),
         bonded=spread([law.kind == "bonded" for law in laws]).astype(bool),
         parted=spread([law.kind == "open" for law in laws]).astype(bool),
         brittle=spread([law.cohesion_lost for law in laws]).astype(bool),
@@ -183,13 +183,13 @@ def _group_strengths(laws: list[Law], interface: Integer, texts: Mapping[str, st
     return tuple(groups)
 
 
-def _evaluate_gaps(laws: list[Law], mesh: Mesh) -> Real:
+def _evaluate_gaps(laws: list[Law], mesh: Mesh, origin: complex) -> Real:
     pairs = mesh.pairs
     given = [0.0 if isinstance(law.gap, str) or law.kind == "bonded" else law.gap for law in laws]
     gap = pairs.distance + np.array([*given, 0.0])[pairs.interface]
     for text in dict.fromkeys(law.gap for law in laws if isinstance(law.gap, str)):
         own = np.array([law.gap == text for law in laws])[pairs.interface]
-        place = pairs.position[own]
+        place = pairs.position[own] + origin
         gap[own] += evaluate_expression(text, x=place.real, y=place.imag)
     return gap
 

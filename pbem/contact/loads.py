@@ -80,7 +80,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     gravity = complex(*interpolate(before.gravity, after.gravity))
     remote = interpolate(before.remote, after.remote)
     balanced = _sample(mesh, [balanced_background(model, region, gravity) for region in model.regions])
-    far = _sample(mesh, [far_background(region, remote) for region in model.regions])
+    far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
         values=values.reshape(-1, 2)[outer.condition],
@@ -126,10 +126,15 @@ def _find_center(model: Model, region: Region) -> complex:
     return complex(0.5 * (min(x) + max(x)), 0.5 * (min(y) + max(y)))
 
 
-def far_background(region: Region, remote: Real) -> Background:
-    """The field to which an infinite region tends; none in a finite region."""
-    sxx, syy, sxy = remote if region.infinite else (0.0, 0.0, 0.0)
-    return Background(region.material, remote=(float(sxx), float(syy), float(sxy)))
+def far_background(model: Model, region: Region, remote: Real) -> Background:
+    """The field to which an infinite region tends; none in a finite region.
+
+    Its displacement is that about the middle of all curves, wherever the model lies.
+    """
+    if not region.infinite:
+        return Background(region.material)
+    sxx, syy, sxy = (float(value) for value in remote)
+    return Background(region.material, remote=(sxx, syy, sxy), center=model.middle)
 
 
 def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:

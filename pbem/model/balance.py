@@ -25,11 +25,11 @@ def describe_unbalance(model: Model, motion: FreeMotion, moving: Sequence[Region
     for stage in model.stages:
         force, moment, power, scale = _sum_tractions(model, motion, moving, stage)
         if abs(power) > BALANCED * scale:
-            about = format_point(0j)
+            about = format_point(model.origin)
             loads = "tractions and weight" if any(stage.gravity) else "tractions"
             return (
-                f"the {loads} of stage '{stage.name}' drive it, with resultant ({force.real:.6g}, {force.imag:.6g}) "
-                f"and moment {moment:.6g} about {about}"
+                f"the {loads} of stage '{stage.name}' drive it, with resultant "
+                f"{format_point(force)} and moment {moment:.6g} about {about}"
             )
     return None
 

@@ -11,6 +11,7 @@ from pbem.case import Case, parse_draft, read_case_text
 from pbem.case.finding import list_names
 from pbem.errors import CaseError, Fault
 from pbem.model.balance import describe_unbalance
+from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
     check_closing,
     check_inside,
@@ -30,10 +31,11 @@ from pbem.model.loading import Loading, read_loading
 from pbem.model.loop import Loops, find_loops
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shape import shape_curves
-from pbem.model.support import find_free_motions
+from pbem.model.support import find_free_motions, find_plane_translations
 
 # Faults shown of what one table [[generate]] made.
 MOST_FAULTS = 5
@@ -109,6 +111,8 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         for fault in check_gap(case, ("contacts", name), contact.law, model.curves[contact.first])
     ]
     faults += gaps
+    radii = {name: table.radius for name, table in case.curves.items() if table.radius is not None}
+    model = move_to_own_origin(model, radii)
     if conditions_known and not gaps:
         wrong, notes = _check_support(case, model)
         faults += wrong
@@ -117,7 +121,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
 
 
 def _find_topology(case: Case, roles: Roles) -> _Topology:
-    shapes = shape_curves(case)
+    shapes = shape_curves(case, roles)
     split = split_at_junctions(shapes.curves, shapes.tolerance)
     curves = split.curves
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
@@ -134,6 +138,7 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(case, curves, cracks)
+        faults += find_coincidences(case, curves, loops, roles)
         closing, cuts = check_closing(case, curves, cracks, loops)
         faults += closing
         notes += cuts
@@ -233,6 +238,21 @@ def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
             continue
         expected = "displacement conditions, springs, or bonded or touching neighbours, that prevent it"
         faults.append(case.fault(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+    notes = []
+    for motion in find_plane_translations(model):
+        moving = [regions[name] for name in motion.regions]
+        name = next(each.name for each in moving if each.infinite)
+        weightless = replace(model, stages=tuple(replace(stage, gravity=(0.0, 0.0)) for stage in model.stages))
+        unbalance = describe_unbalance(weightless, motion, moving)
+        if unbalance is None and describe_unbalance(model, motion, moving):
+            notes.append(f"The weight of what lies in the infinite region '{name}' is a net force on it: its "
+                         "displacement grows with the logarithm of the distance, so that only stresses, and "
+                         "displacements of one point against another, mean anything.")
+        elif unbalance is not None:
+            found = f"a net force on the infinite region '{name}': {unbalance}"
+            expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "
+                        "logarithm of the distance and has no value; or a finite region that is held")
+            faults.append(case.fault(("regions", name), found, expected))
     sentence = "Nothing prevents: {}. The loads balance, and the mean displacement and rotation are set to zero."
     listed = [*balanced[:6], *([f"and {len(balanced) - 6} more"] if len(balanced) > 6 else [])]
-    return faults, [sentence.format("; ".join(listed))] if balanced else []
+    return faults, [*([sentence.format("; ".join(listed))] if balanced else []), *dict.fromkeys(notes)]

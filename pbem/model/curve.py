@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import cmath
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -117,3 +119,21 @@ class Curve:
 def turning_angle(incoming: complex, outgoing: complex) -> float:
     """Angle in (-pi, pi] from one unit tangent to the next."""
     return cmath.phase(outgoing / incoming)
+
+
+def find_middle(curves: Mapping[str, Curve]) -> complex:
+    """The mean place of all curves, by their lengths: it moves and turns with the model, whatever its mesh."""
+    legs = [leg for curve in curves.values() for leg in curve.legs]
+    first = legs[0].start
+    lengths = [leg.length for leg in legs]
+    return first + sum(length * (_find_centroid(leg) - first) for leg, length in zip(legs, lengths, strict=True)) / sum(
+        lengths
+    )
+
+
+def _find_centroid(leg: Leg) -> complex:
+    if leg.center is None:
+        return leg.start + 0.5 * (leg.end - leg.start)
+    half = 0.5 * leg.sweep
+    apex = complex(leg.point(np.array(0.5))) - leg.center
+    return leg.center + apex * math.sin(half) / half

@@ -16,6 +16,7 @@ from pbem.model.boxes import Boxes
 from pbem.model.curve import Curve, Leg
 from pbem.model.intersection import coincide, meeting_points, project
 from pbem.model.shape import share
+from pbem.model.tolerance import Tolerance
 
 Places = Mapping[str, tuple[complex, ...]]
 
@@ -38,10 +39,10 @@ def _pair(found: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Iterator[tuple[
     return zip(found[0].tolist(), found[1].tolist(), strict=True)
 
 
-def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCurves:
+def split_at_junctions(curves: Mapping[str, Curve], tolerance: Tolerance) -> SplitCurves:
     """Split every leg in whose interior an end of another curve lies; the break is exactly that end."""
     legs = [(name, index, leg) for name, curve in curves.items() for index, leg in enumerate(curve.legs)]
-    boxes = Boxes.around_legs([leg for _, _, leg in legs], tolerance)
+    boxes = Boxes.around_legs([leg for _, _, leg in legs], tolerance.largest)
     breaks: dict[tuple[str, int], dict[complex, float]] = defaultdict(dict)
     notes = []
     ends = [(name, end) for name, curve in curves.items() if not curve.closed for end in (curve.start, curve.end)]
@@ -50,7 +51,7 @@ def split_at_junctions(curves: Mapping[str, Curve], tolerance: float) -> SplitCu
         if other == name or end in (leg.start, leg.end):
             continue
         t, distance = project(leg, end)
-        if distance > tolerance or not 0 < t < 1:
+        if distance > tolerance.between(name, other) or not 0 < t < 1:
             continue
         if end not in breaks[other, index]:
             notes.append(f"'{other}' is split at {format_point(end)}, where '{name}' ends.")
@@ -83,7 +84,7 @@ def find_crossings(
     case: Case,
     curves: Mapping[str, Curve],
     cracks: Mapping[str, str],
-    tolerance: float,
+    tolerance: Tolerance,
     touching: Set[frozenset[str]] = frozenset(),
 ) -> list[Fault]:
     """Every place where legs cross, touch or coincide other than at points where curves may meet.
@@ -92,15 +93,16 @@ def find_crossings(
     """
     legs = [(name, leg) for name, curve in curves.items() for leg in curve.legs]
     found: dict[tuple[str, str], Fault] = {}
-    boxes = Boxes.around_legs([leg for _, leg in legs], tolerance)
+    boxes = Boxes.around_legs([leg for _, leg in legs], tolerance.largest)
     for i, j in _pair(boxes.find_pairs()):
         (name, leg), (other, other_leg) = legs[i], legs[j]
         if (name, other) in found or {name, other} in touching:
             continue
-        if coincide(leg, other_leg, tolerance):
+        same = tolerance.between(name, other)
+        if coincide(leg, other_leg, same):
             found[name, other] = _overlap(case, name, other, leg)
             continue
-        points = meeting_points(leg, other_leg, tolerance) or _touching_ends(leg, other_leg, tolerance)
+        points = meeting_points(leg, other_leg, same) or _touching_ends(leg, other_leg, same)
         if points:
             found[name, other] = _crossing(case, name, other, points[0], cracks)
     for pair, point in _meeting_vertices(curves, cracks).items():

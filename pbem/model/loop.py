@@ -20,6 +20,7 @@ from pbem.model.curve import Curve, Leg
 from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
 from pbem.model.junction import format_point
 from pbem.model.model import Loop, Side
+from pbem.model.tolerance import Tolerance
 
 Loops = dict[str, tuple[Loop, ...]]
 HalfEdge = tuple[str, bool]
@@ -68,7 +69,7 @@ def wind_around(loops: Sequence[list[Leg]], points: NDArray[np.complex128]) -> N
 
 
 def find_loops(
-    case: Case, curves: Mapping[str, Curve], tolerance: float, check_nesting: bool
+    case: Case, curves: Mapping[str, Curve], tolerance: Tolerance, check_nesting: bool
 ) -> tuple[Loops, list[Fault]]:
     """Loops of every region all of whose curves are known; regions with faults are left out, the whole plane has none.
 
@@ -94,7 +95,7 @@ def find_loops(
 
 
 def _chain(
-    case: Case, region: str, curves: Mapping[str, Curve], tolerance: float
+    case: Case, region: str, curves: Mapping[str, Curve], tolerance: Tolerance
 ) -> tuple[list[_Chain], list[Fault]]:
     """Walk from end to end; where more than two ends meet, take the turn that keeps one sector of the region."""
     leaving: dict[complex, list[HalfEdge]] = defaultdict(list)
@@ -137,7 +138,7 @@ def _chain(
 
 
 def _open_end(
-    case: Case, region: str, point: complex, edges: list[HalfEdge], curves: Mapping[str, Curve], tolerance: float
+    case: Case, region: str, point: complex, edges: list[HalfEdge], curves: Mapping[str, Curve], tolerance: Tolerance
 ) -> Fault:
     """Name the curve, the end without a partner, and what is nearest to it."""
     names = list(dict.fromkeys(name for name, _ in edges))
@@ -149,7 +150,7 @@ def _open_end(
     near = _nearest_end(point, names, curves)
     touched = [
         name for name, curve in curves.items() if name not in names
-        for leg in curve.legs if project(leg, point)[1] <= tolerance
+        for leg in curve.legs if project(leg, point)[1] <= tolerance.between(names[0], name)
     ]
     if touched:
         expected += f" (the point lies on curve '{touched[0]}': split that one there)"

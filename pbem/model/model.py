@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 from pbem.case.generation import Group
-from pbem.model.curve import Curve
+from pbem.model.curve import Curve, find_middle
 from pbem.model.material import Material
 from pbem.model.sliver import Tie
 
@@ -171,6 +172,7 @@ class Model:
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
+    origin: point of the user's coordinates about which those of the model are, 0 unless the model is far from there.
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
     were when the case was read.
@@ -199,3 +201,9 @@ class Model:
     groups: tuple[Group, ...] = ()
     ties: tuple[Tie, ...] = ()
     law_texts: Mapping[str, str] = field(default_factory=dict)
+    origin: complex = 0j
+
+    @cached_property
+    def middle(self) -> complex:
+        """The mean place of all curves, which the strain of stress far away does not move."""
+        return find_middle(self.curves)

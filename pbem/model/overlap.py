@@ -25,6 +25,7 @@ from pbem.model.junction import format_point
 from pbem.model.loop import Loops, loop_legs
 from pbem.model.model import Loop
 from pbem.model.roles import Roles
+from pbem.model.tolerance import Tolerance
 
 Complex = NDArray[np.complex128]
 
@@ -55,7 +56,9 @@ def _make_body(case: Case, curves: Mapping[str, Curve], name: str, loops: tuple[
     return _Body(name, {side.curve: side.forward for loop in loops for side in loop.sides}, legs, infinite, low, high)
 
 
-def find_overlaps(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: float) -> list[Fault]:
+def find_overlaps(
+    case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: Tolerance
+) -> list[Fault]:
     """Regions that lie on the same side of a shared curve, or one inside another that does not have it as a hole.
 
     Curves that are in contact with one of the other region are left to `check_contacts`.
@@ -110,7 +113,7 @@ def _meet(bodies: list[_Body], curves: list[Curve]) -> Iterator[tuple[int, int]]
 
 
 def _overlap(
-    curves: Mapping[str, Curve], first: _Body, second: _Body, near: list[tuple[_Body, str]], tolerance: float
+    curves: Mapping[str, Curve], first: _Body, second: _Body, near: list[tuple[_Body, str]], tolerance: Tolerance
 ) -> str:
     """near: curves of one of them that may lie in the other, and that other."""
     fewer, more = sorted((first.sides, second.sides), key=len)
@@ -119,13 +122,13 @@ def _overlap(
             return f"both lie on the same side of '{curve}'"
     for body, curve in near:
         points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
-        if (body.find_depth(points) > tolerance).any():
+        if (body.find_depth(points) > tolerance.of(curve)).any():
             return f"'{curve}' lies inside"
     return ""
 
 
 def check_contacts(
-    case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: float
+    case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: Tolerance
 ) -> list[Fault]:
     """A fault for every contact one of whose curves begins inside the other's region, with the deepest place found."""
     faults = []
@@ -135,7 +138,7 @@ def check_contacts(
             if region not in loops or region == roles.outer[curve] or curve not in curves:
                 continue
             depth, point = _find_deepest(curves[curve], _make_body(case, curves, region, loops[region]))
-            if depth > tolerance:
+            if depth > tolerance.of(curve):
                 found = f"curve '{curve}' inside region '{region}', {depth:.3g} deep at {format_point(point)}"
                 expected = "bodies that at most touch before they are loaded"
                 faults.append(case.fault(("contacts", name), found, expected))

@@ -16,9 +16,9 @@ from pbem.errors import Fault
 from pbem.model.curve import Curve, Leg
 from pbem.model.expression import ExpressionError, evaluate_expression
 from pbem.model.intersection import extremes
+from pbem.model.roles import Roles
+from pbem.model.tolerance import Tolerance, join_points, make_tolerance
 
-# Points nearer to each other than this part of the model's size are the same point.
-SAME_POINT = 1e-9
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
 WIDEST_ARC = 45.0
 # Squares of lengths must not underflow.
@@ -27,15 +27,15 @@ SMALLEST = 1e-100
 
 @dataclass(frozen=True)
 class Shapes:
-    """curves: in the order of the file, without those that have faults; tolerance: length below which points agree."""
+    """curves: in the order of the file, without those that have faults; tolerance: which points agree."""
 
     curves: Mapping[str, Curve]
     size: float
-    tolerance: float
+    tolerance: Tolerance
     faults: tuple[Fault, ...]
 
 
-def shape_curves(case: Case) -> Shapes:
+def shape_curves(case: Case, roles: Roles) -> Shapes:
     """Build every curve; joined ends are made exactly equal. Elements are counted per leg, nothing is graded yet."""
     faults: list[Fault] = []
     curves: dict[str, Curve] = {}
@@ -46,7 +46,8 @@ def shape_curves(case: Case) -> Shapes:
             faults.append(case.fault(wrong, legs.found, legs.expected))
             continue
         curves[name] = Curve(name, legs)
-    size, tolerance = measure(curves)
+    size, largest = _measure(curves)
+    tolerance = make_tolerance(curves, roles, largest)
     if curves and not size > SMALLEST:
         found = f"curves with an extent of {size:g}"
         faults.append(case.fault(("curves",), found, f"a model larger than {SMALLEST:g}"))
@@ -69,16 +70,13 @@ def shape_curves(case: Case) -> Shapes:
     return Shapes(curves, size, tolerance, tuple(faults))
 
 
-def measure(curves: Mapping[str, Curve]) -> tuple[float, float]:
-    """Largest extent of all curves, and the distance below which two points are one."""
+def _measure(curves: Mapping[str, Curve]) -> tuple[float, float]:
+    """Largest extent of all curves, and their largest coordinate."""
     if not curves:
         return 0.0, 0.0
     points = np.concatenate([extremes(leg) for curve in curves.values() for leg in curve.legs])
     extents = points.real.max() - points.real.min(), points.imag.max() - points.imag.min()
-    size = float(max(extents))
-    # Far from the origin the coordinates themselves are rounded.
-    rounding = 16 * float(np.finfo(float).eps) * float(np.abs(points).max())
-    return size, max(SAME_POINT * size, rounding)
+    return float(max(extents)), float(np.abs(points).max())
 
 
 def share(total: int, lengths: Sequence[float]) -> list[int]:
@@ -185,10 +183,11 @@ def _point_on_circle(center: complex, radius: float, degrees: float) -> complex:
     return center + radius * direction
 
 
-def _join(curves: Mapping[str, Curve], tolerance: float) -> tuple[dict[str, Curve], list[tuple[str, int]]]:
+def _join(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[str, Curve], list[tuple[str, int]]]:
     """Replace every end by the first point of the file that is the same; also name legs that shrink to a point."""
     points = np.array([point for curve in curves.values() for leg in curve.legs for point in (leg.start, leg.end)])
-    joined, number = _first_equal(points, tolerance), 0
+    owners = [name for name, curve in curves.items() for _ in range(2 * len(curve.legs))]
+    joined, number = join_points(points, owners, tolerance) if len(points) else points, 0
     result, short = {}, []
     for name, curve in curves.items():
         legs = []
@@ -201,20 +200,3 @@ def _join(curves: Mapping[str, Curve], tolerance: float) -> tuple[dict[str, Curv
             legs.append(replace(leg, start=start, end=end))
         result[name] = Curve(name, tuple(legs))
     return result, list({name: (name, index) for name, index in reversed(short)}.values())
-
-
-def _first_equal(points: np.ndarray, tolerance: float) -> np.ndarray:
-    """For each point the first of the list within the tolerance (of those that are themselves first)."""
-    result = points.copy()
-    order = np.argsort(points.real, kind="stable")
-    sorted_x = points.real[order]
-    taken = np.zeros(len(points), dtype=bool)
-    for index in range(len(points)):
-        if taken[index]:
-            continue
-        low, high = np.searchsorted(sorted_x, (points[index].real - tolerance, points[index].real + tolerance * 1.0001))
-        near = order[low:high]
-        near = near[(np.abs(points[near] - points[index]) <= tolerance) & ~taken[near]]
-        result[near], taken[near] = points[index], True
-        taken[index] = True
-    return result

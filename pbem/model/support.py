@@ -66,11 +66,31 @@ def find_free_motions(model: Model, ties: Mapping[str, Tie | PairTie] | None = N
     ties: name of an interface or contact to what it holds: "both" relative displacements, the "normal" one, or "none",
     all along it, or what single pairs of it hold; those that are not named hold what their law gives (`default_tie`).
     """
+    return _find_motions(model, dict(ties or {}), plane_held=True)
+
+
+def find_plane_translations(model: Model) -> tuple[FreeMotion, ...]:
+    """Translations of infinite regions, with all that is tied to them, that no prescribed displacement or spring holds.
+
+    What is far away does not hold them: in a plane the displacement of a net force grows with the logarithm of the
+    distance. It does hold rotations, as that of a moment falls with the distance.
+    """
+    infinite = {region.name for region in model.regions if region.infinite}
+    if not infinite:
+        return ()
+    motions = _find_motions(model, {}, plane_held=False)
+    return tuple(
+        motion for motion in motions
+        if any(name in infinite and not spin for name, (_, spin) in motion.velocities.items())
+    )
+
+
+def _find_motions(model: Model, ties: Mapping[str, Tie | PairTie], plane_held: bool) -> tuple[FreeMotion, ...]:
     names = [region.name for region in model.regions]
     center, scale = _frame(model)
-    links = [*_link_to_ground(model, center, scale), *_link_regions(model, names, dict(ties or {}), center, scale)]
+    links = [*_link_to_ground(model, center, scale, plane_held), *_link_regions(model, names, ties, center, scale)]
     return tuple(
-        describe_motion(vector, [names[body] for body in bodies], center, scale)
+        describe_motion(vector, [names[body] for body in bodies], center, scale, model.origin)
         for bodies, vector in find_moving_bodies(len(names), links)
     )
 
@@ -91,9 +111,9 @@ def _constrain(motions: NDArray[np.complex128], directions: list[NDArray[np.comp
     return np.asarray(np.linalg.qr(np.concatenate(components), mode="r"))
 
 
-def _link_to_ground(model: Model, center: complex, scale: float) -> Iterator[Link]:
+def _link_to_ground(model: Model, center: complex, scale: float, plane_held: bool) -> Iterator[Link]:
     for number, region in enumerate(model.regions):
-        if region.infinite:  # held by what is far away
+        if region.infinite and plane_held:  # by what is far away
             yield number, GROUND, np.eye(3)
         for side in (side for loop in region.loops for side in loop.sides):
             condition = model.conditions.get(side.curve)
@@ -151,8 +171,12 @@ def _touches(model: Model, joint: Interface | Contact) -> bool:
     return measure_opening(model, joint) <= max(TOUCHING * shorter, ROUNDINGS * sys.float_info.epsilon * largest)
 
 
-def describe_motion(vector: NDArray[np.float64], names: list[str], center: complex, scale: float) -> FreeMotion:
-    """A motion (3 bodies,) of named bodies: along x, along y, and the angle times scale about the center."""
+def describe_motion(
+    vector: NDArray[np.float64], names: list[str], center: complex, scale: float, origin: complex
+) -> FreeMotion:
+    """A motion (3 bodies,) of named bodies: along x, along y, and the angle times scale about the center.
+
+    origin: what is added to places in the text."""
     velocities: dict[str, tuple[complex, float]] = {}
     parts: dict[str, list[str]] = {}
     moving = np.flatnonzero(np.abs(vector.reshape(-1, 3)).max(axis=1) >= 1e-6)
@@ -162,7 +186,7 @@ def describe_motion(vector: NDArray[np.float64], names: list[str], center: compl
         spin = turn / scale
         velocities[name] = (complex(x, y) - 1j * spin * center, spin)
         if abs(turn) > 1e-6:
-            pole = center + 1j * complex(x, y) / spin
+            pole = center + 1j * complex(x, y) / spin + origin
             pole = complex(*(0.0 if abs(part) < 1e-9 * scale else part for part in (pole.real, pole.imag)))
             text = f"rotation about {format_point(pole)}"
         elif abs(y) < 1e-6 * abs(x):

@@ -18,7 +18,8 @@ Opening = Callable[[Complex], Real]
 
 
 def sample_gap(law: Law, points: Complex) -> Real:
-    """The law's own gap at points (any shape). Raises ExpressionError if its expression is none."""
+    """The law's own gap at points of the user's coordinates (any shape). Raises ExpressionError if its expression is
+    none."""
     if isinstance(law.gap, str):
         return evaluate_expression(law.gap, x=points.real, y=points.imag)
     return np.full(points.shape, law.gap)
@@ -27,11 +28,11 @@ def sample_gap(law: Law, points: Complex) -> Real:
 def measure_opening(model: Model, joint: Interface | Contact) -> float:
     """The least initial opening anywhere on an interface, or between the curves of a contact (distance and gap)."""
     if isinstance(joint, Interface):
-        return find_least(model.curves[joint.name], lambda points: sample_gap(joint.law, points))[0]
+        return find_least(model.curves[joint.name], lambda points: sample_gap(joint.law, points + model.origin))[0]
     first, second = model.curves[joint.first], model.curves[joint.second]
 
     def opening(points: Complex) -> Real:
-        return measure_distances(second.legs, points) + sample_gap(joint.law, points)
+        return measure_distances(second.legs, points) + sample_gap(joint.law, points + model.origin)
 
     # A corner of the second curve may face the first one between two samples.
     corners = [complex(end) for leg in second.legs for end in (leg.start, leg.end)]

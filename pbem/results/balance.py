@@ -5,42 +5,58 @@ from __future__ import annotations
 import h5py
 import numpy as np
 
+from pbem.contact.cut_parts import name_part
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.parts import find_parts
+from pbem.model.model import Model
 from pbem.results.contents import Balances
 from pbem.results.lazy import freeze, read_names
 from pbem.solve.step import Step
 
-QUANTITIES = ("resultant", "relative", "carried")
+# Quantities of the regions; of the parts that cracks cut off; of the whole.
+OF_REGIONS = ("resultant", "relative", "carried")
+OF_PARTS = ("part_resultant", "part_relative")
+OF_WHOLE = ("whole", "whole_relative")
 
 
-def create_balance(file: h5py.File, mesh: Mesh) -> None:
-    """Create the datasets, without entries; the names of the regions are an attribute of each."""
+def create_balance(file: h5py.File, model: Model, mesh: Mesh) -> None:
+    """Create the datasets, without entries; the names of regions and parts are an attribute of each."""
     group, count = file.create_group("balance"), len(mesh.region_names)
-    for name, shape in zip(QUANTITIES, ((count, 3), (count,), (count,)), strict=True):
-        rows = max(1, min(64, 4096 // count))
+    parts = find_parts(mesh)
+    cut = [name_part(mesh, parts, int(part), model.origin) for part in np.flatnonzero(parts.cut)]
+    shapes = {"resultant": (count, 3), "relative": (count,), "carried": (count,), "whole": (3,), "whole_relative": ()}
+    shapes |= {"part_resultant": (len(cut), 3), "part_relative": (len(cut),)} if cut else {}
+    for name, shape in shapes.items():
+        rows = max(1, min(64, 4096 // (shape[0] if shape else 1)))
         group.create_dataset(name, shape=(0, *shape), maxshape=(None, *shape), dtype="f8", chunks=(rows, *shape))
-        group[name].attrs["names"] = np.array(mesh.region_names, dtype=h5py.string_dtype())
+        if name not in OF_WHOLE:
+            names = cut if name in OF_PARTS else list(mesh.region_names)
+            group[name].attrs["names"] = np.array(names, dtype=h5py.string_dtype())
 
 
 def append_balance(file: h5py.File, step: Step) -> None:
     """Add a step's entries, which are not numbers where it tells nothing of its balance."""
-    for name in QUANTITIES if "balance" in file else ():
-        dataset = file["balance"][name]
+    for name, dataset in file["balance"].items() if "balance" in file else ():
         dataset.resize(dataset.shape[0] + 1, axis=0)
         dataset[-1] = np.nan if step.balance is None else getattr(step.balance, name)
 
 
 def read_balance(file: h5py.File, steps: int) -> Balances | None:
     """The entries of the first steps; None in files of earlier versions."""
-    if "balance" not in file:
+    if "balance" not in file or "whole" not in file["balance"]:
         return None
     group = file["balance"]
-    values = {name: freeze(group[name][:steps]) for name in QUANTITIES}
-    return Balances(names=read_names(group["relative"]), **values)
+    empty = {"part_resultant": np.zeros((steps, 0, 3)), "part_relative": np.zeros((steps, 0))}
+    values = {
+        name: freeze(group[name][:steps] if name in group else empty[name])
+        for name in (*OF_REGIONS, *OF_PARTS, *OF_WHOLE)
+    }
+    parts = read_names(group["part_relative"]) if "part_relative" in group else ()
+    return Balances(names=read_names(group["relative"]), part_names=parts, **values)
 
 
 def describe_balance(balances: Balances | None) -> list[str]:
-    """The worst region of the last step, in a line."""
+    """The worst region of the last step, the worst part that cracks cut off, and the whole, in a line each."""
     if balances is None or not len(balances.relative) or np.isnan(balances.relative[-1]).any():
         return []
     worst = int(np.argmax(balances.relative[-1]))
@@ -48,6 +64,17 @@ def describe_balance(balances: Balances | None) -> list[str]:
         f"forces and moments on every region balance to {balances.relative[-1, worst]:.1e} of their sums without signs"
         f" (worst: {balances.names[worst]})"
     ]
+    if len(balances.part_names):
+        at = int(np.argmax(balances.part_relative[-1]))
+        lines.append(
+            f"on every part that cracks cut off to {balances.part_relative[-1, at]:.1e} (worst: "
+            f"{balances.part_names[at]})"
+        )
+    x, y, moment = balances.whole[-1]
+    lines.append(
+        f"all that acts from outside, to {balances.whole_relative[-1]:.1e}: ({x:.3g}, {y:.3g}) and a moment of "
+        f"{moment:.3g} are left"
+    )
     if balances.carried[-1].any():
         held = int(np.argmax(balances.carried[-1]))
         part = f"{balances.carried[-1, held]:.1e}"

@@ -105,19 +105,43 @@ class Errors:
 
 
 @dataclass(frozen=True)
+class Linearities:
+    """How large strains, rotations and slips are, over the k stored steps.
+
+    regions, interfaces: their names. strain, rotation (k, regions): of the boundary along itself, what a hundredth of
+    its length exceeds (radians). slip (k, interfaces): the largest, to the mean length of the elements. NaN where not
+    known.
+    """
+
+    regions: tuple[str, ...]
+    interfaces: tuple[str, ...]
+    strain: Real
+    rotation: Real
+    slip: Real
+
+
+@dataclass(frozen=True)
 class Balances:
     """What is left over of the forces on r regions, over the k stored steps.
 
     names: of the regions. resultant (k, r, 3): force along x and y (stress times length) and moment about the region's
     centre, the mean of its boundary; of weight and in-situ stress too. relative (k, r): the larger of force and moment,
-    to the sums of their parts without signs; 0 for infinite regions, which may carry a resultant. carried (k, r): of
-    what keeps the mean motion of bodies at zero that nothing else holds; 0 where nothing has to. NaN where not known.
+    to the sums of their parts without signs; of infinite regions, which may carry a moment, the force. carried (k, r):
+    of what keeps the mean motion of bodies at zero that nothing else holds; 0 where nothing has to.
+    part_names (p,): of the parts that cracks cut off. part_resultant (k, p, 3), part_relative (k, p): the same of them,
+    with the tractions of the cracks' faces. whole (k, 3), whole_relative (k,): of all that acts from outside - on outer
+    curves, and weight - about the middle of the model. NaN where not known.
     """
 
     names: tuple[str, ...]
     resultant: Real
     relative: Real
     carried: Real
+    part_names: tuple[str, ...]
+    part_resultant: Real
+    part_relative: Real
+    whole: Real
+    whole_relative: Real
 
 
 @dataclass(frozen=True)

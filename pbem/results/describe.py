@@ -13,6 +13,7 @@ from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
 from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
+from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
 from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.solve.step import OPEN, SLIP, STICK
@@ -68,6 +69,7 @@ def describe_results(results: Results) -> str:
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
+        parts.append(_section("beyond linear theory at the last step", describe_linearity(results.linearity)))
         parts.append(_section("estimated discretisation errors at the last step", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],

@@ -19,6 +19,7 @@ from pbem.results.balance import create_balance
 from pbem.results.configuration import dump_configuration
 from pbem.results.estimates import list_datasets
 from pbem.results.interface_tips import list_tip_curves
+from pbem.results.linearity import create_linearity
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
 
@@ -73,7 +74,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     interior_region (q,): index of the region of every interior point, -1 outside of all.
     """
     faces = list_faces(mesh)
-    _write_nodes(file, mesh, faces)
+    _write_nodes(file, mesh, faces, model.origin)
     steps = file.create_group("steps")
     for name, kind in STEP_DATASETS.items():
         _create_growing(steps, name, (), kind)
@@ -89,30 +90,31 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDA
     energy = file.create_group("energy")
     for name in ENERGIES:
         create_energy(energy, name)
-    create_balance(file, mesh)
+    create_balance(file, model, mesh)
+    create_linearity(file, mesh)
     _write_estimates(file.create_group("estimates"), model, mesh)
     if model.analysis.accuracy is not None:
         _write_fractions(file.create_group("mesh"), model)
     if model.interior_points:
         interior = file.create_group("interior")
-        interior["position"] = to_columns(np.array(model.interior_points))
+        interior["position"] = to_columns(np.array(model.interior_points) + model.origin)
         interior["region"] = interior_region.astype("i4")
         _create_growing(interior, "displacement", (len(interior_region), 2), "f8")
         _create_growing(interior, "stress", (len(interior_region), 3), "f8")
     file.create_dataset("convergence", shape=(0,), maxshape=(None,), dtype=ITERATION, chunks=(256,))
 
 
-def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces) -> None:
+def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces, origin: complex) -> None:
     crack = np.flatnonzero(mesh.crack)
     nodes = file.create_group("nodes")
-    nodes["position"] = to_columns(faces.position)
+    nodes["position"] = to_columns(faces.position + origin)
     nodes["normal"] = to_columns(faces.normal)
     nodes["element"] = faces.element.astype("i4")
     nodes["region"] = faces.region.astype("i4")
     nodes["curve"] = faces.curve.astype("i4")
     nodes.attrs["order"] = np.int32(mesh.order)
     elements = file.create_group("elements")
-    elements["vertices"] = np.stack([to_columns(faces.start), to_columns(faces.end)], axis=1)
+    elements["vertices"] = np.stack([to_columns(faces.start + origin), to_columns(faces.end + origin)], axis=1)
     elements["region"] = np.concatenate([mesh.region, mesh.region[crack]]).astype("i4")
     elements["curve"] = np.concatenate([mesh.curve, mesh.curve[crack]]).astype("i4")
     elements["sweep"] = np.concatenate([mesh.sweep, -mesh.sweep[crack]])
@@ -189,8 +191,8 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
     order = join_pairs(interfaces)
     together["interface"] = np.repeat(np.arange(len(counts)), counts).astype("i4")
     fixed = {
-        "position": to_columns(mesh.pairs.position[order]), "normal": to_columns(mesh.pairs.normal[order]),
-        "arc_length": mesh.pairs.arc_length[order],
+        "position": to_columns(mesh.pairs.position[order] + model.origin),
+        "normal": to_columns(mesh.pairs.normal[order]), "arc_length": mesh.pairs.arc_length[order],
     }  # fmt: skip
     for name, values in fixed.items():
         together[name] = values

@@ -14,8 +14,10 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as OutlinePath
 from numpy.typing import NDArray
 
+from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model
+from pbem.model.origin import move_back
 from pbem.results.describe import describe_condition
 from pbem.results.level_plot import draw_levels
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns, trace_elements
@@ -36,6 +38,9 @@ def plot_model(
 
 def draw_model(model: Model, mesh: Mesh, levels: NDArray[np.int64] | None = None) -> Figure:
     """The figure of `plot_model`; levels (e,): how often each element was halved, to be shown by colours."""
+    if model.origin:
+        model = move_back(model)
+        mesh = generate_mesh(model)
     figure = Figure(figsize=(7.2, 5.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()

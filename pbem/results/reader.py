@@ -19,7 +19,7 @@ from pbem.case.generation import Group
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
-from pbem.results.contents import Balances, Elements, Energies, Errors, Nodes, Steps, Tips, Units
+from pbem.results.contents import Balances, Elements, Energies, Errors, Linearities, Nodes, Steps, Tips, Units
 from pbem.results.journal import check_pages, is_being_written
 from pbem.results.layout import ENERGIES, TIP_DATASETS, count_steps, read_fractions
 from pbem.results.lazy import (
@@ -32,6 +32,7 @@ from pbem.results.lazy import (
     read_names,
     refuse_damage,
 )
+from pbem.results.linearity import read_linearity
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -46,9 +47,9 @@ class Results:
 
     reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; pairs: all of them at
     once; groups: interfaces that a table [[generate]] made; tips: per crack what its tips carry; energy: the
-    energies; balance: of the forces on every region, None in files of earlier versions; interior: points inside, None
-    if the case has none; convergence: one row per Newton iteration with the fields step, iteration, residual, changed,
-    stick, slip, open, seconds.
+    energies; balance: of the forces on every region, and linearity: how large strains and slips are, None in files of
+    earlier versions; interior: points inside, None if the case has none; convergence: one row per Newton iteration with
+    the fields step, iteration, residual, changed, stick, slip, open, seconds.
     failure: why the run ended early (status "failed" or "stopped"), empty if it did not, or was killed.
     """
 
@@ -72,6 +73,7 @@ class Results:
     tips: Mapping[str, Tips]
     energy: Energies
     balance: Balances | None
+    linearity: Linearities | None
     interior: Interior | None
     convergence: NDArray[Any] = field(repr=False)
 
@@ -185,6 +187,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         tips=_read_tips(file, k),
         energy=Energies(*(freeze(_read_energy(file, kind, k)) for kind in ENERGIES)),
         balance=read_balance(file, k),
+        linearity=read_linearity(file, k),
         interior=_read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
     )

@@ -29,6 +29,9 @@ from pbem.results.layout import (
 from pbem.results.lazy import open_quietly
 from pbem.solve.step import ContactState, Step
 
+# Places that differ by less than this part of the model's size and of its distance from the origin are one.
+SAME_PLACE = 1e-12
+
 
 def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> None:
     """Raise ResultFileError unless the file holds this case on this mesh."""
@@ -46,9 +49,10 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     if model.crack_tips and not set(TIP_DATASETS) <= set(file["all/tips"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
-    position = to_columns(list_faces(mesh).position)
+    position = to_columns(list_faces(mesh).position + model.origin)
     stored = file["nodes/position"][...]
-    if stored.shape != position.shape or np.abs(stored - position).max() > 1e-12 * model.size:
+    same = SAME_PLACE * (model.size + abs(model.origin))
+    if stored.shape != position.shape or np.abs(stored - position).max() > same:
         raise ResultFileError(path, "holds another mesh of this case (it was written by another version of pbem); "
                                     "run without resuming")
 

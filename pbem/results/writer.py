@@ -34,6 +34,7 @@ from pbem.results.layout import (
     write_header,
 )
 from pbem.results.lazy import refuse_damage
+from pbem.results.linearity import append_linearity
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
 from pbem.results.store import Store, create_store, remove_stale_parts
@@ -208,6 +209,7 @@ class ResultWriter:
         for kind in ENERGIES:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         append_balance(file, step)
+        append_linearity(file, step)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):

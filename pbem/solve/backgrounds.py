@@ -17,5 +17,6 @@ def evaluate_backgrounds(model: Model, stage: int, factor: float) -> list[tuple[
     values = start + factor * (end - start)
     gravity = complex(values[0], values[1])
     return [
-        (balanced_background(model, region, gravity), far_background(region, values[2:])) for region in model.regions
+        (balanced_background(model, region, gravity), far_background(model, region, values[2:]))
+        for region in model.regions
     ]

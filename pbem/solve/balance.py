@@ -7,11 +7,14 @@ move freely.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.anchor import group_motions
+from pbem.contact.cut_parts import name_part
 from pbem.contact.loads import Load
 from pbem.contact.support import Support
 from pbem.errors import ConvergenceError
@@ -25,6 +28,10 @@ Complex = NDArray[np.complex128]
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
 # anchors hold it, and that make a result wrong, where they are more than NOTED of those on the most loaded region too.
 NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
+# The same of a net force on an infinite region that prescribed displacements or springs bring about.
+NET_FORCE = 1e-2
+# Parts that cracks cut off are judged if they carry more than this part of what the most loaded region does.
+SLIGHT = 1e-2
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
 # Motions that differ by less than this part of their size are one.
@@ -34,37 +41,118 @@ SAME = 1e-9
 def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
     """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted."""
     mesh, count = problem.mesh, len(problem.mesh.region_names)
-    of, weight = mesh.node_region, np.where(mesh.node_crack, 0.0, mesh.weight)
+    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    bounding = np.flatnonzero(~mesh.node_crack)
+    least = _find_least_traction(problem, v, np.abs(whole[bounding]).max(initial=0.0))
+    faces = _Faces(mesh.position[bounding], mesh.weight[bounding], whole[bounding], known[bounding])
+    regions = _add_up(faces, mesh.node_region[bounding], count, least)
+    finite = np.array([not region.infinite for region in problem.model.regions])
+    # An infinite region may carry a moment, which decays.
+    turned = np.where(finite, _divide(np.abs(regions.moment), regions.moments), 0.0)
+    relative = np.maximum(_divide(np.abs(regions.force), regions.forces), turned)
+    carried = np.zeros(count)
+    if support.acting.shape[1]:
+        left, sums = (regions.force, regions.moment), (regions.forces, regions.moments)
+        for motions in group_motions(support.motions):
+            own, part = _measure_carried(problem, motions, regions.middle, left, sums)
+            carried[own] = np.maximum(carried[own], part)
+    most = np.full(count, regions.forces.max())
+    parts, part_relative = _measure_parts(problem, whole, known, least)
+    total, total_relative = _measure_whole(problem, faces, bounding, least)
+    return Balance(
+        resultant=regions.resultant, relative=relative, carried=carried, weight=_divide(regions.forces, most),
+        part_resultant=parts.resultant, part_relative=part_relative,
+        part_weight=_divide(parts.forces, np.full(len(parts.forces), regions.forces.max())),
+        whole=total.resultant[0], whole_relative=total_relative,
+    )
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Nodes (n,) of faces: places, weights, tractions, and of these the part in balance with weight and in-situ
+    stress."""
+
+    position: Complex
+    weight: Real
+    traction: Complex
+    known: Complex
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Of each body: force and moment left over, about its middle; the sums of their parts without signs."""
+
+    middle: Complex
+    force: Complex
+    moment: Real
+    forces: Real
+    moments: Real
+
+    @property
+    def resultant(self) -> Real:
+        return np.stack([self.force.real, self.force.imag, self.moment], axis=1)
+
+
+def _add_up(faces: _Faces, of: NDArray[np.int64], count: int, least: float) -> _Sums:
+    """The sums over the faces of bodies; of (n,): number of the body of each node, in rising order."""
 
     def add(values: Real) -> Real:
-        return np.bincount(of, weight * values, count).astype(float)
+        return np.bincount(of, faces.weight * values, count).astype(float)
 
     def add_vectors(values: Complex) -> Complex:
         return add(values.real) + 1j * add(values.imag)
 
-    length = add(np.ones(mesh.nodes))
-    # About a node of the region first, as coordinates can be large.
-    start = mesh.position[np.searchsorted(of, np.arange(count))]
+    length = add(np.ones(len(of)))
+    # About a node of the body first, as coordinates can be large.
+    start = np.append(faces.position, 0j)[np.searchsorted(of, np.arange(count))]
     # Of a plane with nothing but cracks in it there is no boundary.
-    middle = start + add_vectors(mesh.position - start[of]) / np.where(length > 0, length, 1.0)
-    lever = mesh.position - middle[of]
-    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    middle = start + add_vectors(faces.position - start[of]) / np.where(length > 0, length, 1.0)
+    lever = faces.position - middle[of]
+    whole, known = faces.traction, faces.known
     elastic = whole - known
-    force, moment = add_vectors(elastic), add((np.conj(lever) * elastic).imag)
-    least = _find_least_traction(problem, v, np.abs(whole[weight > 0]).max(initial=0.0))
-    forces = np.maximum(add(np.abs(whole)), least * length) + np.abs(add_vectors(known))
-    moments = np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever))) + np.abs(
-        add((np.conj(lever) * known).imag)
+    return _Sums(
+        middle=middle, force=add_vectors(elastic), moment=add((np.conj(lever) * elastic).imag),
+        forces=np.maximum(add(np.abs(whole)), least * length) + np.abs(add_vectors(known)),
+        moments=np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever)))
+        + np.abs(add((np.conj(lever) * known).imag)),
     )
-    finite = np.array([not region.infinite for region in problem.model.regions])
-    relative = np.where(finite, np.maximum(_divide(np.abs(force), forces), _divide(np.abs(moment), moments)), 0.0)
-    carried = np.zeros(count)
-    if support.acting.shape[1]:
-        for motions in group_motions(support.motions):
-            own, part = _measure_carried(problem, motions, middle, (force, moment), (forces, moments))
-            carried[own] = np.maximum(carried[own], part)
-    weight = _divide(forces, np.full(count, forces.max()))
-    return Balance(np.stack([force.real, force.imag, moment], axis=1), relative, carried, weight)
+
+
+def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: float) -> tuple[_Sums, Real]:
+    """The sums of the parts that cracks cut off, with the tractions of the cracks' faces, and what is left over."""
+    mesh, parts, chosen = problem.mesh, problem.parts, problem.cut_parts
+    crack = np.flatnonzero(mesh.node_crack)
+    nodes = np.concatenate([np.arange(mesh.nodes), crack]) if len(chosen) else crack[:0]
+    sign = np.where(np.arange(len(nodes)) < mesh.nodes, 1.0, -1.0)
+    number = np.full(len(parts.region), -1)
+    number[chosen] = np.arange(len(chosen))
+    element = mesh.node_element[nodes]
+    of = number[np.where(sign > 0, parts.first[element], parts.second[element])]
+    order = np.argsort(of, kind="stable")
+    order = order[of[order] >= 0]
+    nodes, sign, of = nodes[order], sign[order], of[order]
+    sums = _add_up(
+        _Faces(mesh.position[nodes], mesh.weight[nodes], sign * whole[nodes], sign * known[nodes]),
+        of, len(chosen), least,
+    )
+    finite = np.array([not problem.model.regions[parts.region[part]].infinite for part in chosen], dtype=bool)
+    turned = np.where(finite, _divide(np.abs(sums.moment), sums.moments), 0.0)
+    return sums, np.maximum(_divide(np.abs(sums.force), sums.forces), turned)
+
+
+def _measure_whole(problem: Problem, faces: _Faces, bounding: NDArray[np.int64], least: float) -> tuple[_Sums, float]:
+    """The sums over outer curves, and the weight: what acts on all bodies together from outside.
+
+    What interfaces and contacts carry from one to the other cancels in it, as it should.
+    """
+    outer = np.zeros(problem.mesh.nodes, dtype=bool)
+    outer[problem.outer.node] = True
+    traction = np.where(outer[bounding], faces.traction, 0.0)
+    weight = np.where(outer[bounding] | (faces.known != 0), faces.weight, 0.0)
+    sums = _add_up(replace(faces, traction=traction, weight=weight), np.zeros(len(bounding), dtype=np.int64), 1, least)
+    infinite = any(region.infinite for region in problem.model.regions)
+    parts = [_divide(np.abs(sums.force), sums.forces), _divide(np.abs(sums.moment), sums.moments)]
+    return sums, float(parts[0][0] if infinite else max(part[0] for part in parts))
 
 
 def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
@@ -106,24 +194,57 @@ def _divide(part: Real, whole: Real) -> Real:
 
 
 def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
-    """What is left over on the worst region, where that is worth a note; None if all regions are in balance.
+    """What is left over on the worst region, part or on the whole, where that is worth a note; None if it is not.
 
-    Raises ConvergenceError ("not in balance") where it makes the result wrong.
+    Raises ConvergenceError where it makes the result wrong: "not in balance", or "net force" of an infinite region.
     """
-    wrong = (balance.relative > NOT_IN_BALANCE) & (balance.relative * balance.weight > NOTED)
-    worst = int(np.argmax(np.where(wrong, balance.relative, 0.0) if wrong.any() else balance.relative))
-    amount = float(balance.relative[worst])
+    _refuse_net_force(problem, balance)
+    parts = problem.cut_parts
+    relative = np.concatenate([balance.relative, balance.part_relative, [balance.whole_relative]])
+    weight = np.concatenate([balance.weight, balance.part_weight, [1.0]])
+    # Slivers between cracks carry little, of which much may be left over.
+    relative[len(balance.relative) :][weight[len(balance.relative) :] < SLIGHT] = 0.0
+    wrong = (relative > NOT_IN_BALANCE) & (relative * weight > NOTED)
+    worst = int(np.argmax(np.where(wrong, relative, 0.0) if wrong.any() else relative))
+    amount, at = float(relative[worst]), worst - len(balance.relative)
     if amount <= NOTED:
         return None
-    name = problem.mesh.region_names[worst]
-    x, y, moment = balance.resultant[worst]
+    x, y, moment = np.concatenate([balance.resultant, balance.part_resultant, balance.whole[None]])[worst]
+    if at < 0:
+        on = f"region '{problem.mesh.region_names[worst]}'"
+    elif at < len(parts):
+        on = f"'{name_part(problem.mesh, problem.parts, int(parts[at]), problem.model.origin)}'"
+    else:
+        on = "the whole model"
     left = (
-        f"the forces on region '{name}' do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
+        f"the forces on {on} do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
         f"{100 * amount:.2g} % of their sum without signs"
     )
-    held = float(balance.carried[worst])
-    if held > NOTED:
+    if at < 0 and float(balance.carried[worst]) > NOTED:
         left += ", which nothing but the condition on its mean motion carries"
     if wrong.any():
         raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
     return left
+
+
+def _refuse_net_force(problem: Problem, balance: Balance) -> None:
+    """Raise ConvergenceError if displacements that are prescribed push against an infinite region.
+
+    What they move it by grows with the logarithm of the distance to which it is looked at, and so does without bound
+    the force that an answer to them would take.
+    """
+    conditions = problem.model.conditions.values()
+    if not any("displacement" in each.known or any(each.stiffness) for each in conditions):
+        return
+    for number, region in enumerate(problem.model.regions):
+        amount = float(balance.relative[number])
+        if region.infinite and amount > NET_FORCE and amount * balance.weight[number] > NET_FORCE:
+            x, y, _ = balance.resultant[number]
+            raise ConvergenceError(
+                "net force",
+                f"prescribed displacements or springs act on the infinite region '{region.name}' with a net force of "
+                f"({x:.6g}, {y:.6g}), {100 * amount:.2g} % of the sum of all forces there without signs; the "
+                "displacement of a net force grows with the logarithm of the distance, so that these conditions "
+                "determine neither it nor their reactions; prescribe displacements whose forces balance, or "
+                "tractions that do, or a stiff inclusion in place of a hole held at rest, or take a finite region",
+            )

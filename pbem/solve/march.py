@@ -12,6 +12,7 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.balance import describe_imbalance, measure_balance
 from pbem.solve.krylov import make_tangent
+from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_linearity
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.proportional import is_proportional
@@ -51,7 +52,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
     """
     begin = start or start_from_rest(problem)
     tangent = make_tangent(problem)
-    number, memory, noted = begin.number, begin.memory, 0.0
+    number, memory, noted, told = begin.number, begin.memory, 0.0, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
@@ -63,6 +64,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
                 number += 1
                 step = describe_step(problem, solution, memory, number, stage, reached)
                 noted = _note_imbalance(problem, step, noted, reporter)
+                told = _note_nonlinearity(problem, step, told, reporter)
                 reporter.accept(step)
                 yield step
     except (ConvergenceError, GeneratorExit):
@@ -84,11 +86,24 @@ def _note_imbalance(problem: Problem, step: Step, noted: float, reporter: Report
     except ConvergenceError as error:
         detail = f"the step to the fraction {step.factor:.6g} of stage {name!r} is wrong: {error.detail}"
         raise ConvergenceError(error.reason, detail) from error
-    amount = float(balance.relative.max(initial=0.0))
+    amount = max(float(balance.relative.max(initial=0.0)), float(balance.part_relative.max(initial=0.0)))
     if text is None or amount <= 2 * noted:
         return noted
     reporter.note(f"Step {step.number}: {text}.")
     return amount
+
+
+def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
+    """Note what is beyond linear theory if it is twice as much as was noted before; returns what has been noted now."""
+    assert step.linearity is not None
+    amount = measure_excess(step.linearity)
+    mesh = problem.mesh
+    if amount > 2 * noted:
+        notes = describe_nonlinearity(mesh.region_names, mesh.interface_names, step.linearity)
+        for text in notes:
+            reporter.note(f"Step {step.number}: {text}.")
+        return amount if notes else noted
+    return noted
 
 
 def _advance(
@@ -157,13 +172,14 @@ def describe_step(
     opposite[cracks] = mean - jump / 2
     order = problem.second_faces
     pairs = solution.pairs
+    everywhere = np.concatenate([displacement, opposite[order]])
     return Step(
         number=number,
         stage=stage,
         factor=factor,
         iterations=solution.iterations,
         residual=solution.residual,
-        displacement=np.concatenate([displacement, opposite[order]]),
+        displacement=everywhere,
         traction=np.concatenate([traction, -traction[order]]),
         contact=ContactState(
             mode=solution.modes.mode,
@@ -175,4 +191,5 @@ def describe_step(
             broken=memory.broken,
         ),
         balance=measure_balance(problem, solution.v, load, problem.find_support(solution.modes)),
+        linearity=measure_linearity(mesh, everywhere, pairs.g_s),
     )

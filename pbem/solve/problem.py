@@ -83,6 +83,11 @@ class Problem:
         """Into which cracks cut the regions."""
         return find_parts(self.mesh)
 
+    @cached_property
+    def cut_parts(self) -> Integer:
+        """Numbers of the parts that share their region with others."""
+        return np.flatnonzero(self.parts.cut)
+
     def find_support(self, modes: ModeState) -> Support:
         """What holds the bodies in given modes; remembered, as modes are asked of several times."""
         return self._supports(modes.mode.tobytes())

@@ -53,15 +53,36 @@ class Balance:
     """What is left over on r regions.
 
     resultant (r, 3): force along x and y (stress times length) and moment about the region's centre, the mean of its
-    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; 0 for infinite
-    regions, which may carry a resultant. carried (r,): as relative, of what the acting anchors carry; 0 without any.
+    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; of infinite
+    regions, which may carry a moment, the force. carried (r,): as relative, of what the acting anchors carry; 0
+    without any.
     weight (r,): the sum of forces without signs, to that of the region with the most.
+    part_resultant (p, 3), part_relative, part_weight (p,): the same of the parts into which cracks cut regions; none
+    where they do not. whole (3,), whole_relative: of all that acts on the model from outside, about its middle.
     """
 
     resultant: NDArray[np.float64]
     relative: NDArray[np.float64]
     carried: NDArray[np.float64]
     weight: NDArray[np.float64]
+    part_resultant: NDArray[np.float64]
+    part_relative: NDArray[np.float64]
+    part_weight: NDArray[np.float64]
+    whole: NDArray[np.float64]
+    whole_relative: float
+
+
+@dataclass(frozen=True)
+class Linearity:
+    """How large strains, rotations (radians) and slips are, of r regions and i interfaces.
+
+    strain, rotation (r,): of the boundary along itself, what a hundredth of its length exceeds. slip (i,): the largest
+    one, to the mean length of the interface's elements.
+    """
+
+    strain: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    slip: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -78,7 +99,7 @@ class Step:
 
     number: from 1 on, sub-steps counted; stage: index; factor: fraction of the stage reached, in (0, 1].
     displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
-    interior: at the interior points, once evaluated. balance: of the forces; None where it is not told.
+    interior: at the interior points, once evaluated. balance, linearity: None where they are not told.
     last_of_stage: True at factor 1.
     """
 
@@ -92,6 +113,7 @@ class Step:
     contact: ContactState
     interior: Interior | None = None
     balance: Balance | None = None
+    linearity: Linearity | None = None
 
     @property
     def last_of_stage(self) -> bool:

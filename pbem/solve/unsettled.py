@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
+from pbem.model.junction import format_point
 from pbem.solve.problem import Problem
 
 Integer = NDArray[np.int64]
@@ -57,7 +58,7 @@ def _name(problem: Problem, pairs: Integer) -> str:
     mesh = problem.mesh
     places = [
         f"on {mesh.interface_names[mesh.pairs.interface[pair]]} at "
-        f"({mesh.pairs.position[pair].real:.6g}, {mesh.pairs.position[pair].imag:.6g})"
+        f"{format_point(mesh.pairs.position[pair] + problem.model.origin)}"
         for pair in pairs[:MOST_NAMED]
     ]
     more = len(pairs) - len(places)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import pbem
 import pbem.cli
 from pbem.exact import conforming_load, conforming_pressure
+from pbem.results.describe import describe_results
 from pbem.results.reader import Results
 
 CASES = Path(__file__).parent.parent / "defects"
@@ -94,6 +95,15 @@ def measure_pressure(results: Results, clearance: float, traction: float, within
 def test_the_pressure_of_a_pin_with_a_small_clearance(solve: Solve) -> None:
     results = solve("pin_small_clearance")
     assert measure_pressure(results, 1e-5, -0.004403466186000604) < 0.01
+
+
+def test_the_pressure_of_a_pin_whose_clearance_is_below_what_joins_ends(solve: Solve) -> None:
+    # 1e-7 of the radius, 1e-9 of the model: the ends of pin and hole were once made one.
+    changes = [(r"-1e-05", "-1e-7"), (r"0\.99999,", "0.9999999,"), (r"0\.9999800000000001", "0.9999998"),
+               (r"0\.04999\]", "0.0499999]"), (r"-0\.050010000000000006", "-0.0500001"),
+               (r"-0\.004403466186000604", "-4.403466186000604e-5")]  # fmt: skip
+    results = solve("pin_small_clearance", *changes)
+    assert measure_pressure(results, 1e-7, -4.403466186000604e-5) < 0.01
 
 
 def test_the_pressure_of_a_pin_whichever_mesh_is_first(solve: Solve) -> None:
@@ -192,6 +202,24 @@ def test_weight_far_from_the_origin(solve: Solve) -> None:
     assert far.energy.elastic[-1] == pytest.approx(near.energy.elastic[-1], rel=1e-9)
 
 
+def test_an_inclusion_far_from_the_origin(solve: Solve) -> None:
+    far, near = (solve("inclusion_far_from_origin", ("1000000.0, -1000000.0", at)) for at in ("1e8, -1e6", "0, 0"))
+    for given, expected in ((far.traction, near.traction), (far.displacement, near.displacement)):
+        np.testing.assert_allclose(given[-1], expected[-1], rtol=0, atol=1e-12 * np.abs(expected[-1]).max())
+    np.testing.assert_array_equal(far.nodes.position[0], near.nodes.position[0] + [1e8, -1e6])
+
+
+# Beyond linear theory
+
+def test_slip_beyond_linear_theory_is_told(solve: Solve) -> None:
+    results = solve("slip_larger_than_body")
+    assert results.linearity is not None
+    slip = np.abs(results.contact["k"].slip[-1]).max()
+    assert results.linearity.slip[-1, 0] == pytest.approx(slip / (2 / 6), rel=0.1)  # 6 elements on a side of 2
+    told = describe_results(results)
+    assert "faces of 'k' slip by" in told and "are beyond linear theory" in told
+
+
 # Cohesion without tensile strength
 
 def test_a_field_of_cohesive_cracks_under_tension_settles(solve: Solve) -> None:
@@ -216,6 +244,10 @@ TOLD = [
     ("nul_title", 2, "title (line 1)", "control character U+0000"),
     ("nan_later", 1, "the law nan_later.py", "gives bound = nan at p_n = "),
     ("exits_later", 1, "the law exits_later.py", "fails (SystemExit: 0)"),
+    ("infinite_resultant_near", 3, "net force", "on the infinite region 'h' with a net force of (9.30"),
+    ("infinite_resultant_far", 3, "net force", "on the infinite region 'h' with a net force of (4.3"),
+    ("infinite_net_force", 3, "net force", "on the infinite region 'p' with a net force of (3.2"),
+    ("near_coincident_bodies", 2, "curves.b2 (line 6)", "curve 'b2' beside curve 't1', at most 1e-06 apart"),
     ("cut_frictionless_free_part", 3, "free motion", "translation along x of 'plate: the part around (1, 1.4)'"),
 ]
 

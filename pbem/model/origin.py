@@ -1,0 +1,76 @@
+"""Where a model lies: coordinates about a point of its own where it is far from the origin.
+
+Coordinates are known to so many digits of the largest of them. What is computed from differences of places - positions
+of nodes within elements, kernels, expansions, levers of moments - would lose as many digits as the distance from the
+origin is longer than an element. So a model far away is moved, exactly, as soon as it is complete, and what is shown,
+written or asked of the user's expressions is moved back.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pbem.model.curve import Leg
+from pbem.model.intersection import extremes
+from pbem.model.model import Model
+
+# A model is moved if its middle is further away than so many times its size.
+FAR = 4.0
+# A point of a circle far away is known to so many roundings of its coordinates.
+ROUNDINGS = 8
+
+
+def move_to_own_origin(model: Model, radii: Mapping[str, float]) -> Model:
+    """The same model in coordinates about `origin`, a point near its middle, if it is far from 0.
+
+    The origin has few digits, so that no coordinate is rounded. radii: of circular curves as they were written; the
+    ends of their legs, which were rounded far away, are put back on the circle.
+    """
+    points = np.concatenate([extremes(leg) for curve in model.curves.values() for leg in curve.legs])
+    middle = complex(0.5 * (points.real.min() + points.real.max()), 0.5 * (points.imag.min() + points.imag.max()))
+    if abs(middle) <= FAR * model.size:
+        return model
+    unit = 2.0 ** math.floor(math.log2(model.size))
+    origin = complex(unit * round(middle.real / unit), unit * round(middle.imag / unit))
+    return _move(model, origin, _list_rounded(model, radii, origin))
+
+
+def move_back(model: Model) -> Model:
+    """The same model in the coordinates of the user."""
+    return _move(model, -model.origin, {}) if model.origin else model
+
+
+def _list_rounded(model: Model, radii: Mapping[str, float], origin: complex) -> dict[complex, complex]:
+    """Ends of circular legs, to where they are about the origin: on the circle, which they missed by rounding."""
+    most = ROUNDINGS * sys.float_info.epsilon * abs(origin)
+    places: dict[complex, complex] = {}
+    for name, curve in model.curves.items():
+        for leg in curve.legs if name in radii else ():
+            assert leg.center is not None
+            for end in (leg.start, leg.end):
+                center, local = leg.center - origin, end - origin
+                on_circle = center + radii[name] * (local - center) / abs(local - center)
+                if abs(on_circle - local) <= most:
+                    places.setdefault(end, on_circle)
+    return places
+
+
+def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> Model:
+    """places: where points are about the origin, if not at the difference."""
+
+    def shift(leg: Leg) -> Leg:
+        center = None if leg.center is None else leg.center - origin
+        start, end = (places.get(point, point - origin) for point in (leg.start, leg.end))
+        return replace(leg, start=start, end=end, center=center)
+
+    curves = {name: replace(curve, legs=tuple(map(shift, curve.legs))) for name, curve in model.curves.items()}
+    return replace(
+        model, curves=curves, origin=model.origin + origin,
+        ties=tuple(replace(tie, corner=tie.corner - origin) for tie in model.ties),
+        interior_points=tuple(point - origin for point in model.interior_points),
+    )

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from pbem.contact.laws import SLIP, Memory, ModeState, commit, start_memory
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
+from pbem.parallel import StopSignals
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.beside import Beside
 from pbem.solve.krylov import make_tangent
@@ -18,6 +19,7 @@ from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.step import ContactState, SilentReporter, Step
 from pbem.solve.tangent import AnyTangent
+from pbem.solve.watch import Watch
 
 
 class SecondSolution:
@@ -32,30 +34,35 @@ class SecondSolution:
         self.problem: Problem = assemble_problem(beside.model, beside.mesh, comm)
         self.tangent: AnyTangent = make_tangent(self.problem)
         self.memory: Memory = start_memory(self.problem.laws)
+        self._watch = Watch(comm, SilentReporter(), StopSignals())
+        self._watch.look_after(self.problem.laws)
         if start is not None:
             self._take_over(start.contact)
 
     def follow(self, step: Step) -> Step:
         """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
 
-        Raises ConvergenceError; the next step then starts from the run's memory, carried over.
+        Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
+        custom law fails with what it is asked here; there is no further step then.
         """
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)
         except ConvergenceError:
+            self._watch.check()  # a law that failed has answered with no strength
             self._take_over(step.contact)
             raise
         self.memory = commit(self.problem.laws, solution.memory, solution.modes, solution.pairs)
+        self._watch.check()
         return describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
 
     def _solve(self, step: Step, load: Load) -> Solution:
-        silent = SilentReporter()
         begun = replace(self.memory, modes=self._guess_modes(step.contact))
         try:
-            return solve_step(self.problem, self.tangent, begun, load, silent)
+            return solve_step(self.problem, self.tangent, begun, load, self._watch)
         except ConvergenceError:
-            return solve_step(self.problem, self.tangent, self.memory, load, silent)
+            self._watch.check()
+            return solve_step(self.problem, self.tangent, self.memory, load, self._watch)
 
     def _guess_modes(self, contact: ContactState) -> ModeState:
         nearest, own = self.beside.nearest, self.memory.modes

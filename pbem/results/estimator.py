@@ -69,7 +69,7 @@ class Estimator:
                     f"at step {step.number} the second solution, on a coarser mesh, did not converge ({error.reason})"
                 )
             except LawError as error:
-                self.missing = f"from step {step.number} on, with the second solution, on a coarser mesh, {error.reason}"
+                self.missing = f"with the second solution, on a coarser mesh, of step {step.number} {error.reason}"
                 self.destroy()
                 self._second = None
         if not self._first:

@@ -29,7 +29,7 @@ ROUNDING = 1e-8
 LEAST_FACTOR_ERROR = 0.005
 # Jumps below this part of what the tractions strain over an interface are none: where faces stay together as they are
 # by symmetry, all of a jump is error.
-LEAST_JUMP = 1e-4
+LEAST_JUMP = 1e-3
 
 JUMPS = ("opening", "slip")
 
@@ -56,8 +56,11 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Scales:
-    """The largest values so far: of a reaction (magnitude), of a jump on any interface (at least LEAST_JUMP), of the
-    tractions on an interface (root of their mean square), of the traction of a pair, of a factor K, of a displacement."""
+    """The largest values so far.
+
+    reactions: magnitude; jumps: on any interface, at least LEAST_JUMP; tractions: root of their mean square on an
+    interface; peak: traction of a pair; factors: K; displacement.
+    """
 
     reactions: float = 0.0
     jumps: float = 0.0

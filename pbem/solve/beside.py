@@ -19,7 +19,7 @@ Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 # The second solution starts from the modes of the first, so that it settles soon or never.
-MOST_ITERATIONS = 12
+MOST_ITERATIONS = 8
 # Of a hierarchical operator a difference of meshes asks for less than the solution itself.
 TOLERANCE, NEWTON_TOLERANCE = 1e-6, 1e-7
 

@@ -11,8 +11,8 @@ from pbem.contact.laws import collect_laws
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import Violations
-from pbem.results.contact_ends import EndFinder
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
+from pbem.results.rates import EndFinder, choose_jump_divisors
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.beside import Beside
 from pbem.solve.step import ContactState, Step
@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 # The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
 # 5; with the order lowered by one. Measured over the problems with known answers by scripts/bench_estimate.py.
 MERGED = (1.0, 3.0, 5.0, 5.0)
-LOWERED = 8.0
+LOWERED = 5.0
 # Of the largest displacement: jumps and factors below are rounding, and have no relative error.
 ROUNDING = 1e-8
 # Differences of K pass through zero by chance; of the relative error of a crack's jumps this part at least is K's.
@@ -102,6 +102,7 @@ class Comparison:
             self._other_gap = collect_laws(beside.model, beside.mesh).gap
             self._divisor = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
             self._ends = EndFinder(mesh, beside)
+            self._jump_divisor = choose_jump_divisors(beside, model.crack_tips, self._divisor)
 
     def measure_scales(self, step: Step) -> Scales:
         """The largest values of one step."""
@@ -166,7 +167,7 @@ class Comparison:
 
     def _subtract_pairs(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real, Real, Real]:
         """Per interface (i,): estimated errors, of opening and slip the largest, of the tractions the mean ones."""
-        opening, slip = (self._subtract_jumps(name, mine, other, beside) / self._divisor for name in JUMPS)
+        opening, slip = (self._subtract_jumps(name, mine, other, beside) / self._jump_divisor for name in JUMPS)
         normal, tangential = self._subtract_tractions(mine, other, beside)
         weight = beside.mesh.pairs.weight
         of = dict(self._others)
@@ -212,7 +213,7 @@ class Comparison:
         own, of = np.unique(pairs.slot // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             for name in JUMPS:
-                errors = self._subtract_jumps(name, mine, other, beside) / (self._divisor * self.scales.jumps)
+                errors = self._subtract_jumps(name, mine, other, beside) / (self._jump_divisor * self.scales.jumps)
                 mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
                 errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
                 np.maximum.at(result, element, np.abs(errors))

@@ -1,12 +1,17 @@
-"""Where contact, or stick, ends: there tractions follow a root, which meshes resolve more slowly than smooth fields."""
+"""How much better a run is than its second solution: less where contact or stick ends, and at the tips of cracks.
+
+There tractions or jumps follow a root of the distance, which meshes resolve more slowly than smooth fields.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.solve.beside import Beside
 from pbem.solve.step import SLIP, ContactState
@@ -19,6 +24,9 @@ Real = NDArray[np.float64]
 # that begins where two elements meet the mean error falls with the length (2 - 1). Within an element it depends on
 # where: three times as large on the coarser mesh, measured over cylinders, pins and layers (scripts/bench_estimate.py).
 FIXED, MOVING = 1.0, 2.0
+# That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which would
+# give 1.8, and smooth fields.
+TIP, AT_TIP = 3.0, 2
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,18 @@ class EndFinder:
         if not len(order):
             return np.zeros(len(self._at))
         return np.asarray(np.interp(self._at, self._nodes[order], values[order]))
+
+
+def choose_jump_divisors(beside: Beside, tips: Mapping[str, tuple[bool, bool]], smooth: float) -> Real:
+    """What differences of jumps at the pairs of the second solution (c,) are to be divided by.
+
+    tips: of each crack, whether its start and its end is a tip; smooth: elsewhere.
+    """
+    coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
+    for name, own in list_curve_elements(beside.model, coarse) if beside.kind == "merged" else ():
+        at_start, at_end = tips.get(name, (False, False))
+        result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
+    return np.asarray(result[coarse.pairs.slot // (coarse.order + 1)])
 
 
 class _Chain:

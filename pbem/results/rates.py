@@ -24,8 +24,8 @@ Real = NDArray[np.float64]
 # that begins where two elements meet the mean error falls with the length (2 - 1). Within an element it depends on
 # where: three times as large on the coarser mesh, measured over cylinders, pins and layers (scripts/bench_estimate.py).
 FIXED, MOVING = 1.0, 2.0
-# That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which would
-# give 1.8, and smooth fields.
+# That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which
+# would give 1.8, and smooth fields.
 TIP, AT_TIP = 3.0, 2
 
 

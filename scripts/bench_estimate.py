@@ -54,7 +54,8 @@ REFINED = {
     "crack between smooth walls": 2, "centre crack in a plate, 2a/W = 0.4": 2, "centre crack in a plate, 2a/W = 0.6": 2,
     "kinked crack, 45": 2, "closed crack, cohesion 10, eight angles: slip": 2, "sheared crack": 2,
     "panel without friction, 16": 2, "panel with friction, 16": 4, "smooth inclusion": 2, "block dragged": 4,
-    "edge crack": 4, "ring widened": 2,
+    "edge crack": 4, "ring widened": 2, "ring pressed": 2, "row of collinear cracks": 2, "crack in bending": 4,
+    "crack along an arc, 145": 2,
 }  # fmt: skip
 
 solve_as_given = proof.solve_model

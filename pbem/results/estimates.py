@@ -29,7 +29,7 @@ ROUNDING = 1e-8
 LEAST_FACTOR_ERROR = 0.005
 # Jumps below this part of what the tractions strain over an interface are none: where faces stay together as they are
 # by symmetry, all of a jump is error.
-LEAST_JUMP = 1e-3
+LEAST_JUMP = 1e-2
 
 JUMPS = ("opening", "slip")
 
@@ -89,7 +89,8 @@ class Comparison:
     and slip over the largest jump in the model.
     """
 
-    def __init__(self, model: Model, mesh: Mesh, beside: Beside | None) -> None:
+    def __init__(self, model: Model, mesh: Mesh, beside: Beside | None, as_they_are: bool = False) -> None:
+        """as_they_are: differences are not divided: with a run that is exact they are the errors of the other one."""
         self._model, self._mesh, self._beside = model, mesh, beside
         self._interfaces = list(sort_pairs(mesh).values())
         self._rules = collect_tip_rules(model, mesh)
@@ -100,7 +101,9 @@ class Comparison:
             self._others = list(sort_pairs(beside.mesh).items())
             self._other_rules = collect_tip_rules(beside.model, beside.mesh)
             self._other_gap = collect_laws(beside.model, beside.mesh).gap
-            self._divisor = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
+            smooth = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
+            self._divisor = 1.0 if as_they_are else smooth
+            self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
             self._ends = EndFinder(mesh, beside)
             self._jump_divisor = choose_jump_divisors(beside, model.crack_tips, self._divisor)
 
@@ -162,7 +165,7 @@ class Comparison:
             own = self._interfaces[number[name]]
             largest = max(_largest(contact.opening[own] - self._gap[own]), _largest(contact.slip[own]))
             factor = max(_largest(KI[crack]), _largest(KII[crack]))
-            least[crack] = LEAST_FACTOR_ERROR * jumps[number[name]] / largest * factor if largest > 0 else 0.0
+            least[crack] = self._least_factor_error * jumps[number[name]] / largest * factor if largest > 0 else 0.0
         return least
 
     def _subtract_pairs(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real, Real, Real]:

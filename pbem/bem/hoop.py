@@ -84,8 +84,14 @@ def _differentiate_patches(mesh: Mesh, values: Complex) -> tuple[Integer, Comple
     before[following[following >= 0]] = np.flatnonzero(following >= 0)
     inner = np.flatnonzero((following >= 0) & (before >= 0))
     former, latter = before[inner], following[inner]
-    length = mesh.weight.reshape(mesh.elements, -1).sum(axis=1)
-    along = 0.5 * (locate_nodes(mesh) + 1) * length[:, None]
+    # Lengths from the start: on an arc the integral of `stretch_elements`.
+    half, quarter = 0.5 * np.abs(mesh.end - mesh.start), np.tan(0.25 * mesh.sweep)
+    arc = quarter != 0
+    by = np.where(arc, quarter, 1.0)
+    length = np.where(arc, 2 * half * (1 + by**2) * np.arctan(by) / by, 2 * half)
+    s = locate_nodes(mesh)
+    turned = np.where(arc[:, None], np.arctan(by[:, None] * s) / np.where(arc, np.arctan(by), 1.0)[:, None], s)
+    along = 0.5 * (turned + 1) * length[:, None]
     places = np.concatenate([along[former, -1:] - length[former, None], along[inner],
                              along[latter, :1] + length[inner, None]], axis=1) / length[inner, None]
     nodal = values.reshape(mesh.elements, -1)

@@ -168,7 +168,7 @@ def solve_ring(ligament: float, order: int, place: Place) -> Solved:
 
 
 def study_rings(quick: bool) -> Iterator[Row]:
-    """Hoop stress at the outer side of the ligament, 64 elements asked on each circle."""
+    """Hoop stress of the bore where the ligament is thinnest, 64 elements asked on each circle."""
     for ligament in (0.1, 0.01) if quick else (0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003):
         e = 1 - ligament
         exact = 2 * 4 * (4 + 1 - 2 * e - e**2) / (5 * (4 - 1 - 2 * e - e**2)) - 1

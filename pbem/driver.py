@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -22,8 +23,8 @@ from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_fir
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.estimator import Estimator
 from pbem.results.output import check_output_path
+from pbem.results.passes import KeptPass, keep_pass, read_refinement
 from pbem.results.reader import Results, open_results
-from pbem.results.resume import read_mesh_fractions
 from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
 from pbem.solve.assembly import assemble_problem
@@ -115,24 +116,26 @@ def _refine_and_solve(
 ) -> None:
     """Solve, and where `analysis.accuracy` asks for it refine and solve again, from rest, until it is met.
 
-    Raises ConvergenceError ("accuracy") when passes or unknowns run out; the file then holds the last pass.
+    Raises ConvergenceError ("accuracy") when passes or unknowns run out; the file then holds the last pass. Of a pass
+    that fails otherwise the former one is kept.
     """
+    one = Pass(1, 0)
     if target.resume and model.analysis.accuracy is not None:
-        fractions = do_on_first(world, PbemError, lambda: read_mesh_fractions(target.path))
-        model = model if fractions is None else impose_fractions(model, fractions)
-    first_unknowns = 0
+        read = do_on_first(world, PbemError, lambda: read_refinement(target.path))
+        model, one = (model, one) if read is None else (impose_fractions(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes,)
-    for number in count(1):
+    for number in count(one.number):
         mesh = generate_mesh(model)
         check_shares(model, mesh, world.size)
         watch.begin(model)
-        for note in (*notes, *mesh.notes, *placement) if number == 1 else ():
+        for note in (*notes, *mesh.notes, *placement) if number == one.number else ():
             watch.note(note)
-        first_unknowns = first_unknowns or 2 * mesh.nodes
-        decision = _solve(model, mesh, target, options, watch, signals, Pass(number, first_unknowns))
+        now = Pass(number, one.first_unknowns or 2 * mesh.nodes)
+        decision = _solve(model, mesh, target, options, watch, signals, now)
         if decision.marked is None:
             return
         # The next pass takes the place of this one in the file.
+        one = replace(one, first_unknowns=now.first_unknowns)
         model, target = bisect_elements(model, decision.marked, decision.gently), _Target(target.path, False, True)
 
 
@@ -143,15 +146,30 @@ def _solve(
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
 
+    former: KeptPass | None = None
+
     def open_writer() -> ResultWriter | None:
+        nonlocal former
         flat = [f"{name}={value}" for name, value in options.items()]
         if target.resume:
             return ResultWriter.resume(target.path, model, mesh, world.size, petsc_version(), flat, region)
-        return ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region, force=target.force)
+        former = keep_pass(target.path) if one.number > 1 else None
+        try:
+            writer = ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region,
+                                  force=target.force)
+        except BaseException:
+            if former:
+                former.drop()
+            raise
+        if former:
+            former.hold()
+        return writer
 
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     writer = do_on_first(world, PbemError, open_writer, share=False)
+    if model.analysis.accuracy is not None:
+        do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
     last: Step | None = broadcast(world, writer.last_step if writer else None)
     try:
         signals.at_once = world.size == 1
@@ -182,11 +200,39 @@ def _solve(
             raise ConvergenceError("accuracy", decision.failure)
         do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
     except BaseException as error:
+        told = _blame_pass(error, one, 2 * mesh.nodes) if one.number > 1 and not target.resume else error
         if writer:
-            writer.__exit__(type(error), error, error.__traceback__)
-        raise
+            _end_badly(writer, told, former)
+        if told is error:
+            raise
+        raise told from error
+    if former:
+        former.drop()
     world.Barrier()
     return decision
+
+
+def _blame_pass(error: BaseException, one: Pass, unknowns: int) -> BaseException:
+    """Says which pass it was that did not converge, and what the file holds."""
+    if not isinstance(error, ConvergenceError) or error.reason == "accuracy":
+        return error
+    return ConvergenceError(
+        error.reason,
+        f"with the mesh refined for analysis.accuracy, pass {one.number} of {unknowns} unknowns, {error.detail}; the "
+        f"file holds pass {one.number - 1}, which was solved, but is not as accurate as was asked for",
+    )
+
+
+def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | None) -> None:
+    """Close the file. A pass that was stopped can be gone on with, one that has failed gives way to the former one."""
+    reached = isinstance(error, ConvergenceError) and error.reason == "accuracy"
+    stopped = isinstance(error, StopError | KeyboardInterrupt) and writer.steps_stored > 0
+    reasons = writer.abandon(error)
+    if former and (reached or stopped):
+        former.drop()
+    elif former:
+        with suppress(PbemError, OSError):  # what ended the run must be what the user hears of
+            former.restore(reasons)
 
 
 def _check(writer: ResultWriter | None) -> ResultWriter:

@@ -12,7 +12,11 @@ from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_no
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
 Complex = NDArray[np.complex128]
+Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
+
+# Directions that differ by less (radians) are one: rounding of places far from the origin.
+SMOOTH = 1e-6
 
 
 def evaluate_hoop_stress(
@@ -21,10 +25,12 @@ def evaluate_hoop_stress(
     """Normal stress along the boundary (f,) at the nodes of `list_faces(mesh)`.
 
     displacement, traction (f,) complex, at these nodes. initial: per region its material and in-situ stress, which has
-    no displacement. The stretch is the derivative of each element's own polynomial; on a crack's faces that of their
-    mean displacement, and plus or minus half that of the jump, which at a tip has the square-root shape: the hoop
-    stress then grows like 1/sqrt(distance) in mode II, as it should. Elements of order 0 have no stretch of their own:
-    there it is the difference between neighbours on the same curve.
+    no displacement. The stretch is the derivative of the polynomial through an element's own nodes and the nearest one
+    of each neighbour on a smooth curve: the own polynomial alone is off by several times as much at its outer nodes. On
+    a crack's faces it is that of their mean displacement, and plus or minus half that of the jump, which at a tip has
+    the square-root shape: the hoop stress then grows like 1/sqrt(distance) in mode II, as it should; jumps keep to
+    their own element. Elements of order 0 have no stretch of their own: there it is the difference between neighbours
+    on the same curve.
     """
     second = second_face_nodes(mesh)
     stretch, direction = evaluate_stretch(mesh, displacement)
@@ -72,7 +78,50 @@ def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Comple
     if with_tips and len(tips):
         shapes[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
     by_local = np.einsum("epj,ej->ep", shapes, values.reshape(mesh.elements, -1))
-    return np.asarray(by_local / stretch_elements(mesh, np.arange(mesh.elements), local)).ravel()
+    derivative = by_local / stretch_elements(mesh, np.arange(mesh.elements), local)
+    if not with_tips:
+        inner, derivatives = _differentiate_patches(mesh, values)
+        derivative[inner] = derivatives
+    return np.asarray(derivative).ravel()
+
+
+def _differentiate_patches(mesh: Mesh, values: Complex) -> tuple[Integer, Complex]:
+    """Elements (k,) that go on smoothly at both ends, and derivatives (k, p + 1) there by the polynomials through the
+    own nodes and the nearest of each neighbour."""
+    following = _find_smooth_joints(mesh)
+    before = np.full(mesh.elements, -1)
+    before[following[following >= 0]] = np.flatnonzero(following >= 0)
+    inner = np.flatnonzero((following >= 0) & (before >= 0))
+    former, latter = before[inner], following[inner]
+    # Lengths from the start: on an arc the integral of `stretch_elements`.
+    half, quarter = 0.5 * np.abs(mesh.end - mesh.start), np.tan(0.25 * mesh.sweep)
+    arc = quarter != 0
+    by = np.where(arc, quarter, 1.0)
+    length = np.where(arc, 2 * half * (1 + by**2) * np.arctan(by) / by, 2 * half)
+    s = locate_nodes(mesh)
+    turned = np.where(arc[:, None], np.arctan(by[:, None] * s) / np.where(arc, np.arctan(by), 1.0)[:, None], s)
+    along = 0.5 * (turned + 1) * length[:, None]
+    places = np.concatenate([along[former, -1:] - length[former, None], along[inner],
+                             along[latter, :1] + length[inner, None]], axis=1) / length[inner, None]
+    nodal = values.reshape(mesh.elements, -1)
+    known = np.concatenate([nodal[former, -1:], nodal[inner], nodal[latter, :1]], axis=1)
+    shapes = differentiate(places - 0.5, places[:, 1:-1] - 0.5)
+    return inner, np.einsum("epj,ej->ep", shapes, known) / length[inner, None]
+
+
+def _find_smooth_joints(mesh: Mesh) -> Integer:
+    """For each element (e,) the one in which it goes on, on the same curve without a corner; -1 where it does not."""
+    numbers = np.arange(mesh.elements)
+    key = np.stack([mesh.curve, mesh.region, mesh.crack])
+    breaks = (np.diff(key, axis=1) != 0).any(axis=0) | (mesh.start[1:] != mesh.end[:-1])
+    firsts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    following = numbers + 1
+    following[np.concatenate([firsts[1:] - 1, [mesh.elements - 1]])] = firsts  # closed curves go on where they began
+    chord = (mesh.end - mesh.start) / np.abs(mesh.end - mesh.start)
+    leaves, arrives = chord * np.exp(0.5j * mesh.sweep), chord * np.exp(-0.5j * mesh.sweep)
+    smooth = (mesh.start[following] == mesh.end) & (following != numbers)
+    smooth &= (np.abs(leaves - arrives[following]) < SMOOTH) & (mesh.sweep[following] * mesh.sweep >= 0)
+    return np.where(smooth, following, -1)
 
 
 def _difference_neighbours(mesh: Mesh, values: Complex) -> Complex:

@@ -14,6 +14,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import group_elements
 
+Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 
@@ -25,8 +26,9 @@ BEYOND = 1e-2
 class Carry:
     """What takes values at the fine mesh's nodes (n,) to the coarse mesh's nodes (c,).
 
-    plain (c, n): by the polynomials of the fine elements; rooted (c, n): with the square-root shape on crack-tip
-    elements, for jumps. nearest (c,): the fine node nearest to each coarse node on its element.
+    plain (c, n): by the polynomials of the fine elements; rooted (c, n): for jumps, which follow the root of the
+    distance from each tip of a crack: with the square-root shape on crack-tip elements, on the others of the crack by
+    polynomials times these roots. nearest (c,): the fine node nearest to each coarse node on its element.
     """
 
     plain: sparse.csr_matrix
@@ -65,15 +67,41 @@ def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh
             local[target] = np.where(better, s, local[target])
             element[target] = np.where(better, source[:, None], element[target])
     assert (np.abs(local) <= 1 + BEYOND).all()
-    return _build_carry(fine, element.ravel(), local.ravel())
+    return _build_carry(fine, element.ravel(), local.ravel(), coarse.position, _RootOfTips(fine_model, fine))
 
 
-def _build_carry(fine: Mesh, element: Integer, s: Real) -> Carry:
+class _RootOfTips:
+    """The product of the roots of the distances from the tips of a crack, along it; 1 on other curves."""
+
+    def __init__(self, model: Model, mesh: Mesh) -> None:
+        # Of each element: the end that comes first along the curve, its distance along it, and whether there are tips.
+        self._begin, self._along = np.zeros(mesh.elements, dtype=complex), np.zeros(mesh.elements)
+        self._whole, self._tips = np.ones(mesh.elements), np.zeros((2, mesh.elements), dtype=bool)
+        length = mesh.weight.reshape(mesh.elements, -1).sum(axis=1)
+        for name, chain in list_curve_elements(model, mesh):
+            if not any(model.crack_tips.get(name, (False, False))):
+                continue
+            forward = np.abs(mesh.start[chain[0]] - model.curves[name].start) <= 0.5 * length[chain[0]]
+            self._begin[chain] = (mesh.start if forward else mesh.end)[chain]
+            self._along[chain] = np.concatenate([[0.0], np.cumsum(length[chain])[:-1]])
+            self._whole[chain] = length[chain].sum()
+            self._tips[:, chain] = np.array(model.crack_tips[name])[:, None]
+
+    def evaluate(self, element: Integer, points: Complex) -> Real:
+        """At points (k,) on the elements (k,)."""
+        along = (self._along[element] + np.abs(points - self._begin[element])) / self._whole[element]
+        from_start = np.where(self._tips[0, element], along, 1.0)
+        from_end = np.where(self._tips[1, element], 1.0 - along, 1.0)
+        return np.asarray(np.sqrt(np.maximum(from_start * from_end, 0.0)))
+
+
+def _build_carry(fine: Mesh, element: Integer, s: Real, points: Complex, root: _RootOfTips) -> Carry:
     per_element = fine.order + 1
     nodes = element[:, None] * per_element + np.arange(per_element)
     places = locate_nodes(fine)[element]
     plain = interpolate(places, s[:, None])[:, 0]
-    rooted = plain.copy()
+    own = root.evaluate(np.arange(fine.nodes) // per_element, fine.position)
+    rooted = plain * (root.evaluate(element, points)[:, None] / own[nodes])
     tips = np.flatnonzero(fine.tip[element] > 0)
     if len(tips):
         inside = np.clip(s[tips], -1.0, 1.0)[:, None]

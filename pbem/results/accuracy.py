@@ -23,7 +23,7 @@ ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"
 ROUNDING = 1e-13
 
 # The estimates are to be so many times below the accuracy: they are within a factor, and too small more often.
-SAFETY = 1.5
+SAFETY = 2.0
 
 # Passes at most, and unknowns at most over those of the first mesh.
 MOST_PASSES = 20

@@ -70,7 +70,7 @@ def describe_results(results: Results) -> str:
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
         parts.append(_section("beyond linear theory at the last step", describe_linearity(results.linearity)))
-        parts.append(_section("estimated discretisation errors at the last step", describe_errors(results)))
+        parts.append(_section("estimated discretisation errors", describe_errors(results)))
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
@@ -99,7 +99,8 @@ def describe_errors(results: Results) -> list[str]:
     if errors.missing and not any(np.isfinite(value) for value in shown.values()):
         return [f"none: {errors.missing}"]
     lines = [
-        ", ".join(f"{name} {value:.1e}" for name, value in shown.items()) + " of the largest in the model, at most"
+        ", ".join(f"{name} {value:.1e}" for name, value in shown.items())
+        + " of the largest in the model, at the worst of the steps"
     ]
     if len(errors.slip) > MOST_ERRORS:
         return lines
@@ -108,7 +109,7 @@ def describe_errors(results: Results) -> list[str]:
         [name, *(f"{getattr(errors, kind)[name][-1]:.1e}" for kind in ("opening", "slip", "traction_n", "traction_s"))]
         for name in worst
     ]
-    return lines + _table(["interface", "opening", "slip", "traction n", "traction s"], rows)
+    return lines + _table(["last step, interface", "opening", "slip", "traction n", "traction s"], rows)
 
 
 # Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by

@@ -8,29 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.laws import collect_laws
-from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import Violations
+from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
+from pbem.results.rates import EndFinder, choose_jump_divisors
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.beside import Beside
 from pbem.solve.step import ContactState, Step
 
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 # The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
 # 5; with the order lowered by one. Measured over the problems with known answers by scripts/bench_estimate.py.
 MERGED = (1.0, 3.0, 5.0, 5.0)
-LOWERED = 8.0
+LOWERED = 5.0
 # Of the largest displacement: jumps and factors below are rounding, and have no relative error.
 ROUNDING = 1e-8
 # Differences of K pass through zero by chance; of the relative error of a crack's jumps this part at least is K's.
-LEAST_FACTOR_ERROR = 0.02
+LEAST_FACTOR_ERROR = 0.005
+# Jumps below this part of what the tractions strain over an interface are none: where faces stay together as they are
+# by symmetry, all of a jump is error.
+LEAST_JUMP = 1e-2
 
-
-PAIR_FIELDS = ("opening", "slip", "traction_n", "traction_s")
+JUMPS = ("opening", "slip")
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,11 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Scales:
-    """The largest values so far: of a reaction (magnitude), of a jump on any interface, of the tractions on an
-    interface (root of their mean square), of the traction of a pair, of a factor K, of a displacement."""
+    """The largest values so far.
+
+    reactions: magnitude; jumps: on any interface, at least LEAST_JUMP; tractions: root of their mean square on an
+    interface; peak: traction of a pair; factors: K; displacement.
+    """
 
     reactions: float = 0.0
     jumps: float = 0.0
@@ -85,7 +89,8 @@ class Comparison:
     and slip over the largest jump in the model.
     """
 
-    def __init__(self, model: Model, mesh: Mesh, beside: Beside | None) -> None:
+    def __init__(self, model: Model, mesh: Mesh, beside: Beside | None, as_they_are: bool = False) -> None:
+        """as_they_are: differences are not divided: with a run that is exact they are the errors of the other one."""
         self._model, self._mesh, self._beside = model, mesh, beside
         self._interfaces = list(sort_pairs(mesh).values())
         self._rules = collect_tip_rules(model, mesh)
@@ -96,17 +101,24 @@ class Comparison:
             self._others = list(sort_pairs(beside.mesh).items())
             self._other_rules = collect_tip_rules(beside.model, beside.mesh)
             self._other_gap = collect_laws(beside.model, beside.mesh).gap
-            self._divisor = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
+            smooth = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
+            self._divisor = 1.0 if as_they_are else smooth
+            self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
+            self._ends = EndFinder(mesh, beside)
+            self._jump_divisor = choose_jump_divisors(beside, model.crack_tips, self._divisor)
 
     def measure_scales(self, step: Step) -> Scales:
         """The largest values of one step."""
         contact, mesh, weight = step.contact, self._mesh, self._mesh.pairs.weight
         factors = self._rules.evaluate_factors(contact)
         square = weight * (contact.traction_n**2 + contact.traction_s**2)
+        tractions = max((float(np.sqrt(square[p].sum() / weight[p].sum())) for p in self._interfaces), default=0.0)
+        longest = max((float(weight[p].sum()) for p in self._interfaces), default=0.0)
+        least = LEAST_JUMP * tractions / max(region.material.plane_modulus for region in self._model.regions) * longest
         return Scales(
             reactions=_largest(np.abs(sum_reactions(self._model, mesh, step))),
-            jumps=max(_largest(contact.opening - self._gap), _largest(contact.slip)),
-            tractions=max((float(np.sqrt(square[p].sum() / weight[p].sum())) for p in self._interfaces), default=0.0),
+            jumps=max(_largest(contact.opening - self._gap), _largest(contact.slip), least),
+            tractions=tractions,
             peak=float(np.sqrt(_largest(contact.traction_n**2 + contact.traction_s**2))),
             factors=max(_largest(each) for each in factors),
             displacement=_largest(np.abs(step.displacement)),
@@ -132,12 +144,11 @@ class Comparison:
     def _subtract(self, step: Step, second: Step, beside: Beside) -> Estimates:
         by = 1.0 / self._divisor
         forces = by * (sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second))
-        errors = self._subtract_pairs(step.contact, second.contact, beside)
+        opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
         cracks = len(self._model.crack_tips)  # the two meshes need not see the same cracks along interfaces
         factors = [by * np.abs(mine[:cracks] - other[:cracks]) for mine, other in zip(*both, strict=True)]
         moved = subtract_displacements(self._mesh, beside, step, second)
-        opening, slip, traction_n, traction_s = (by * each for each in errors)
         least = self._bound_factors(step.contact, np.fmax(opening, slip))
         KI, KII = (np.maximum(each, least) for each in factors)
         return Estimates(
@@ -154,35 +165,46 @@ class Comparison:
             own = self._interfaces[number[name]]
             largest = max(_largest(contact.opening[own] - self._gap[own]), _largest(contact.slip[own]))
             factor = max(_largest(KI[crack]), _largest(KII[crack]))
-            least[crack] = LEAST_FACTOR_ERROR * jumps[number[name]] / largest * factor if largest > 0 else 0.0
+            least[crack] = self._least_factor_error * jumps[number[name]] / largest * factor if largest > 0 else 0.0
         return least
 
     def _subtract_pairs(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real, Real, Real]:
-        """Per interface: largest differences of opening and slip, mean ones of the tractions."""
-        difference = {name: self._subtract_field(name, mine, other, beside) for name in PAIR_FIELDS}
+        """Per interface (i,): estimated errors, of opening and slip the largest, of the tractions the mean ones."""
+        opening, slip = (self._subtract_jumps(name, mine, other, beside) / self._jump_divisor for name in JUMPS)
+        normal, tangential = self._subtract_tractions(mine, other, beside)
         weight = beside.mesh.pairs.weight
         of = dict(self._others)
         found = []
         for name in sort_pairs(self._mesh):
             pairs = of.get(name, np.zeros(0, dtype=np.int64))
-            largest = [_largest(difference[kind][pairs]) for kind in ("opening", "slip")]
-            mean = [
-                float(np.sqrt((weight * difference[kind] ** 2)[pairs].sum() / max(weight[pairs].sum(), 1e-300)))
-                for kind in ("traction_n", "traction_s")
-            ]
+            whole = max(weight[pairs].sum(), 1e-300)
+            largest = [_largest(each[pairs]) for each in (opening, slip)]
+            mean = [float(np.sqrt((weight[pairs] @ each[pairs] ** 2) / whole)) for each in (normal, tangential)]
             # Where the second solution has its pairs on the other face nothing is known.
             seen = float(weight[pairs] @ beside.seen[pairs]) >= 0.5 * float(weight[pairs].sum())
             found.append([*largest, *mean] if len(pairs) and seen else [np.nan] * 4)
         table = np.array(found).reshape(-1, 4)
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
 
-    def _subtract_field(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
-        """At the pairs of the second solution; zero where the run has none."""
-        values = beside.carry_pairs(getattr(mine, name), name in ("opening", "slip")) - getattr(other, name)
+    def _subtract_jumps(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
+        """Differences at the pairs of the second solution; zero where the run has none."""
+        values = beside.carry_pairs(getattr(mine, name), True) - getattr(other, name)
         if name == "opening":
             # The initial gap is no part of the error: between the nodes it need not be a polynomial.
             values = values - (beside.carry_pairs(self._gap, True) - self._other_gap)
         return np.where(beside.seen, values, 0.0)
+
+    def _subtract_tractions(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real]:
+        """Estimated errors at the pairs of the second solution; zero where the run has none."""
+        ends = self._ends.find(mine, other)
+        by = np.where(beside.seen, 1.0 / ends.choose_divisors(self._divisor), 0.0)
+
+        def subtract(name: str) -> Real:
+            own = getattr(mine, name)
+            carried = np.where(ends.mixed, self._ends.read_between(own), beside.carry_pairs(own, False))
+            return np.asarray(by * (carried - getattr(other, name)))
+
+        return subtract("traction_n"), subtract("traction_s")
 
     def _locate_jumps(self, mine: ContactState, other: ContactState, beside: Beside) -> Real:
         """Estimated error of the jumps on each element of the run (e,), over the largest jump so far.
@@ -193,8 +215,8 @@ class Comparison:
         element = beside.carry.nearest[pairs.slot] // (self._mesh.order + 1)
         own, of = np.unique(pairs.slot // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
-            for name in ("opening", "slip"):
-                errors = self._subtract_field(name, mine, other, beside) / (self._divisor * self.scales.jumps)
+            for name in JUMPS:
+                errors = self._subtract_jumps(name, mine, other, beside) / (self._jump_divisor * self.scales.jumps)
                 mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
                 errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
                 np.maximum.at(result, element, np.abs(errors))
@@ -244,50 +266,6 @@ def to_rows(estimates: Estimates, relative: Relative, parts: Violations) -> dict
     rows = {name: value for name, value in vars(parts).items()}
     rows |= {name: np.asarray(value) for name, value in vars(estimates).items()}
     return rows | {f"relative_{name}": np.asarray(value) for name, value in vars(relative).items()}
-
-
-def sum_reactions(model: Model, mesh: Mesh, step: Step) -> Complex:
-    """Integral (c,) of the traction over every outer curve, complex."""
-    numbers = {name: number for number, name in enumerate(model.conditions)}
-    of = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)[mesh.node_curve]
-    outer = of >= 0
-    force = (mesh.weight * step.traction[: mesh.nodes])[outer]
-    count = len(numbers)
-    return np.bincount(of[outer], force.real, count) + 1j * np.bincount(of[outer], force.imag, count)
-
-
-def subtract_displacements(mesh: Mesh, beside: Beside, step: Step, second: Step) -> Complex:
-    """At the nodes of the coarser mesh (c,): displacement of the run less that of the second solution; on cracks that
-    of the jumps."""
-    carry, found = beside.carry, []
-    for each, moved in ((mesh, step.displacement), (beside.mesh, second.displacement)):
-        first, opposite = split_faces(each, moved)
-        found.append(np.where(each.node_crack, first - opposite, first))
-    carried = np.where(beside.mesh.node_crack, carry.rooted @ found[0], carry.plain @ found[0])
-    return np.asarray(carried - found[1])
-
-
-def measure_energy(model: Model, mesh: Mesh, beside: Beside, step: Step, second: Step) -> Real:
-    """Energies (2, e) of the differences on every element of the run's mesh: stress times length squared.
-
-    With h an element's length and E the plane modulus, E/h |du|^2 and h/E |dt|^2 over the element, the parts of the
-    norms of displacements (half a derivative) and tractions (minus half) in which the equations are elliptic. Of du the
-    mean over the element is left out: motions of what is far away are none of its own.
-    """
-    coarse = beside.mesh
-    du = subtract_displacements(mesh, beside, step, second).reshape(coarse.elements, -1)
-    dt = beside.carry.plain @ step.traction[: mesh.nodes] - second.traction[: coarse.nodes]
-    weight = coarse.weight.reshape(coarse.elements, -1)
-    length = weight.sum(axis=1)
-    mean = np.where(coarse.tip > 0, 0.0, (weight * du).sum(axis=1) / length)
-    du = du - mean[:, None]
-    modulus = np.array([region.material.plane_modulus for region in model.regions])[coarse.region]
-    dt = dt.reshape(coarse.elements, -1)
-    element = beside.carry.nearest // (mesh.order + 1)
-    return np.stack([
-        np.bincount(element, (weight * factor[:, None] * np.abs(field) ** 2).ravel(), mesh.elements).astype(float)
-        for factor, field in ((modulus / length, du), (length / modulus, dt))
-    ])  # fmt: skip
 
 
 def _largest(values: NDArray[np.floating]) -> float:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, LawError
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import BetweenNodes
@@ -31,7 +31,7 @@ class Follower(Protocol):
     """What the second solution does: see `pbem.solve.second.SecondSolution`."""
 
     def follow(self, step: Step) -> Step:
-        """The same load step on the coarser mesh; raises ConvergenceError."""
+        """The same load step on the coarser mesh; raises ConvergenceError, or LawError and then is of no more use."""
 
     def destroy(self) -> None:
         """Free the storage."""
@@ -68,6 +68,10 @@ class Estimator:
                 self.missing = (
                     f"at step {step.number} the second solution, on a coarser mesh, did not converge ({error.reason})"
                 )
+            except LawError as error:
+                self.missing = f"with the second solution, on a coarser mesh, of step {step.number} {error.reason}"
+                self.destroy()
+                self._second = None
         if not self._first:
             return {}
         estimates, relative = self.comparison.compare(step, second)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -12,7 +11,6 @@ import numpy as np
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
-from pbem.model.refinement import Fractions
 from pbem.results.energy import Energy
 from pbem.results.layout import (
     ENERGIES,
@@ -23,10 +21,8 @@ from pbem.results.layout import (
     extend,
     find_growing,
     join_pairs,
-    read_fractions,
     to_columns,
 )
-from pbem.results.lazy import open_quietly
 from pbem.solve.step import ContactState, Step
 
 # Places that differ by less than this part of the model's size and of its distance from the origin are one.
@@ -72,18 +68,6 @@ def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
         number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
         iterations=(), residual=float(steps["residual"][k - 1]), contact=ContactState(**contact), **fields,
     )
-
-
-def read_mesh_fractions(path: Path) -> Fractions | None:
-    """Where the elements end in a result file that is to be gone on with; None if it does not say.
-
-    Raises ResultFileError if it cannot be read.
-    """
-    try:
-        with open_quietly(path) as file:
-            return read_fractions(file)
-    except (OSError, KeyError, ValueError) as error:
-        raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
 
 
 def read_last_energy(file: h5py.File) -> Energy:

@@ -86,7 +86,7 @@ def create_store(target: Path, replace: bool, fill: Callable[[h5py.File], None])
     writing that; OSError if it cannot be written, and then nothing is left behind.
     """
     remove_stale_parts(target)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    part = name_part(target)
     disk = os.open(part, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
     try:
         lock(disk)  # who finds it locked knows that it is not stale
@@ -132,9 +132,16 @@ def _move(part: Path, target: Path, replace: bool) -> None:
         part.unlink()
 
 
+def name_part(target: Path, kind: str = "") -> Path:
+    """The name of a part of this process beside a result file."""
+    return target.with_name(f".{target.name}.{os.getpid()}{kind and '.' + kind}.part")
+
+
 def remove_stale_parts(target: Path) -> None:
-    """Remove what runs onto this file have left behind that were killed before their header was complete."""
+    """Remove what other runs onto this file have left behind that were killed."""
     for part in target.parent.glob(f".{_escape(target.name)}.*.part"):
+        if part.name.startswith(f".{target.name}.{os.getpid()}."):
+            continue
         with suppress(OSError):
             disk = os.open(part, os.O_RDWR | os.O_CLOEXEC)
             try:

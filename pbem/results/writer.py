@@ -27,6 +27,7 @@ from pbem.results.layout import (
     PAIR_DATASETS,
     STEP_DATASETS,
     append_row,
+    count_steps,
     extend,
     join_pairs,
     to_columns,
@@ -221,6 +222,16 @@ class ResultWriter:
             self._file["estimates"].attrs["missing"] = reason
             self._commit("a note")
 
+    def note_pass(self, number: int, first_unknowns: int) -> None:
+        """Say in the file which pass of `analysis.accuracy` this is, and the unknowns of the first."""
+        self._file["mesh"].attrs.update({"pass": number, "first_unknowns": first_unknowns})
+        self._commit("a note")
+
+    @property
+    def steps_stored(self) -> int:
+        """How many steps the file holds."""
+        return count_steps(self._file) if self._storage.is_open else 0
+
     @property
     def relative_errors(self) -> dict[str, NDArray[np.float64]]:
         """The estimated relative errors (k,) of the steps stored so far, by kind."""
@@ -282,18 +293,30 @@ class ResultWriter:
         if error is None:
             self.finish()
             return
+        self.abandon(error)
+
+    def abandon(self, error: BaseException) -> Mapping[str, str]:
+        """Close the file of a run that an exception has ended; gives the attributes that say so."""
+        reasons = _describe_end(error)
         # What ended the run must be what the user hears of, not that its last words could not be written.
         with suppress(Exception):
             if self._storage.is_open and self._storage.dirty:
                 self._storage.roll_back()  # it ended within a step
-            if isinstance(error, ConvergenceError | StopError):
-                self.fail(error.reason, error.detail, "stopped" if isinstance(error, StopError) else "failed")
-            elif isinstance(error, KeyboardInterrupt):
-                self.fail("interrupted", "the run was stopped by the user or the batch system", "stopped")
-            else:
-                stopped = isinstance(error, STOPPED)
-                self.fail(type(error).__name__, str(error), "stopped" if stopped else "failed")
+            self._close(reasons["status"], reasons)
         self._storage.drop()
+        return reasons
+
+
+def _describe_end(error: BaseException) -> Mapping[str, str]:
+    """The attributes of a file whose run ended by an exception."""
+    if isinstance(error, ConvergenceError | StopError):
+        status, reason, detail = "stopped" if isinstance(error, StopError) else "failed", error.reason, error.detail
+    elif isinstance(error, KeyboardInterrupt):
+        status, reason = "stopped", "interrupted"
+        detail = "the run was stopped by the user or the batch system"
+    else:
+        status, reason, detail = "stopped" if isinstance(error, STOPPED) else "failed", type(error).__name__, str(error)
+    return {"failure": f"{reason}: {detail}" if detail else reason, "failure_reason": reason, "status": status}
 
 
 def _iteration_row(step: int, iteration: Iteration) -> tuple[float, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 # The second solution starts from the modes of the first, so that it settles soon or never.
-MOST_ITERATIONS = 12
+MOST_ITERATIONS = 8
 # Of a hierarchical operator a difference of meshes asks for less than the solution itself.
 TOLERANCE, NEWTON_TOLERANCE = 1e-6, 1e-7
 
@@ -35,7 +36,7 @@ class Beside:
     a fine node is, or -1. nearest (c,): the nearest fine pair, or -1.
     """
 
-    kind: str
+    kind: Literal["merged", "order"]
     model: Model
     mesh: Mesh
     fine: Mesh
@@ -61,14 +62,19 @@ def put_beside(model: Model, mesh: Mesh) -> Beside | None:
     if coarse is None:
         return None
     second = _ease_solver(coarse, is_hierarchical(model, mesh))
-    second_mesh = generate_mesh(second)
+    return relate_meshes(coarse.kind, model, mesh, second, generate_mesh(second))
+
+
+def relate_meshes(
+    kind: Literal["merged", "order"], model: Model, mesh: Mesh, second: Model, second_mesh: Mesh
+) -> Beside:
+    """What reads values of a run on the mesh of another model, each of whose elements is made of whole ones."""
     carry = carry_nodes(model, mesh, second, second_mesh)
     pair_of_node = np.full(mesh.nodes, -1)
     pair_of_node[mesh.pairs.slot] = np.arange(mesh.pairs.count)
     slot = second_mesh.pairs.slot
     lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slot]
-    nearest = pair_of_node[carry.nearest[slot]]
-    return Beside(coarse.kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, nearest)
+    return Beside(kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, pair_of_node[carry.nearest[slot]])
 
 
 def _ease_solver(coarse: CoarseModel, hierarchical: bool) -> Model:

@@ -6,18 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
-from pbem.contact.laws import SLIP, Memory, ModeState, commit, start_memory
+from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, start_memory
 from pbem.contact.loads import Load
+from pbem.contact.modes import linearise
 from pbem.errors import ConvergenceError
+from pbem.parallel import StopSignals, do_on_first
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.beside import Beside
+from pbem.solve.hold import Hold
 from pbem.solve.krylov import make_tangent
 from pbem.solve.march import describe_step
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.step import ContactState, SilentReporter, Step
 from pbem.solve.tangent import AnyTangent
+from pbem.solve.watch import Watch
 
 
 class SecondSolution:
@@ -32,30 +38,60 @@ class SecondSolution:
         self.problem: Problem = assemble_problem(beside.model, beside.mesh, comm)
         self.tangent: AnyTangent = make_tangent(self.problem)
         self.memory: Memory = start_memory(self.problem.laws)
+        self._watch = Watch(comm, SilentReporter(), StopSignals())
+        self._watch.look_after(self.problem.laws)
         if start is not None:
             self._take_over(start.contact)
 
     def follow(self, step: Step) -> Step:
         """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
 
-        Raises ConvergenceError; the next step then starts from the run's memory, carried over.
+        Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
+        custom law fails with what it is asked here; there is no further step then.
         """
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)
         except ConvergenceError:
+            self._watch.check()  # a law that failed has answered with no strength
             self._take_over(step.contact)
             raise
         self.memory = commit(self.problem.laws, solution.memory, solution.modes, solution.pairs)
+        self._watch.check()
         return describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
 
     def _solve(self, step: Step, load: Load) -> Solution:
-        silent = SilentReporter()
         begun = replace(self.memory, modes=self._guess_modes(step.contact))
         try:
-            return solve_step(self.problem, self.tangent, begun, load, silent)
+            return solve_step(self.problem, self.tangent, begun, load, self._watch)
         except ConvergenceError:
-            return solve_step(self.problem, self.tangent, self.memory, load, silent)
+            self._watch.check()
+            return self._solve_held(step.contact, load)
+
+    def _solve_held(self, contact: ContactState, load: Load) -> Solution:
+        """The solution with the statuses of the run's pairs, which need not be those that this mesh wants.
+
+        In narrow wedges, or with cohesion that is lost as faces part, a coarser mesh may have none.
+        """
+        problem, beside = self.problem, self.beside
+        memory = replace(self.memory, broken=self._carry_broken(contact))
+        hold = Hold(problem)
+        modes = do_on_first(problem.comm, ConvergenceError, lambda: follow_leaders(
+            problem.laws, hold.apply(self._guess_modes(contact), problem.laws.gap, np.zeros(problem.laws.count))))
+        law = linearise(
+            problem.laws, modes, beside.carry_pairs(contact.traction_n, jumps=False),
+            beside.carry_pairs(contact.slip, jumps=True), memory, load.pressure, problem.traction_scale, "slip",
+        )
+        constraints = hold.release(problem.constrain(law, load), modes)
+        solved = self.tangent.solve(constraints, load, law)
+        if not solved.checked:
+            solved = self.tangent.check(solved, constraints, load, law)
+        pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, ())
+
+    def _carry_broken(self, contact: ContactState) -> NDArray[np.bool_]:
+        nearest = self.beside.nearest
+        return np.asarray(self.problem.laws.brittle & (nearest >= 0) & contact.broken[nearest])
 
     def _guess_modes(self, contact: ContactState) -> ModeState:
         nearest, own = self.beside.nearest, self.memory.modes
@@ -69,10 +105,9 @@ class SecondSolution:
         beside, laws = self.beside, self.problem.laws
         slip = beside.carry_pairs(contact.slip, jumps=True)
         tangential = beside.carry_pairs(contact.traction_s, jumps=False)
-        broken = laws.brittle & (beside.nearest >= 0) & contact.broken[beside.nearest]
         self.memory = Memory(
             self._guess_modes(contact), slip - laws.compliance_s * tangential,
-            np.maximum(beside.carry_pairs(contact.slip_path, jumps=True), 0.0), broken,
+            np.maximum(beside.carry_pairs(contact.slip_path, jumps=True), 0.0), self._carry_broken(contact),
             beside.carry_pairs(contact.traction_n, jumps=False),
         )
 

@@ -145,6 +145,25 @@ def test_polynomials_are_carried_exactly(plate: Model) -> None:
     assert (np.abs((carry.plain @ root)[first] - np.sqrt(along[: len(first)])) > 1e-3).any()
 
 
+@pytest.mark.parametrize("backward", [False, True])
+def test_jumps_of_a_crack_are_carried_by_the_roots_from_its_tips(backward: bool) -> None:
+    ends = "[1.5, 0.7], [0.5, 0.5]" if backward else "[0.5, 0.5], [1.5, 0.7]"
+    plate = parse_model(PLATE.replace("[0.5, 0.5], [1.5, 0.7]", ends).replace("elements = 5", "elements = 12"))[1]
+    coarse = coarsen_model(plate)
+    assert coarse is not None and plate.crack_tips["crack"] == (True, True)
+    fine, other = generate_mesh(plate), generate_mesh(coarse.model)
+    carry = carry_nodes(plate, fine, coarse.model, other)
+
+    def evaluate(points: np.ndarray) -> np.ndarray:
+        along = np.abs(points - (0.5 + 0.5j)) / abs(1 + 0.2j)
+        return np.sqrt(np.maximum(along * (1 - along), 0.0)) * (2 - along)
+
+    crack = np.flatnonzero(other.node_crack & (fine.tip[carry.nearest // (fine.order + 1)] == 0))
+    exact = evaluate(other.position[crack])
+    assert np.abs((carry.rooted @ evaluate(fine.position))[crack] - exact).max() < 1e-12
+    assert np.abs((carry.plain @ evaluate(fine.position))[crack] - exact).max() > 5e-5
+
+
 def test_chains_are_listed_in_the_direction_of_their_curves(plate: Model) -> None:
     mesh = generate_mesh(plate)
     for name, elements in list_curve_elements(plate, mesh):

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pbem
+from pbem import driver
 from pbem.cli import main
 from pbem.driver import make_estimator
-from pbem.errors import CaseError, ConvergenceError
+from pbem.errors import CaseError, ConvergenceError, StopError
 from pbem.model.model import Model
 from pbem.results import accuracy as limits
 from pbem.results.reader import open_results
+from pbem.solve import second
+from pbem.solve.step import Step
+from tests.cli.cli_sample import BLOCKS
 from tests.verification.proofs import PROOFS, proof
 from tests.verification.proofs.proof import Solved
 
@@ -33,6 +38,8 @@ KINDS = {
     "circular hole, 48 elements: displacement of the wall": "displacement",
     "ring widened into a ring across a gap: pressure": "tractions",
     "Hertz, two meshes, block first: pressure": "tractions",
+    "pin in a hole, clearance 1e-4 of the radius: pressure": "tractions",
+    "pushed by about 0.5 of friction: traction": "tractions",
     "block dragged along a plane: force": "reactions",
     "panel with friction, 8 elements a side: slip": "jumps",
 }
@@ -108,7 +115,7 @@ def test_the_accuracy_asked_for_is_met_by_a_crack(accuracy: float, tmp_path: Pat
     middle = 4 * 2.0 * 1.3 * (1 - 0.2**2) / 1e3
     shape = np.sqrt(1 - (opening.position[:, 0] / 1.3) ** 2)
     assert np.abs(opening.opening[-1] / middle - shape).max() < accuracy
-    assert max(results.errors.relative["jumps"][-1], results.errors.relative["factors"][-1]) < accuracy / 1.5
+    assert max(results.errors.relative["jumps"][-1], results.errors.relative["factors"][-1]) < accuracy / limits.SAFETY
     assert results.status == "finished"
 
 
@@ -171,6 +178,123 @@ def test_what_is_not_reached_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
     results = open_results(tmp_path / "block.h5")
     assert results.status == "failed" and "accuracy" in results.failure
     assert len(results.steps) == 2
+
+
+@pytest.fixture
+def failing_second_pass(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
+    """From the second pass on, an exception after the first step."""
+    march, passes = driver.march, []
+
+    def install(error: BaseException) -> None:
+        def break_off(*arguments: Any) -> Iterator[Step]:
+            passes.append(1)
+            for step in march(*arguments):
+                yield step
+                if len(passes) > 1:
+                    raise error
+
+        monkeypatch.setattr(driver, "march", break_off)
+
+    return install
+
+
+def test_a_pass_that_fails_leaves_the_file_of_the_former_one(
+    tmp_path: Path, failing_second_pass: Callable[[BaseException], None]
+) -> None:
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-4))
+    (tmp_path / "rough.toml").write_text(BLOCK.format(accuracy=0.5))
+    rough = pbem.run(tmp_path / "rough.toml", tmp_path / "rough.h5")
+    failing_second_pass(ConvergenceError("mode cycle", "pairs go round"))
+    told = r"pass 2 of \d+ unknowns, pairs go round; the file holds pass 1"
+    with pytest.raises(ConvergenceError, match=told) as caught:
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    assert caught.value.reason == "mode cycle"
+    results = open_results(tmp_path / "block.h5")
+    assert results.status == "failed" and "pass 2" in results.failure
+    assert len(results.steps) == 2
+    assert np.array_equal(results.displacement, rough.displacement)
+    assert sorted(path.name for path in tmp_path.glob("*block.h5*")) == ["block.h5"]
+    assert not list(tmp_path.glob(".block.h5*"))
+
+
+def test_a_pass_without_memory_leaves_the_file_of_the_former_one(
+    tmp_path: Path, failing_second_pass: Callable[[BaseException], None]
+) -> None:
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-4))
+    failing_second_pass(MemoryError("none left"))
+    with pytest.raises(MemoryError):
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    results = open_results(tmp_path / "block.h5")
+    assert results.status == "stopped" and len(results.steps) == 2
+
+
+def test_a_pass_that_is_stopped_can_be_gone_on_with(
+    tmp_path: Path, failing_second_pass: Callable[[BaseException], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-3))
+    whole = pbem.run(tmp_path / "block.toml", tmp_path / "whole.h5")
+    with monkeypatch.context():
+        failing_second_pass(StopError("SIGTERM", "stopped by SIGTERM"))
+        with pytest.raises(StopError):
+            pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    results = open_results(tmp_path / "block.h5")
+    assert results.status == "stopped" and len(results.steps) == 1
+    monkeypatch.undo()
+    again = pbem.run(tmp_path / "block.toml", tmp_path / "block.h5", resume=True)
+    assert np.allclose(again.reactions["top"], whole.reactions["top"], rtol=1e-3)
+
+
+def test_passes_are_counted_on_after_a_resume(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MOST_PASSES", 2)
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-6))
+    with pytest.raises(ConvergenceError, match="not reached within 2 passes"):
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    before = open_results(tmp_path / "block.h5").fractions
+    with pytest.raises(ConvergenceError, match="not reached within 2 passes"):
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5", resume=True)
+    assert open_results(tmp_path / "block.h5").fractions == before
+
+
+LAW = """
+from pbem.contact.strength import Strength
+
+def strength(p_n, slip, friction):
+    if len(p_n) == {pairs}:
+        raise RuntimeError("as many as on the coarser mesh")
+    return Strength(-friction * p_n, -friction + 0 * p_n, 0 * p_n)
+"""
+
+
+def test_a_law_that_fails_in_the_second_solution_alone_is_said(tmp_path: Path) -> None:
+    text = BLOCKS.replace('law = "coulomb"\nfriction = 0.2',
+                          'law = "custom"\nfile = "law.py"\nparameters = { friction = 0.2 }')
+    (tmp_path / "blocks.toml").write_text(text)
+    (tmp_path / "law.py").write_text(LAW.format(pairs=0))
+    sound = pbem.run(tmp_path / "blocks.toml", tmp_path / "sound.h5")
+    pairs = len(sound.contact["joint"].arc_length)
+    assert not sound.errors.missing
+    (tmp_path / "law.py").write_text(LAW.format(pairs=pairs // 2))
+    results = pbem.run(tmp_path / "blocks.toml", tmp_path / "blocks.h5")
+    assert results.status == "finished" and "law.py fails" in results.errors.missing
+    assert np.isnan(results.errors.relative["jumps"]).all()
+    assert np.array_equal(results.displacement, sound.displacement)
+
+
+def test_statuses_that_do_not_settle_on_the_coarser_mesh_are_those_of_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "blocks.toml").write_text(BLOCKS.replace("elements = 4", "elements = 12"))
+    settled = pbem.run(tmp_path / "blocks.toml", tmp_path / "settled.h5").errors
+
+    def refuse(*_: Any) -> None:
+        raise ConvergenceError("unsound mesh", "pairs part when they are pressed")
+
+    monkeypatch.setattr(second, "solve_step", refuse)
+    held = pbem.run(tmp_path / "blocks.toml", tmp_path / "held.h5").errors
+    assert not held.missing
+    for kind in ("reactions", "jumps", "tractions"):
+        ratio = held.relative[kind][-1] / settled.relative[kind][-1]
+        assert 0.2 < ratio < 5
 
 
 def test_where_nothing_is_coarser_there_is_no_estimate(tmp_path: Path) -> None:

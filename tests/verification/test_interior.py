@@ -33,6 +33,7 @@ from pbem.solve.march import march
 from pbem.solve.step import ContactState, Interior, SilentReporter, Step
 from tests.parallel.launch import launch_snippet
 from tests.verification.planes import ROCK, make_circle, make_plane, make_straight, solve
+from tests.verification.proofs.proof import solve_case
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -331,3 +332,17 @@ def test_points_are_shared_by_the_ranks(tmp_path: Path) -> None:
     one = np.load(tmp_path / "1_0.npy")
     for rank in range(3):
         np.testing.assert_allclose(np.load(tmp_path / f"3_{rank}.npy"), one, rtol=1e-9, atol=1e-10)
+
+
+@pytest.mark.parametrize(("order", "elements", "limit"), [(1, 48, 5e-3), (2, 16, 2e-3), (2, 48, 3e-4), (3, 48, 6e-6)])
+def test_the_hoop_stress_of_a_hole_takes_the_neighbours_in(order: int, elements: int, limit: float) -> None:
+    solved = solve_case(
+        materials={"rock": {"young": 1000.0, "poisson": 0.25}},
+        curves={"hole": {"center": [3e3, -1e3], "radius": 20.0, "elements": elements}},
+        regions={"plane": {"material": "rock", "infinite": True, "boundary": ["hole"]}},
+        remote={"sxx": 1.0},
+        analysis={"steps": 1, "order": order},
+    )
+    angle = np.angle(solved.mesh.position - (3e3 - 1e3j))
+    exact = 1 - 2 * np.cos(2 * angle)  # Kirsch
+    assert np.abs(solved.hoop_stress() - exact).max() < limit * 3

@@ -45,8 +45,8 @@ def test_the_deflection_does_not_depend_on_the_unit_of_length() -> None:
     assert solve_cantilever(60.0, 1e-6) == pytest.approx(solve_cantilever(60.0), rel=1e-7)
 
 
-@pytest.mark.parametrize("ligament", [0.1, 0.03, 0.01, 0.003])
-def test_the_stress_in_the_ligament_of_an_eccentric_ring(ligament: float) -> None:
+@pytest.mark.parametrize(("ligament", "order"), [(0.1, 3), (0.05, 2), (0.03, 3), (0.03, 2), (0.01, 2), (0.003, 3)])
+def test_the_stress_in_the_ligament_of_an_eccentric_ring(ligament: float, order: int) -> None:
     solved = solve_case(
         materials={"rock": {"young": 1000.0, "poisson": 0.3}},
         curves={
@@ -55,7 +55,7 @@ def test_the_stress_in_the_ligament_of_an_eccentric_ring(ligament: float) -> Non
         },
         regions={"ring": {"material": "rock", "boundary": ["inner", "outer"]}},
         boundary={"inner": {"pressure": 1.0}},
-        analysis={"steps": 1, "order": 3},
+        analysis={"steps": 1, "order": order},
     )
     thinnest = np.argmin(np.abs(solved.mesh.position - (2 - ligament)))
     e = 1 - ligament

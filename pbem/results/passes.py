@@ -1,0 +1,97 @@
+"""The file of a finished pass of `analysis.accuracy`: kept while a finer one is computed in its place."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from pbem.errors import ResultFileError
+from pbem.model.refinement import Fractions
+from pbem.results.accuracy import Pass
+from pbem.results.journal import lock
+from pbem.results.layout import read_fractions
+from pbem.results.lazy import open_quietly, refuse_damage
+from pbem.results.store import Store, name_part
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """Where a result file that is to be gone on with stands: the element ends of its mesh, and its pass."""
+
+    fractions: Fractions
+    one: Pass
+
+
+def read_refinement(path: Path) -> Refinement | None:
+    """What a file says of its refinement; None if it says nothing.
+
+    Raises ResultFileError if it cannot be read.
+    """
+    try:
+        with open_quietly(path) as file:
+            fractions = read_fractions(file)
+            if fractions is None:
+                return None
+            attributes = file["mesh"].attrs  # files of earlier versions do not say
+            return Refinement(fractions, Pass(int(attributes.get("pass", 1)), int(attributes.get("first_unknowns", 0))))
+    except (OSError, KeyError, ValueError) as error:
+        raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
+
+
+def keep_pass(target: Path) -> KeptPass:
+    """The file of a pass that is finished, before another one takes its place. Raises ResultFileError."""
+    try:
+        return KeptPass(target)
+    except OSError as error:
+        raise ResultFileError(str(target), f"cannot be kept beside a finer pass ({error.strerror or error})") from error
+
+
+class KeptPass:
+    """The file of the last pass under a second name, until the next pass is finished; for one rank only.
+
+    A process that is killed before that leaves it behind, to be removed as other parts are.
+    """
+
+    def __init__(self, target: Path) -> None:
+        """Raises OSError if there is no room for it on a file system that knows no links."""
+        self._target = target
+        self._path = name_part(target, "pass")
+        self._disk = -1
+        self._path.unlink(missing_ok=True)
+        try:
+            os.link(target, self._path)
+        except OSError:  # no links on this file system
+            shutil.copyfile(target, self._path)
+
+    def hold(self) -> None:
+        """From now on it is not stale, once the target is another file."""
+        self._disk = os.open(self._path, os.O_RDWR | os.O_CLOEXEC)
+        lock(self._disk)
+
+    def restore(self, reasons: Mapping[str, str]) -> None:
+        """Put it back in the place of the pass that failed, with the attributes that say why."""
+        self._release()
+        with refuse_damage(self._path):
+            storage = Store(self._path)
+        try:
+            storage.file.attrs.update(reasons)
+            storage.close()
+        except BaseException:
+            storage.drop()
+            raise
+        self._path.replace(self._target)
+
+    def drop(self) -> None:
+        """The next pass is finished, or can be gone on with."""
+        self._release()
+        with suppress(OSError):
+            self._path.unlink(missing_ok=True)
+
+    def _release(self) -> None:
+        if self._disk >= 0:
+            os.close(self._disk)
+            self._disk = -1

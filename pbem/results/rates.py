@@ -1,0 +1,115 @@
+"""How much better a run is than its second solution: less where contact or stick ends, and at the tips of cracks.
+
+There tractions or jumps follow a root of the distance, which meshes resolve more slowly than smooth fields.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.mesh.carry import list_curve_elements
+from pbem.mesh.mesh import Mesh
+from pbem.solve.beside import Beside
+from pbem.solve.step import SLIP, ContactState
+
+Bool = NDArray[np.bool_]
+Integer = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+# The error of the second solution's tractions over that of the run, less one, on the elements beside an end. Of a root
+# that begins where two elements meet the mean error falls with the length (2 - 1). Within an element it depends on
+# where: three times as large on the coarser mesh, measured over cylinders, pins and layers (scripts/bench_estimate.py).
+FIXED, MOVING = 1.0, 2.0
+# That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which
+# would give 1.8, and smooth fields (scripts/bench_estimate.py --accuracy).
+TIP, AT_TIP = 4.0, 2
+
+
+@dataclass(frozen=True)
+class Ends:
+    """At the pairs of the second solution (c,): beside, whether the status changes in the element or next to it, in
+    either solution; moving, whether it changes within an element; mixed, within the run's element at this pair."""
+
+    beside: Bool
+    moving: Bool
+    mixed: Bool
+
+    def choose_divisors(self, smooth: float) -> Real:
+        """What differences of tractions (c,) are to be divided by; smooth: away from ends."""
+        at_end = np.where(self.moving, min(MOVING, smooth), min(FIXED, smooth))
+        return np.where(self.beside, at_end, smooth)
+
+
+class EndFinder:
+    """Looks for the ends of contact in the solutions of a run and of the mesh beside it."""
+
+    def __init__(self, mesh: Mesh, beside: Beside) -> None:
+        self._fine, self._coarse = _Chain(mesh), _Chain(beside.mesh)
+        per_element = mesh.order + 1
+        slot = beside.mesh.pairs.slot
+        self._fine_element = beside.carry.nearest[slot] // per_element
+        # One coordinate for all pairs: interfaces one after the other.
+        longest = max(each.pairs.arc_length.max(initial=0.0) for each in (mesh, beside.mesh)) or 1.0
+        self._at, self._nodes = (
+            each.pairs.interface * 2.0 + each.pairs.arc_length / longest for each in (beside.mesh, mesh)
+        )
+
+    def find(self, mine: ContactState, other: ContactState) -> Ends:
+        """The ends of a step in both solutions."""
+        near_fine, mixed_fine = self._fine.find_changes(mine)
+        near_coarse, mixed_coarse = self._coarse.find_changes(other)
+        coarse = self._coarse.element
+        near = near_coarse[coarse] | near_fine[self._fine_element]
+        moving = mixed_coarse[coarse] | mixed_fine[self._fine_element]
+        return Ends(_spread(near, coarse), _spread(moving, coarse), mixed_fine[self._fine_element])
+
+    def read_between(self, values: Real) -> Real:
+        """Values (m,) of the run's pairs at those of the second solution (c,), by straight lines from node to node: the
+        polynomial of an element in which contact ends is far from the truth between the nodes."""
+        order = self._fine.order
+        if not len(order):
+            return np.zeros(len(self._at))
+        return np.asarray(np.interp(self._at, self._nodes[order], values[order]))
+
+
+def choose_jump_divisors(beside: Beside, tips: Mapping[str, tuple[bool, bool]], smooth: float) -> Real:
+    """What differences of jumps at the pairs of the second solution (c,) are to be divided by.
+
+    tips: of each crack, whether its start and its end is a tip; smooth: elsewhere.
+    """
+    coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
+    for name, own in list_curve_elements(beside.model, coarse) if beside.kind == "merged" else ():
+        at_start, at_end = tips.get(name, (False, False))
+        result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
+    return np.asarray(result[coarse.pairs.slot // (coarse.order + 1)])
+
+
+class _Chain:
+    """The pairs of all interfaces in order along them; element (m,): of each pair's slot."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        pairs = mesh.pairs
+        self.order: Integer = np.lexsort((pairs.arc_length, pairs.interface))
+        self.element: Integer = pairs.slot // (mesh.order + 1)
+        self._elements = mesh.elements
+        same = np.diff(pairs.interface[self.order]) == 0
+        self._first, self._second = self.order[:-1][same], self.order[1:][same]
+
+    def find_changes(self, contact: ContactState) -> tuple[Bool, Bool]:
+        """Elements (e,) in which or beside which the status changes from pair to pair, and those in which it does."""
+        status = np.where((contact.mode == SLIP) & (contact.traction_s < 0), -1, contact.mode.astype(np.int64))
+        changes = status[self._first] != status[self._second]
+        one, other = (self.element[each[changes]] for each in (self._first, self._second))
+        near, mixed = np.zeros((2, self._elements), dtype=bool)
+        near[one] = near[other] = True
+        mixed[one[one == other]] = True
+        return near, mixed
+
+
+def _spread(marked: Bool, element: Integer) -> Bool:
+    """Pairs whose element has a marked pair."""
+    return np.asarray(np.bincount(element, marked, element.max(initial=0) + 1)[element] > 0)

@@ -3,8 +3,8 @@
 Two cracks that cross (crossing), one that ends on another (t), one that leaves the side of a plate (edge), at angles
 from 90 to 3 degrees, each from rest in one step under compression with shear, biaxial compression and mixed opening.
 A row for each kind, angle and friction coefficient: the most iterations under a load on the mesh as it is asked and on
-the finer one; the largest difference of the slips from those of the finer mesh, and, in wedges whose last bit follows
-the pair next to it, from those with half that bit, both as parts of the largest slip; what did not settle.
+the finer one; the largest difference of the slips from those of the finer mesh, and, in wedges, which are graded down
+to a last bit, from those with half that bit, both as parts of the largest slip; what did not settle.
 
 usage: .venv/bin/python -m scripts.study_junctions [--kinds crossing,t,edge] [--angles 90,5] [--friction 0.2,0.6]
     [--elements 8] [--finer 2]
@@ -29,6 +29,7 @@ from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model import sliver
 from pbem.model.build import parse_model
+from pbem.model.nearness import WEDGE
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march
@@ -189,7 +190,7 @@ def study(kind: str, angle: float, frictions: tuple[float, ...], elements: int, 
     """Print the rows of a kind and an angle."""
     given = Solver(Junction(kind, angle, elements))
     fine = Solver(Junction(kind, angle, finer * elements))
-    half = Solver(Junction(kind, angle, elements), 0.5) if (given.problem.laws.follows).any() else None
+    half = Solver(Junction(kind, angle, elements), 0.5) if angle < WEDGE else None
     for friction in frictions:
         rows = []
         for name, load in LOADS.items():

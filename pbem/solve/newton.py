@@ -81,7 +81,9 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     most_pivoted = MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
-    search = Search(most_pivoted if is_linear(laws) else 0, laws.follows)
+    search = Search(
+        most_pivoted if is_linear(laws) else 0, laws.follows, None if hierarchical else problem.mesh.pairs.interface
+    )
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -163,17 +165,21 @@ def _pivot(
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
     judge = _make_judge(problem, solved, search.caution)
 
+    def complete(own: ModeState) -> ModeState:
+        mode, sign = modes.mode.copy(), modes.sign.copy()
+        mode[group], sign[group] = own.mode, own.sign
+        return follow_leaders(problem.laws, ModeState(mode, sign))
+
     def settle() -> Settled:
-        return settle_subset(subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure))
+        return settle_subset(
+            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
+            lambda own: not hold.find_free(complete(own)),
+        )
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
     if search.conclude(found):
         raise _end(hold, "no admissible modes", search.proposal, search)
-    if found.modes is None:
-        return None
-    mode, sign = modes.mode.copy(), modes.sign.copy()
-    mode[group], sign[group] = found.modes.mode, found.modes.sign
-    return follow_leaders(problem.laws, ModeState(mode, sign))
+    return None if found.modes is None else complete(found.modes)
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

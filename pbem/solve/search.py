@@ -60,11 +60,14 @@ class Search:
     """Watches the changes of modes and says what comes next; the same on all ranks, from the same proposals.
 
     most_pivoted: the largest group of pairs that is solved by pivoting. follows (m,): pairs that take the mode of
-    another one, which are in no such group.
+    another one, which are in no such group. interface (m,): of each pair, in order along it; given where larger groups
+    cost little: then ever more neighbours join the pairs that change beside a group which has been solved.
     """
 
-    def __init__(self, most_pivoted: int, follows: NDArray[np.bool_] | None = None) -> None:
-        self.most_pivoted, self.follows = most_pivoted, follows
+    def __init__(
+        self, most_pivoted: int, follows: NDArray[np.bool_] | None = None, interface: Integer | None = None
+    ) -> None:
+        self.most_pivoted, self.follows, self.interface = most_pivoted, follows, interface
         self.restart()
 
     def restart(self) -> None:
@@ -74,7 +77,7 @@ class Search:
         self.group: Integer = np.zeros(0, dtype=np.int64)
         self.failed_group: Integer = self.group
         self.failed: Settled | None = None
-        self.futile = 0
+        self.futile = self.solved = 0
         self.level = 0
         self.returned = False
         self.seen: set[bytes] = set()
@@ -100,11 +103,22 @@ class Search:
         if not len(self.group) and self.counts[-1] <= SLOW * min(self.counts[:-1]):
             return nothing
         lately = np.unique(np.concatenate(self.changed[-2:]))
-        for group in (np.union1d(self.group, lately), lately, self.changed[-1]):
+        whole = np.union1d(self.group, lately)
+        for group in (np.union1d(whole, self._find_neighbours(self.changed[-1])), whole, lately, self.changed[-1]):
             if len(group) <= self.most_pivoted:
                 self.group = group
                 return group
         return nothing
+
+    def _find_neighbours(self, pairs: Integer) -> Integer:
+        """The pairs next to some, the more the oftener groups were solved in turn: contact ends somewhere there."""
+        if self.interface is None or not self.solved:
+            return pairs
+        reach = min(2**self.solved, len(self.interface))
+        near = pairs[:, None] + np.arange(-reach, reach + 1)
+        inside = np.clip(near, 0, len(self.interface) - 1)
+        near = inside[(near == inside) & (self.interface[inside] == self.interface[pairs][:, None])]
+        return np.unique(near if self.follows is None else near[~self.follows[near]])
 
     def conclude(self, found: Settled) -> bool:
         """Take note of what pivoting found for the group; True if there seems to be nothing to be found.
@@ -114,7 +128,9 @@ class Search:
         """
         if found.modes is not None:
             self.futile = 0
+            self.solved += 1
             return False
+        self.solved = 0
         again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
         self.failed_group, self.failed = self.group, found
         self.futile += found.tried > 1

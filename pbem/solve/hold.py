@@ -88,9 +88,12 @@ class Hold:
         # Pairs that stuck until now and are overloaded say in which sense the body goes on to move.
         overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
         overloaded = np.intersect1d(overloaded, self.pairs)
-        held, pairs = stick_calmest_pairs(
-            mesh, laws, closed, slip, overloaded, lambda trial: not self.find_free(trial)
-        )
+        for passed_over in (overloaded, overloaded[:0]):
+            held, pairs = stick_calmest_pairs(
+                mesh, laws, closed, slip, passed_over, lambda trial: not self.find_free(trial)
+            )
+            if len(pairs):
+                break
         self.count += 1
         self.pairs = np.union1d(self.pairs, pairs)
         return held

@@ -177,7 +177,8 @@ def _pivot(
         )
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
-    if search.conclude(found):
+    # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
+    if search.conclude(found) and not len(hold.pairs):
         raise _end(hold, "no admissible modes", search.proposal, search)
     return None if found.modes is None else complete(found.modes)
 

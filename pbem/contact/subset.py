@@ -44,9 +44,12 @@ Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
 
-# Choices of detached pairs that are followed from one to the next, and beyond that tried one by one.
-MOST_FOLLOWED = 60
+# Choices of detached pairs that are followed from one to the next, and beyond that tried one by one. Those of more
+# pairs than are pivoted quickly are the fewer, as pivoting costs the cube of their number.
+MOST_FOLLOWED, LEAST_FOLLOWED, QUICK = 60, 3, 60
 MOST_ENUMERATED = 6
+# The most pairs that are pivoted; Newton's steps among them cost a hundredth of it.
+MOST_PIVOTED = 300
 # Newton's steps among the pairs of a group, each far cheaper than a solution with all.
 MOST_STEPS = 100
 # Where modes come back, only violations of this share of the largest change; at last one pair at a time.
@@ -148,6 +151,8 @@ def settle_subset(
     stepped = _step(problem, subset.modes, response, judge, holds)
     if stepped is not None:
         return Settled(stepped, False, 0, wrong)
+    if len(loses) > MOST_PIVOTED:
+        return Settled(None, False, 0, wrong)
     tried: set[bytes] = set()
     complete = True
     for detached in _choose_detached(subset.modes.mode == OPEN, loses):
@@ -207,7 +212,8 @@ def _follow(proposal: Proposal, loses: Bool, detached: Bool, tried: set[bytes]) 
 
 def _most_tried(loses: Bool) -> int:
     few = int(loses.sum())
-    return MOST_FOLLOWED + (2**few if few <= MOST_ENUMERATED else 0)
+    followed = int(MOST_FOLLOWED * min(1.0, QUICK / len(loses)) ** 3)
+    return max(followed, LEAST_FOLLOWED) + (2**few if few <= MOST_ENUMERATED else 0)
 
 
 def _choose_detached(is_open: Bool, loses: Bool) -> Iterator[Bool]:

@@ -23,7 +23,7 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.subset import Settled, settle_subset, take_subset
+from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.cascade import run_cascade
@@ -57,8 +57,8 @@ class Solution:
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# The most pairs that are solved by pivoting; with the hierarchical operator each costs two solutions by GMRES.
-MOST_PIVOTED, MOST_PIVOTED_BY_GMRES = 300, 12
+# The most pairs that are settled together; with the hierarchical operator each costs two solutions by GMRES.
+MOST_SETTLED, MOST_SETTLED_BY_GMRES = 600, 12
 
 
 def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
@@ -78,11 +78,11 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    most_pivoted = MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED
+    most_settled = MOST_SETTLED_BY_GMRES if hierarchical else MOST_SETTLED
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(
-        most_pivoted if is_linear(laws) else 0, laws.follows, None if hierarchical else problem.mesh.pairs.interface
+        most_settled if is_linear(laws) else 0, laws.follows, None if hierarchical else problem.mesh.pairs.interface
     )
     iterations: list[Iteration] = []
     while True:
@@ -106,7 +106,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             floor = _find_floor(problem, solved)
             cascade = run_cascade(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
-                most_pivoted,
+                min(most_settled, MOST_PIVOTED),
             )
             memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal

@@ -52,6 +52,8 @@ CAUTIONS = (
 SLOW = 0.5
 # Iterations that are plain Newton steps whatever they change.
 PLAIN = 3
+# Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
+COSTLY = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
 FUTILE = 6
 
@@ -78,6 +80,7 @@ class Search:
         self.failed_group: Integer = self.group
         self.failed: Settled | None = None
         self.futile = self.solved = 0
+        self.pause = self.paused = 0
         self.level = 0
         self.returned = False
         self.seen: set[bytes] = set()
@@ -100,6 +103,9 @@ class Search:
         nothing = np.zeros(0, dtype=np.int64)
         if len(self.counts) <= PLAIN or not self.counts[-1]:
             return nothing
+        if self.paused < self.pause:
+            self.paused += 1
+            return nothing
         if not len(self.group) and self.counts[-1] <= SLOW * min(self.counts[:-1]):
             return nothing
         lately = np.unique(np.concatenate(self.changed[-2:]))
@@ -114,7 +120,7 @@ class Search:
         """The pairs next to some, the more the oftener groups were solved in turn: contact ends somewhere there."""
         if self.interface is None or not self.solved:
             return pairs
-        reach = min(2**self.solved, len(self.interface))
+        reach = min(4**self.solved, len(self.interface))
         near = pairs[:, None] + np.arange(-reach, reach + 1)
         inside = np.clip(near, 0, len(self.interface) - 1)
         near = inside[(near == inside) & (self.interface[inside] == self.interface[pairs][:, None])]
@@ -127,10 +133,11 @@ class Search:
         of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
         """
         if found.modes is not None:
-            self.futile = 0
+            self.futile = self.pause = 0
             self.solved += 1
             return False
-        self.solved = 0
+        self.solved = self.paused = 0
+        self.pause = 2 * self.pause + 1 if len(self.group) > COSTLY else 0
         again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
         self.failed_group, self.failed = self.group, found
         self.futile += found.tried > 1

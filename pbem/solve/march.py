@@ -127,7 +127,7 @@ def _advance(
             if error.reason == "free motion":
                 ceiling = min(ceiling, target)
             balanced = _find_balanced(problem, memory, stage, reached, target)
-            if balanced - reached < max(least, NEAR * balanced):
+            if balanced < target and balanced - reached < max(least, NEAR * balanced):
                 raise _end_out_of_balance(problem, stage, reached, target, error) from error
             if balanced < target:
                 half = min(half, SAFE * (balanced - reached)) if half < least else SAFE * (balanced - reached)

@@ -9,6 +9,7 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.build import parse_model
 from pbem.parallel import world
+from pbem.solve import march
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.limit_load import find_balanced_fraction
 from tests.verification.proofs.proof import write_case
@@ -67,3 +68,17 @@ def test_a_run_comes_to_its_limit_load_in_a_few_steps() -> None:
         run(write_pushed_block(0.7, {"friction": 0.25}), listener)
     assert caught.value.reason == "limit load"
     assert 1 <= len(listener.rejected) <= 4
+
+
+def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: pytest.MonkeyPatch) -> None:
+    # What forces could balance is then the whole step, however little it is more than what was reached.
+    def fail(*_: object) -> None:
+        raise ConvergenceError("mode cycle", "as it is made to")
+
+    problem = parse_model(write_pushed_block(0.2, {"friction": 0.25}))[1]
+    assembled = assemble_problem(problem, generate_mesh(problem), world)
+    monkeypatch.setattr(march, "solve_step", fail)
+    start = march.Start(2, 1, 0.499, start_memory(assembled.laws))
+    with pytest.raises(ConvergenceError) as caught:
+        next(march.march(assembled, Listener(), start))
+    assert caught.value.reason == "mode cycle"

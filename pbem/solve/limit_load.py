@@ -23,6 +23,8 @@ Real = NDArray[np.float64]
 
 # What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.
 BALANCED = 1e-3
+# A share that is less than the whole by no more than this is the whole.
+ROUNDING = 1e-6
 # Models with more pairs are not asked.
 MOST_PAIRS = 20_000
 
@@ -45,7 +47,9 @@ def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached
     if not size > 0:
         return target
     share = _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size)
-    return None if share is None else reached + share * (target - reached)
+    if share is None or share > 1 - ROUNDING:
+        return None if share is None else target
+    return reached + share * (target - reached)
 
 
 def _sum_up(

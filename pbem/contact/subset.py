@@ -37,16 +37,23 @@ from pbem.contact.laws import (
     plastic_slip,
     resists_slip,
 )
-from pbem.contact.modes import Proposal, tensile_limit
+from pbem.contact.modes import Proposal, limit_changes, tensile_limit
 from pbem.contact.pivoting import solve_by_pivoting
 
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
 
-# Choices of detached pairs that are followed from one to the next, and beyond that tried one by one.
-MOST_FOLLOWED = 60
+# Choices of detached pairs that are followed from one to the next, and beyond that tried one by one. Those of more
+# pairs than are pivoted quickly are the fewer, as pivoting costs the cube of their number.
+MOST_FOLLOWED, LEAST_FOLLOWED, QUICK = 60, 3, 60
 MOST_ENUMERATED = 6
+# The most pairs that are pivoted; Newton's steps among them cost a hundredth of it.
+MOST_PIVOTED = 300
+# Newton's steps among the pairs of a group, each far cheaper than a solution with all.
+MOST_STEPS = 100
+# Where modes come back, only violations of this share of the largest change; at last one pair at a time.
+SHARES = (0.0, 0.3, 1.0)
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
 ROUNDING, PERTURBATION = 1e-12, 1e-10
 # Tractions that some motion hardly changes leave a body free without these pairs.
@@ -127,9 +134,13 @@ class Settled:
 
 
 def settle_subset(
-    subset: Subset, response: Response, judge: Callable[[ModeState, PairState], Proposal]
+    subset: Subset, response: Response, judge: Callable[[ModeState, PairState], Proposal],
+    holds: Callable[[ModeState], bool] = lambda modes: True,
 ) -> Settled:
-    """Find modes of s pairs that `judge` leaves as they are; the judge sees modes and states of these pairs alone."""
+    """Find modes of s pairs that `judge` leaves as they are; the judge sees modes and states of these pairs alone.
+
+    holds: whether all bodies are held in modes of these pairs.
+    """
     problem = _pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
     compliance, sprung = _find_compliance(problem)
@@ -137,6 +148,11 @@ def settle_subset(
     if compliance is None:
         return Settled(None, False, 0, none)
     wrong = none if sprung else (np.diag(compliance) >= 0).reshape(2, -1).any(axis=0)
+    stepped = _step(problem, subset.modes, response, judge, holds)
+    if stepped is not None:
+        return Settled(stepped, False, 0, wrong)
+    if len(loses) > MOST_PIVOTED:
+        return Settled(None, False, 0, wrong)
     tried: set[bytes] = set()
     complete = True
     for detached in _choose_detached(subset.modes.mode == OPEN, loses):
@@ -154,7 +170,30 @@ def settle_subset(
             if not proposal.changed.any():
                 return Settled(modes, False, len(tried), wrong)
             follow = _follow(proposal, loses, follow, tried)
-    return Settled(None, complete and len(tried) >= 2 ** int(loses.sum()), len(tried), wrong)
+    # Friction alone always has admissible modes: what pivoting finds of it and the judge refuses is ill-conditioned.
+    return Settled(None, complete and bool(loses.any()) and len(tried) >= 2 ** int(loses.sum()), len(tried), wrong)
+
+
+def _step(
+    problem: _Pairs, modes: ModeState, response: Response, judge: Callable[[ModeState, PairState], Proposal],
+    holds: Callable[[ModeState], bool],
+) -> ModeState | None:
+    """Modes by Newton's steps among these pairs alone; None where they come back, take too many or free a body.
+
+    Along a slender wedge the end of contact moves by an element or two in a step, however many there are.
+    """
+    for share in SHARES:
+        seen: set[bytes] = set()
+        while len(seen) < MOST_STEPS and modes.fingerprint() not in seen:
+            seen.add(modes.fingerprint())
+            d = _solve_in_modes(problem, modes) if holds(modes) else None
+            if d is None:
+                return None
+            proposal = judge(modes, response.evaluate(d))
+            if not proposal.changed.any():
+                return modes
+            modes = limit_changes(modes, proposal, share)
+    return None
 
 
 def _follow(proposal: Proposal, loses: Bool, detached: Bool, tried: set[bytes]) -> Bool | None:
@@ -173,7 +212,8 @@ def _follow(proposal: Proposal, loses: Bool, detached: Bool, tried: set[bytes]) 
 
 def _most_tried(loses: Bool) -> int:
     few = int(loses.sum())
-    return MOST_FOLLOWED + (2**few if few <= MOST_ENUMERATED else 0)
+    followed = int(MOST_FOLLOWED * min(1.0, QUICK / len(loses)) ** 3)
+    return max(followed, LEAST_FOLLOWED) + (2**few if few <= MOST_ENUMERATED else 0)
 
 
 def _choose_detached(is_open: Bool, loses: Bool) -> Iterator[Bool]:

@@ -130,8 +130,10 @@ def _list_velocities(mesh: Mesh, motions: Sequence[FreeMotion]) -> NDArray[np.co
 CLOSED_AT_LEAST = 3
 
 
-def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: NDArray[np.float64]) -> ModeState:
-    """Modes with the nearest pairs of every interface on which fewer are closed, for a body that is free otherwise.
+def close_nearest_pairs(
+    mesh: Mesh, laws: PairLaws, modes: ModeState, opening: NDArray[np.float64], least: int = CLOSED_AT_LEAST
+) -> ModeState:
+    """Modes with the nearest pairs of every interface on which fewer than `least` are closed, for a body that is free.
 
     A body that is pressed against another one by forces alone has no equilibrium until they touch somewhere; opening
     (m,): the present openings.
@@ -141,11 +143,11 @@ def close_nearest_pairs(mesh: Mesh, laws: PairLaws, modes: ModeState, opening: N
     may_close = np.flatnonzero(~laws.parted & ~mesh.pairs.crack)
     of = mesh.pairs.interface[may_close]
     count = np.bincount(of[mode[may_close] != OPEN], minlength=len(mesh.interface_names))
-    own = may_close[(mode[may_close] == OPEN) & (count[of] < CLOSED_AT_LEAST)]
+    own = may_close[(mode[may_close] == OPEN) & (count[of] < least)]
     # By interface, then by opening: the first few of each interface are its nearest pairs.
     own = own[np.lexsort((opening[own], mesh.pairs.interface[own]))]
     of = mesh.pairs.interface[own]
-    nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < CLOSED_AT_LEAST - count[of]]
+    nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < least - count[of]]
     mode[nearest] = closed[nearest]
     return ModeState(mode, modes.sign)
 

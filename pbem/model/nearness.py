@@ -150,13 +150,14 @@ class Corner:
     """Legs that meet at a point and enclose wedges there.
 
     ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
-    two legs `sides`.
+    two legs `sides`; beside: further legs that end at the point, in corners that are no wedges.
     """
 
     point: complex
     ends: tuple[tuple[int, bool], ...]
     angle: float
     sides: tuple[int, int]
+    beside: tuple[tuple[int, bool], ...] = ()
 
 
 def _find_meetings(legs: Sequence[Leg], members: Sequence[Integer]) -> tuple[list[Corner], Integer]:
@@ -185,7 +186,11 @@ def _find_meetings(legs: Sequence[Leg], members: Sequence[Integer]) -> tuple[lis
                     around |= {(one, one_end): None, (other, other_end): None}
         if found:
             angle, one, other = min(found)
-            corners.append(Corner(point, tuple(around), angle, (one, other)))
+            beside = [
+                (leg, at_end) for leg, _, at_end in ends
+                if (leg, at_end) not in around and any(regions[leg] & regions[side] for side, _ in around)
+            ]
+            corners.append(Corner(point, tuple(around), angle, (one, other), tuple(beside)))
     return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
 
 

@@ -5,6 +5,9 @@ and distance of the sides, down to the element in the corner itself, which no me
 they are pressed. Up to TIED that bit must not choose its own contact status. It takes that of the pair next to it
 (stick, slip with its sign, open); its jump stays free, so that rigid motions of the sides pass through the corner.
 Faces tied to zero jump there would pin cracks that cross: 30 % of the slip, falling with the logarithm of the length.
+
+Further legs that end in the corner are graded in the same way, though no wedge lies beside them: where a branch leaves
+a crack, jumps that elements of a tenfold length cannot follow turn the needle between the two (30 % of the slip).
 """
 
 from __future__ import annotations
@@ -57,9 +60,9 @@ class Wedges:
         """Per end of a leg (legs, 2): length of the last bit, and growth of lengths; zeros where no wedge is."""
         floor, growth = np.zeros((legs, 2)), np.zeros((legs, 2))
         for corner, bit in zip(self.corners, self.bits, strict=True):
-            for number, at_end in corner.ends:
+            for number, at_end in corner.ends + corner.beside:
                 floor[number, int(at_end)] = bit
-                growth[number, int(at_end)] = measure_growth(corner.angle, reach)
+                growth[number, int(at_end)] = _measure_growth_of_leg(corner, (number, at_end), reach)
         return floor, growth
 
     def grade(
@@ -71,7 +74,9 @@ class Wedges:
         number = self.at.get((leg, at_end))
         if number is None:
             return [0.0]
-        growth, bit = measure_growth(self.corners[number].angle, reach), self.bits[number]
+        growth, bit = _measure_growth_of_leg(self.corners[number], (leg, at_end), reach), self.bits[number]
+        if bit > 0.5 * length:
+            return [0.0]
         if at_end:
             places, limits = (1.0 - np.append(places[1:], 1.0))[::-1], limits[::-1]
         ends = [0.0, bit / length]
@@ -88,6 +93,10 @@ class Wedges:
 def measure_growth(angle: float, reach: float) -> float:
     """Length of an element over its distance from the corner of a wedge (radians)."""
     return min(MOST_GROWTH, reach * math.sin(angle))
+
+
+def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: float) -> float:
+    return MOST_GROWTH if end in corner.beside else measure_growth(corner.angle, reach)
 
 
 def measure_last_bit(angle: float) -> float:
@@ -112,5 +121,5 @@ def find_wedges(surroundings: Surroundings) -> Wedges:
             first = before[number] + (legs[number].length - bit if at_end else 0.0)
             other = names[corner.sides[corner.sides[0] == number]]
             ties.append(Tie(names[number], first, first + bit, corner.point, math.degrees(corner.angle), other))
-    at = {end: number for number, corner in enumerate(surroundings.corners) for end in corner.ends}
+    at = {end: number for number, corner in enumerate(surroundings.corners) for end in corner.ends + corner.beside}
     return Wedges(tuple(surroundings.corners), tuple(bits), tuple(ties), at)

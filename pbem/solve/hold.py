@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.cut_parts import describe_cut_motions
-from pbem.contact.laws import SLIP, STICK, ModeState
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.loads import Load
-from pbem.contact.support import close_nearest_pairs, stick_calmest_pairs
+from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
 from pbem.solve.balance import DRIVEN, measure_balance
@@ -22,6 +22,8 @@ Integer = NDArray[np.int64]
 
 # A body that slips on all its contacts is held by single pairs at most so often in one step.
 MOST_HELD = 12
+# Gaps that differ by more than this part are not those of a symmetric contact.
+UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
 
@@ -82,15 +84,22 @@ class Hold:
         if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
-        closed = close_nearest_pairs(mesh, laws, modes, opening)
-        if before is None or self.count >= MOST_HELD or not self.find_free(closed):
+        # No more than hold it: a third pair beside the two on which a round body lies would pull at it.
+        for least in range(2, CLOSED_AT_LEAST + 1):
+            closed = close_nearest_pairs(mesh, laws, modes, opening, least)
+            if not self.find_free(closed):
+                return closed
+        if before is None or self.count >= MOST_HELD:
             return closed
         # Pairs that stuck until now and are overloaded say in which sense the body goes on to move.
         overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
         overloaded = np.intersect1d(overloaded, self.pairs)
-        held, pairs = stick_calmest_pairs(
-            mesh, laws, closed, slip, overloaded, lambda trial: not self.find_free(trial)
-        )
+        for passed_over in (overloaded, overloaded[:0]):
+            held, pairs = stick_calmest_pairs(
+                mesh, laws, closed, slip, passed_over, lambda trial: not self.find_free(trial)
+            )
+            if len(pairs):
+                break
         self.count += 1
         self.pairs = np.union1d(self.pairs, pairs)
         return held
@@ -137,6 +146,32 @@ class Hold:
 
     def refuse_free_motion(self, modes: ModeState) -> None:
         """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
-        error = self.describe_free_motion(modes)
+        error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
         if error:
             raise error
+
+    def _describe_unresolved(self, modes: ModeState) -> ConvergenceError | None:
+        """The error of a body that two neighbouring pairs alone hold against a rotation, where it is one of the mesh.
+
+        Round faces touch at a place between the pairs, which a contact shorter than an element does not show: pairs
+        that were unequally far apart would turn the body until both touch.
+        """
+        mesh, mode = self.problem.mesh, modes.mode.copy()
+        pairs, gap = mesh.pairs, self.problem.laws.gap
+        closed = np.flatnonzero((mode != OPEN) & ~pairs.crack)
+        count = np.bincount(pairs.interface[closed], minlength=len(mesh.interface_names))
+        for number in np.flatnonzero(count == 2):
+            along = np.flatnonzero(pairs.interface == number)
+            along = along[np.argsort(pairs.arc_length[along], kind="stable")]
+            at = np.flatnonzero(mode[along] != OPEN)
+            first, second = along[at]
+            if at[1] == at[0] + 1 and abs(gap[first] - gap[second]) > UNEQUAL * max(gap[first], gap[second]):
+                mode[second] = OPEN
+        free = self.find_free(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else None
+        if not free:
+            return None
+        detail = (
+            f"nothing in the present contact but two neighbouring pairs, which were not equally far apart, prevents a "
+            f"{free}; hold it by a condition, or use shorter elements where it touches"
+        )
+        return ConvergenceError("free motion", detail)

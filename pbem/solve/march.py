@@ -12,7 +12,11 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.balance import describe_imbalance, measure_balance
 from pbem.solve.krylov import make_tangent
+<<<<<<< HEAD
 from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_linearity
+=======
+from pbem.solve.limit_load import find_balanced_fraction
+>>>>>>> settling
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.proportional import is_proportional
@@ -57,9 +61,12 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
             reached = begin.factor if stage == begin.stage else 0.0
+            ceiling = np.inf
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
-                solution, reached = _advance(problem, tangent, memory, stage, reached, planned, reporter)
+                solution, reached, ceiling = _advance(
+                    problem, tangent, memory, stage, reached, planned, ceiling, reporter
+                )
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
                 number += 1
                 step = describe_step(problem, solution, memory, number, stage, reached)
@@ -93,6 +100,7 @@ def _note_imbalance(problem: Problem, step: Step, noted: float, reporter: Report
     return amount
 
 
+<<<<<<< HEAD
 def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
     """Note what is beyond linear theory if it is twice as much as was noted before; returns what has been noted now."""
     assert step.linearity is not None
@@ -104,26 +112,67 @@ def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Rep
             reporter.note(f"Step {step.number}: {text}.")
         return amount if notes else noted
     return noted
+=======
+# A limit load is told where no more than this part of it is missing.
+NEAR = 0.02
+# Of what forces in the contacts could still balance, a step takes this part.
+SAFE = 0.97
+>>>>>>> settling
 
 
 def _advance(
-    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float,
+    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float, ceiling: float,
     reporter: Reporter,
-) -> tuple[Solution, float]:
-    """One converged step towards the planned fraction of the stage; returns it and the fraction reached."""
+) -> tuple[Solution, float, float]:
+    """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
+
+    ceiling: the least fraction of the stage at which a body was found to move freely, infinity if none was: it is
+    halved towards rather than tried again.
+    """
+    least = problem.model.solver.min_step
     target = planned
+    if reached < ceiling <= planned:
+        middle = 0.5 * (reached + ceiling)
+        target = middle if middle - reached >= least else ceiling
     while True:
         reporter.start_step(stage, reached, target)
         try:
-            return solve_step(problem, tangent, memory, problem.evaluate_load(stage, target), reporter), target
+            solution = solve_step(problem, tangent, memory, problem.evaluate_load(stage, target), reporter)
+            return solution, target, ceiling if target < ceiling else np.inf
         except ConvergenceError as error:
             half = 0.5 * (target - reached)
             if is_proportional(problem, memory, stage, reached):
                 raise _end_at_rest(problem, stage, target, error) from error
-            if half < problem.model.solver.min_step:
+            if error.reason == "free motion":
+                ceiling = min(ceiling, target)
+            balanced = _find_balanced(problem, memory, stage, reached, target)
+            if balanced < target and balanced - reached < max(least, NEAR * balanced):
+                raise _end_out_of_balance(problem, stage, reached, target, error) from error
+            if balanced < target:
+                half = min(half, SAFE * (balanced - reached)) if half < least else SAFE * (balanced - reached)
+            if half < least:
                 raise _end_march(problem, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
             target = reached + half
+
+
+def _find_balanced(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float:
+    """The largest fraction up to the target that forces in the contacts could balance, as the first rank finds it."""
+    found = do_on_first(
+        problem.comm, ConvergenceError, lambda: find_balanced_fraction(problem, memory, stage, reached, target)
+    )
+    return target if found is None else found
+
+
+def _end_out_of_balance(
+    problem: Problem, stage: int, reached: float, target: float, error: ConvergenceError
+) -> ConvergenceError:
+    name = problem.model.stages[stage].name
+    return ConvergenceError(
+        "limit load",
+        f"limit load reached at fraction {reached:.6g} of stage {name!r}: no forces that the contacts can carry "
+        f"balance the loads at {target:.6g}; there {error.detail}, or prescribe a displacement in place of the load",
+    )
 
 
 def _end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceError) -> ConvergenceError:

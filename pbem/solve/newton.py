@@ -23,7 +23,7 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.subset import Settled, settle_subset, take_subset
+from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.cascade import run_cascade
@@ -57,8 +57,8 @@ class Solution:
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# The most pairs that are solved by pivoting; with the hierarchical operator each costs two solutions by GMRES.
-MOST_PIVOTED, MOST_PIVOTED_BY_GMRES = 300, 12
+# The most pairs that are settled together; with the hierarchical operator each costs two solutions by GMRES.
+MOST_SETTLED, MOST_SETTLED_BY_GMRES = 600, 12
 
 
 def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
@@ -78,10 +78,12 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    most_pivoted = MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED
+    most_settled = MOST_SETTLED_BY_GMRES if hierarchical else MOST_SETTLED
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
-    search = Search(most_pivoted if is_linear(laws) else 0, laws.follows)
+    search = Search(
+        most_settled if is_linear(laws) else 0, laws.follows, None if hierarchical else problem.mesh.pairs.interface
+    )
     iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
@@ -104,7 +106,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             floor = _find_floor(problem, solved)
             cascade = run_cascade(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
-                most_pivoted,
+                min(most_settled, MOST_PIVOTED),
             )
             memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
@@ -163,17 +165,22 @@ def _pivot(
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
     judge = _make_judge(problem, solved, search.caution)
 
+    def complete(own: ModeState) -> ModeState:
+        mode, sign = modes.mode.copy(), modes.sign.copy()
+        mode[group], sign[group] = own.mode, own.sign
+        return follow_leaders(problem.laws, ModeState(mode, sign))
+
     def settle() -> Settled:
-        return settle_subset(subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure))
+        return settle_subset(
+            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
+            lambda own: not hold.find_free(complete(own)),
+        )
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
-    if search.conclude(found):
+    # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
+    if search.conclude(found) and not len(hold.pairs):
         raise _end(hold, "no admissible modes", search.proposal, search)
-    if found.modes is None:
-        return None
-    mode, sign = modes.mode.copy(), modes.sign.copy()
-    mode[group], sign[group] = found.modes.mode, found.modes.sign
-    return follow_leaders(problem.laws, ModeState(mode, sign))
+    return None if found.modes is None else complete(found.modes)
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

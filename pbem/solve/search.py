@@ -52,6 +52,8 @@ CAUTIONS = (
 SLOW = 0.5
 # Iterations that are plain Newton steps whatever they change.
 PLAIN = 3
+# Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
+COSTLY = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
 FUTILE = 6
 
@@ -60,11 +62,14 @@ class Search:
     """Watches the changes of modes and says what comes next; the same on all ranks, from the same proposals.
 
     most_pivoted: the largest group of pairs that is solved by pivoting. follows (m,): pairs that take the mode of
-    another one, which are in no such group.
+    another one, which are in no such group. interface (m,): of each pair, in order along it; given where larger groups
+    cost little: then ever more neighbours join the pairs that change beside a group which has been solved.
     """
 
-    def __init__(self, most_pivoted: int, follows: NDArray[np.bool_] | None = None) -> None:
-        self.most_pivoted, self.follows = most_pivoted, follows
+    def __init__(
+        self, most_pivoted: int, follows: NDArray[np.bool_] | None = None, interface: Integer | None = None
+    ) -> None:
+        self.most_pivoted, self.follows, self.interface = most_pivoted, follows, interface
         self.restart()
 
     def restart(self) -> None:
@@ -74,7 +79,8 @@ class Search:
         self.group: Integer = np.zeros(0, dtype=np.int64)
         self.failed_group: Integer = self.group
         self.failed: Settled | None = None
-        self.futile = 0
+        self.futile = self.solved = 0
+        self.pause = self.paused = 0
         self.level = 0
         self.returned = False
         self.seen: set[bytes] = set()
@@ -97,14 +103,28 @@ class Search:
         nothing = np.zeros(0, dtype=np.int64)
         if len(self.counts) <= PLAIN or not self.counts[-1]:
             return nothing
+        if self.paused < self.pause:
+            self.paused += 1
+            return nothing
         if not len(self.group) and self.counts[-1] <= SLOW * min(self.counts[:-1]):
             return nothing
         lately = np.unique(np.concatenate(self.changed[-2:]))
-        for group in (np.union1d(self.group, lately), lately, self.changed[-1]):
+        whole = np.union1d(self.group, lately)
+        for group in (np.union1d(whole, self._find_neighbours(self.changed[-1])), whole, lately, self.changed[-1]):
             if len(group) <= self.most_pivoted:
                 self.group = group
                 return group
         return nothing
+
+    def _find_neighbours(self, pairs: Integer) -> Integer:
+        """The pairs next to some, the more the oftener groups were solved in turn: contact ends somewhere there."""
+        if self.interface is None or not self.solved:
+            return pairs
+        reach = min(4**self.solved, len(self.interface))
+        near = pairs[:, None] + np.arange(-reach, reach + 1)
+        inside = np.clip(near, 0, len(self.interface) - 1)
+        near = inside[(near == inside) & (self.interface[inside] == self.interface[pairs][:, None])]
+        return np.unique(near if self.follows is None else near[~self.follows[near]])
 
     def conclude(self, found: Settled) -> bool:
         """Take note of what pivoting found for the group; True if there seems to be nothing to be found.
@@ -113,8 +133,11 @@ class Search:
         of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
         """
         if found.modes is not None:
-            self.futile = 0
+            self.futile = self.pause = 0
+            self.solved += 1
             return False
+        self.solved = self.paused = 0
+        self.pause = 2 * self.pause + 1 if len(self.group) > COSTLY else 0
         again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
         self.failed_group, self.failed = self.group, found
         self.futile += found.tried > 1

@@ -41,6 +41,35 @@ def test_pairs_that_changed_lately_are_pivoted_once_their_number_does_not_fall()
     assert follow(search, []) == [[]]
 
 
+def test_neighbours_join_where_pairs_change_beside_groups_that_were_solved() -> None:
+    interface = np.repeat([0, 1], [12, COUNT - 12])
+    follows = np.arange(COUNT) == 8
+    search = Search(50, follows, interface)
+    found = Settled(make_modes(SLIP, count=COUNT), False, 0, np.zeros(0, dtype=bool))
+    assert follow(search, [10], [10], [10], [10])[-1] == [10]
+    search.conclude(found)
+    # Four on either side, of its own interface, but none that follows another one; then sixteen.
+    assert follow(search, [10]) == [[6, 7, 9, 10, 11]]
+    search.conclude(found)
+    assert follow(search, [20]) == [[6, 7, 9, 10, 11, *range(12, 37)]]
+    search.conclude(Settled(None, False, 1, np.zeros(0, dtype=bool)))
+    assert follow(search, [60]) == [[6, 7, 9, 10, 11, *range(12, 37), 60]]
+
+
+def test_large_groups_that_failed_are_tried_again_after_more_and_more_iterations() -> None:
+    search = Search(90)
+    failed = Settled(None, False, 1, np.zeros(0, dtype=bool))
+    many = list(range(70))
+    tried = []
+    for _ in range(16):
+        group = follow(search, many)[0]
+        tried.append(len(group))
+        if group:
+            search.conclude(failed)
+    # Three plain steps, then after one iteration, three, seven.
+    assert np.flatnonzero(tried).tolist() == [3, 5, 9]
+
+
 def test_a_group_that_grows_too_large_is_left_for_its_latest_pairs() -> None:
     search = Search(4)
     assert follow(search, [0], [1], [2], [3, 4], [5, 6])[-2:] == [[2, 3, 4], [3, 4, 5, 6]]

@@ -115,8 +115,8 @@ def test_curves_that_all_but_coincide_are_refused() -> None:
     with pytest.raises(CaseError) as error:
         build(a="0,0 1,0; elements = 8", b="0,1e-6 1,1e-6; elements = 8")
     (fault,) = error.value.faults
-    assert "'a' and 'b'" in fault.found or "'b' and 'a'" in fault.found
-    assert "at a distance of 1e-06" in fault.found
+    assert "curve 'b' beside curve 'a'" in fault.found
+    assert "at most 1e-06 apart" in fault.found
 
 
 def test_a_jump_of_a_prescribed_traction_is_refined() -> None:

@@ -83,7 +83,27 @@ def test_pairs_with_friction_get_the_modes_that_trying_all_finds(seed: int) -> N
     admissible = try_all_modes(subset, response)
     found = settle(subset, response)
     assert found.modes is not None and not found.wrong.any()
+    # Pairs without friction slip in no sense.
+    found.modes.sign[friction == 0] = 1.0
     assert found.modes.fingerprint() in [modes.fingerprint() for modes in admissible]
+
+
+def test_few_of_many_pairs_are_found_by_steps_without_pivoting() -> None:
+    # A beam on a foundation that it leaves from one end on: -(compliance) of a Green's function of bending.
+    count = 40
+    x = np.linspace(0.0, 1.0, count)
+    low, high = np.minimum(x[:, None], x), np.maximum(x[:, None], x)
+    bending = low**2 * (3 * high - low) / 6
+    values, change = np.zeros((count, 4)), np.zeros((count, 4, 2 * count))
+    values[:, 2] = 0.02 * x**2 - 0.002 * x
+    for pair in range(count):
+        change[pair, 0, 2 * pair] = change[pair, 1, 2 * pair + 1] = 1.0
+        change[pair, 2, ::2], change[pair, 3, 2 * pair + 1] = -(bending[pair] + 1e-6 * (x == x[pair])), -1.0
+    subset, response = pose(np.full(count, 0.3), np.zeros(count)), Response(values, change, 1.0, 1.0)
+    found = settle(subset, response)
+    assert found.modes is not None and found.tried == 0
+    touching = np.flatnonzero(found.modes.mode != OPEN)
+    assert 0 < len(touching) < count // 2
 
 
 def test_cohesion_that_is_lost_where_faces_part_is_settled_or_seen_to_have_no_solution() -> None:

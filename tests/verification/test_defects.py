@@ -170,6 +170,15 @@ def test_a_loose_block_between_two_others(solve: Solve) -> None:
     assert bottom[1] == pytest.approx(5.620, abs=5e-4)
 
 
+def test_a_disc_stays_upright(solve: Solve) -> None:
+    results = solve("disc_on_one_pair")
+    disc = results.nodes.region == results.nodes.region_names.index("disc")
+    # Nothing but the elastic strain, which the load makes 1e-9, is not a translation.
+    moved = results.displacement[-1][disc]
+    assert np.abs(moved - moved.mean(axis=0)).max() < 1e-7
+    assert results.energy.elastic[-1] > 0
+
+
 def test_no_force_is_left_on_a_loose_pin(solve: Solve) -> None:
     balance = solve("loose_pin").balance
     assert balance is not None

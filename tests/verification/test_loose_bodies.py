@@ -113,25 +113,45 @@ def test_a_body_that_stays_free_is_anchored(tmp_path: Path) -> None:
     assert np.abs(results.displacement[-1, middle]).max() < 1e-12
 
 
-def test_a_disc_on_one_pair_is_told_to_be_free(tmp_path: Path) -> None:
-    # Its contact is shorter than an element: nothing keeps the disc from rolling, and no rotation is its answer.
-    text = """
+DISC = """
 materials.m = { young = 1000.0, poisson = 0.3 }
-curves.bottom = { points = [[-2, -1], [2, -1]], elements = 4 }
-curves.right = { points = [[2, -1], [2, 0]], elements = 2 }
-curves.floor = { points = [[2, 0], [-2, 0]], elements = 8 }
-curves.left = { points = [[-2, 0], [-2, -1]], elements = 2 }
+curves.bottom = { points = [[LEFT, -1], [RIGHT, -1]], elements = 4 }
+curves.right = { points = [[RIGHT, -1], [RIGHT, 0]], elements = 2 }
+curves.floor = { points = [[RIGHT, 0], [LEFT, 0]], elements = 8 }
+curves.left = { points = [[LEFT, 0], [LEFT, -1]], elements = 2 }
 curves.lower = { center = [0, 1], radius = 1, angles = [180, 360], elements = 12 }
 curves.upper = { center = [0, 1], radius = 1, angles = [0, 180], elements = 12 }
 regions.table = { material = "m", boundary = ["bottom", "right", "floor", "left"] }
 regions.disc = { material = "m", boundary = ["lower", "upper"] }
 boundary.bottom = { ux = 0.0, uy = 0.0 }
-boundary.upper = { ty = -1e-6 }
+boundary.upper = { ty = -LOAD }
 contacts.seat = { between = ["floor", "lower"], law = "coulomb", friction = 0.3 }
 analysis.steps = 1
 """
-    case = tmp_path / "disc.toml"
+
+
+def run_disc(path: Path, load: float, shift: float) -> Results:
+    text = DISC.replace("LEFT", str(-2 + shift)).replace("RIGHT", str(2 + shift)).replace("LOAD", repr(load))
+    case = path / "disc.toml"
     case.write_text(text, encoding="utf-8")
-    with pytest.raises(ConvergenceError, match=r"rotation about .* of 'disc'") as caught:
-        pbem.run(case, tmp_path / "disc.h5")
+    return pbem.run(case, path / "disc.h5", force=True)
+
+
+@pytest.mark.parametrize("load", [1e-6, 0.1])
+def test_a_disc_on_the_middle_of_a_table_stays_upright(load: float, tmp_path: Path) -> None:
+    results = run_disc(tmp_path, load, 0.0)
+    disc = results.nodes.region == results.nodes.region_names.index("disc")
+    position, moved = (each[disc] @ [1, 1j] for each in (results.nodes.position, results.displacement[-1]))
+    arm = position - position.mean()
+    turn = (arm.conj() * (moved - moved.mean())).imag.sum() / (np.abs(arm) ** 2).sum()
+    assert abs(turn) < 1e-9
+    assert results.energy.elastic[-1] > 0
+    assert results.reactions["bottom"][-1] == pytest.approx([0.0, np.pi * load], rel=1e-3, abs=1e-6 * load)
+
+
+@pytest.mark.parametrize("load", [1e-6, 0.1])
+def test_a_disc_that_the_mesh_would_turn_is_told_to_be_free(load: float, tmp_path: Path) -> None:
+    # Its contact is shorter than an element, between pairs that are not equally far from the disc.
+    with pytest.raises(ConvergenceError, match=r"rotation about .* of 'disc'.*shorter elements") as caught:
+        run_disc(tmp_path, load, 0.1)
     assert caught.value.reason == "free motion"

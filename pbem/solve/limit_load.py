@@ -1,0 +1,148 @@
+"""The largest part of a load step that forces in the contacts could balance, whatever the bodies' elasticity.
+
+Static admissibility (the lower bound of limit analysis, here as a necessary condition): tractions of the pairs within
+their laws, and of what is held, have to balance the loads on every finite body. Beyond the fraction at which none do
+no smaller step finds an equilibrium. A linear programme in the tractions of the nodes and the fraction.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import linprog
+
+from pbem.contact.constraints import build_constraints
+from pbem.contact.laws import Memory, PairLaws
+from pbem.contact.loads import Load
+from pbem.contact.modes import P_N, P_S, Linearisation, tensile_limit
+from pbem.contact.strength import coulomb, slip_weakening
+from pbem.solve.problem import Problem
+
+Real = NDArray[np.float64]
+
+# What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.
+BALANCED = 1e-3
+# A share that is less than the whole by no more than this is the whole.
+ROUNDING = 1e-6
+# Models with more pairs are not asked.
+MOST_PAIRS = 20_000
+
+
+def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float | None:
+    """The largest fraction of a stage in [reached, target] whose loads some tractions balance; None if unknown.
+
+    Without what pairs have lost for good, but as if none of them had slipped. Unknown for laws of one's own, models
+    without finite bodies, and where the programme finds no balance at `reached` itself.
+    """
+    mesh, laws = problem.mesh, problem.laws
+    finite = np.array([not region.infinite for region in problem.model.regions])
+    if laws.count > MOST_PAIRS or not finite.any() or not (~mesh.pairs.crack).any():
+        return None
+    if any(group.law not in (coulomb, slip_weakening) for group in laws.strengths):
+        return None
+    loads = [problem.evaluate_load(stage, factor) for factor in (reached, target)]
+    matrix, before, after = _sum_up(problem, loads, np.flatnonzero(finite))
+    size = max(np.abs(before).max(), np.abs(after).max())
+    if not size > 0:
+        return target
+    share = _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size)
+    if share is None or share > 1 - ROUNDING:
+        return None if share is None else target
+    return reached + share * (target - reached)
+
+
+def _sum_up(
+    problem: Problem, loads: list[Load], regions: NDArray[np.int64]
+) -> tuple[sparse.csr_matrix, Real, Real]:
+    """Force and moment over length of every region (3 k,): what unknown tractions add (3 k, 2 nodes), and loads."""
+    mesh, count = problem.mesh, problem.laws.count
+    tangent = np.zeros((count, 4, 2))
+    tangent[:, P_N, 0] = tangent[:, P_S, 1] = 1.0
+    law = Linearisation(tangent, np.zeros((count, 4)), np.arange(count))
+    maps = [build_constraints(mesh, problem.outer, np.zeros(count), law, load, 1.0) for load in loads]
+    weight = np.where(mesh.node_crack, 0.0, mesh.weight)
+    rows, columns, values = [], [], []
+    for row, region in enumerate(regions):
+        own = np.flatnonzero(mesh.node_region == region)
+        lever = mesh.position[own] - mesh.position[own].mean()
+        lever = lever / np.abs(lever).max()
+        for part, along in enumerate((np.ones_like(lever), np.full_like(lever, 1j), 1j * lever)):
+            for component, value in enumerate((along.real, along.imag)):
+                rows.append(np.full(len(own), 3 * row + part))
+                columns.append(2 * own + component)
+                values.append(weight[own] * value)
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    resultant = sparse.csr_matrix(entries, shape=(3 * len(regions), 2 * mesh.nodes))
+    given = [
+        resultant @ (each.offset - load.known)[2 * mesh.nodes :] for each, load in zip(maps, loads, strict=True)
+    ]
+    return resultant @ maps[0].matrix[2 * mesh.nodes :], given[0], given[1]
+
+
+def _maximise(
+    problem: Problem, memory: Memory, loads: list[Load], matrix: sparse.csr_matrix, constant: Real, change: Real,
+    size: float,
+) -> float | None:
+    """The largest share of the change that is balanced, None if no share is.
+
+    Unknowns: tractions times the model's length over `size`, in the order of the map's unknowns, and the share.
+    """
+    mesh, laws = problem.mesh, problem.laws
+    scale = size / problem.model.size
+    columns = 2 * mesh.nodes
+    at_n, at_s = 2 * mesh.pairs.slot, 2 * mesh.pairs.slot + 1
+    pressure, rise = loads[0].pressure / scale, (loads[1].pressure - loads[0].pressure) / scale
+    friction, cohesion = _find_strongest(laws, memory)
+    limit = tensile_limit(laws, memory)
+    low, high = np.full(columns + 1, -np.inf), np.full(columns + 1, np.inf)
+    low[-1], high[-1] = 0.0, 1.0
+    # Without pressure parted faces carry nothing; with it, what it gives.
+    own = ~(laws.bonded | laws.follows | laws.parted)
+    parted = np.flatnonzero(laws.parted)
+    count, last = len(own), np.full(len(own), columns)
+    pair = np.arange(count)
+
+    def build(blocks: list[tuple[Real, NDArray[np.int64]]]) -> sparse.csr_matrix:
+        parts = [sparse.csr_matrix((value, (pair, column)), shape=(count, columns + 1)) for value, column in blocks]
+        return sum(parts[1:], parts[0])
+
+    inside = np.where(laws.fluid_inside, friction, 0.0)
+    one = np.ones(count)
+    bounds = [
+        (build([(one, at_n), (rise, last)]), limit / scale - pressure),
+        (build([(one, at_s), (friction, at_n), (inside * rise, last)]), cohesion / scale - inside * pressure),
+        (build([(-one, at_s), (friction, at_n), (inside * rise, last)]), cohesion / scale - inside * pressure),
+    ]
+    above = sparse.vstack([rows[own] for rows, _ in bounds])
+    most = np.concatenate([values[own] for _, values in bounds])
+    low[at_s[parted]] = high[at_s[parted]] = 0.0
+    fixed = build([(one, at_n), (rise, last)])[parted]
+    balance = sparse.hstack([matrix * (1 / problem.model.size), change[:, None]]).tocsr()
+    used = np.zeros(columns + 1, dtype=bool)
+    used[np.unique(balance.indices)] = used[-1] = True
+    # What is left may grow with the loads.
+    spare = BALANCED * np.abs(constant).max()
+    left = BALANCED * sparse.csr_matrix(([np.abs(change).max()] * len(change), (np.arange(len(change)), [columns] *
+                                        len(change))), shape=balance.shape)
+    cost = np.zeros(columns + 1)
+    cost[-1] = -1.0
+    found = linprog(
+        cost[used],
+        A_ub=sparse.vstack([above, balance - left, -balance - left]).tocsr()[:, used],
+        b_ub=np.concatenate([most, spare - constant, spare + constant]),
+        A_eq=fixed[:, used] if len(parted) else None,
+        b_eq=-pressure[parted] if len(parted) else None,
+        bounds=np.stack([low, high], axis=1)[used], method="highs",
+    )  # fmt: skip
+    return float(np.clip(found.x[-1], 0.0, 1.0)) if found.status == 0 else None
+
+
+def _find_strongest(laws: PairLaws, memory: Memory) -> tuple[Real, Real]:
+    """Friction and cohesion of all pairs, the larger of what they are before and after slip."""
+    friction, cohesion = np.zeros(laws.count), np.zeros(laws.count)
+    for group in laws.strengths:
+        at, parameters = group.pairs, group.parameters
+        friction[at] = np.maximum(parameters["friction"], parameters.get("friction_dynamic", 0.0))
+        cohesion[at] = np.where(memory.broken[at], 0.0, parameters["cohesion"])
+    return friction, cohesion

@@ -12,16 +12,18 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.balance import describe_imbalance, measure_balance
 from pbem.solve.krylov import make_tangent
-<<<<<<< HEAD
-from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_linearity
-=======
 from pbem.solve.limit_load import find_balanced_fraction
->>>>>>> settling
+from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_linearity
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
 from pbem.solve.proportional import is_proportional
 from pbem.solve.step import ContactState, Reporter, Step
 from pbem.solve.tangent import AnyTangent
+
+# A limit load is told where no more than this part of it is missing.
+NEAR = 0.02
+# Of what forces in the contacts could still balance, a step takes this part.
+SAFE = 0.97
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,6 @@ def _note_imbalance(problem: Problem, step: Step, noted: float, reporter: Report
     return amount
 
 
-<<<<<<< HEAD
 def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
     """Note what is beyond linear theory if it is twice as much as was noted before; returns what has been noted now."""
     assert step.linearity is not None
@@ -112,12 +113,6 @@ def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Rep
             reporter.note(f"Step {step.number}: {text}.")
         return amount if notes else noted
     return noted
-=======
-# A limit load is told where no more than this part of it is missing.
-NEAR = 0.02
-# Of what forces in the contacts could still balance, a step takes this part.
-SAFE = 0.97
->>>>>>> settling
 
 
 def _advance(

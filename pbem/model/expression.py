@@ -55,6 +55,8 @@ def evaluate_expression(text: str, **variables: ArrayLike) -> Real:
 def _parse(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise ExpressionError(f"a text of {len(text)} characters", f"at most {LONGEST}")
+    if "\0" in text:  # Python 3.13 tells it otherwise than 3.11
+        raise ExpressionError(*_UNREADABLE)
     try:
         return ast.parse(_straighten(text), mode="eval").body
     except SyntaxError as error:

@@ -30,6 +30,10 @@ Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
+# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
+MOST_LEFT = 900
+
+
 @dataclass
 class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
@@ -113,7 +117,7 @@ class SchwarzPreconditioner:
         self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix, less: Elimination
     ) -> None:
         """Form the rows of a group's inverse; what is eliminated is not in the factors, but follows from the rest."""
-        around, inside = inverse.around, inverse.inside
+        elements, around, inside = self._narrow(inverse, less)
         local, first = less.local.ravel()[around], less.first.ravel()[around]
         inverse.seen, inverse.matrix, inverse.formed = around[~first], None, True
         if local.all():
@@ -123,7 +127,7 @@ class SchwarzPreconditioner:
         own[inside] = True
         rows = np.flatnonzero(~first | own)
         left = np.flatnonzero(~local)
-        whole = self._form(inverse.group.around, around, rows, left, constraints, free, less)
+        whole = self._form(elements, around, rows, left, constraints, free, less)
         rest = ~first[rows]
         factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(whole[rest]), overwrite_a=True)
         # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
@@ -138,6 +142,19 @@ class SchwarzPreconditioner:
             matrix = lapack.dgetrs(factors, pivots, wanted.T, trans=1)[0].T
             inverse.matrix = np.ascontiguousarray(matrix) if np.isfinite(matrix).all() else None
         self.singular += inverse.matrix is None
+
+    def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
+        """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""
+        group = inverse.group
+        if not len(group.nearest):
+            return group.around, inverse.around, inverse.inside
+        own, width = group.elements, 2 * (self._mesh.order + 1)
+        left = (~less.local).reshape(-1, width).sum(axis=1)
+        sums = left[own].sum() + np.cumsum(left[group.nearest])
+        elements = np.union1d(own, group.nearest[sums <= MOST_LEFT])
+        around = list_nodes(self._mesh, elements)
+        inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
+        return elements, number_components(around), inside
 
     def _form(
         self, elements: Integer, around: Integer, rows: Integer, left: Integer, constraints: sparse.csc_matrix,

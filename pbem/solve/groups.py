@@ -23,8 +23,8 @@ Bool = NDArray[np.bool_]
 ONE_GROUP = 1500
 # Elements of a group at most; both sides of an interface count.
 GROUP_ELEMENTS = 48
-# Cracks that meet are divided by place, not by curve: a part of them moves as a whole. Their groups have so many elements
-# at most, and around them the nearest elements, so many times as many, whichever group those belong to.
+# Cracks that meet are divided by place, not by curve: what is enclosed by them moves as a whole. Their groups have so
+# many elements at most, and around them the nearest elements, so many times as many, whichever group those belong to.
 CONNECTED_ELEMENTS = 128
 NEAREST_SHARE = 3.0
 # Candidates for the nearest, as a multiple of those taken.
@@ -78,8 +78,8 @@ def connect_cracks(mesh: Mesh) -> tuple[Integer, Bool]:
     curves = len(mesh.curve_names)
     points, at = np.unique(np.concatenate([mesh.start[own], mesh.end[own]]), return_inverse=True)
     size = curves + len(points)
-    links = sparse.coo_matrix((np.ones(len(at)), (np.tile(mesh.curve[own], 2), curves + at.ravel())), shape=(size, size))
-    _, label = csgraph.connected_components(links, directed=False)
+    meeting = (np.ones(len(at)), (np.tile(mesh.curve[own], 2), curves + at.ravel()))
+    _, label = csgraph.connected_components(sparse.coo_matrix(meeting, shape=(size, size)), directed=False)
     # The number of a set is that of its first curve.
     _, first, inverse = np.unique(label[:curves], return_index=True, return_inverse=True)
     set_of_curve = first[inverse.ravel()]
@@ -131,8 +131,8 @@ def surround_groups(
 def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Group:
     """A group with the elements that are nearest to it, by the gap between middles less half the lengths."""
     middle, length = 0.5 * (mesh.start + mesh.end), np.abs(mesh.end - mesh.start)
-    wanted = min(int(NEAREST_SHARE * widening * max(len(group), NEIGHBOUR_UNKNOWNS // (2 * (mesh.order + 1)))),
-                 mesh.elements - len(group))
+    least = NEIGHBOUR_UNKNOWNS // (2 * (mesh.order + 1))
+    wanted = min(int(NEAREST_SHARE * widening * max(len(group), least)), mesh.elements - len(group))
     center = middle[group].mean()
     candidates = min(CANDIDATES * (wanted + len(group)), mesh.elements)
     _, near = elements.query([center.real, center.imag], k=candidates)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
-from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation
+from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
@@ -33,9 +33,9 @@ SLOW = 60
 WIDENING, MOST_WIDENING = 4, 16
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
-# While modes change their pairs are judged by solutions to this residual, or to this part of the share of the pairs that
-# have changed if that is less: the fewer change, the nearer to the bounds are those that remain. A solution in which
-# none changes is completed.
+# While modes change their pairs are judged by solutions to this residual, or to this part of the share of the pairs
+# that have changed if that is less: the fewer change, the nearer to the bounds are those that remain. A solution in
+# which none changes is completed.
 LOOSE, LOOSE_BY_SHARE = 1e-4, 1e-3
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
@@ -187,24 +187,12 @@ class KrylovTangent:
         return result
 
     def _carry_over(self, law: Linearisation | None) -> Real | None:
-        """The last solution in the present unknowns: tractions and jumps of the pairs as they were; None if there is none.
-
-        In other modes an unknown is another quantity.
-        """
+        """The last solution in the present unknowns; None if there is none."""
         if self.solution is None or law is None or self.law is None:
             return self.solution
         slot = self.problem.mesh.pairs.slot
-        units = np.array([self.problem.traction_scale] * 2 + [1.0] * 2)[:, None]
-        own = self.solution.reshape(-1, 2)[slot]
-        state = np.einsum("mij,mj->mi", self.law.tangent, own) + self.law.offset
-        # Of normal and tangential values that which the present mode leaves free.
-        size = np.abs(law.tangent / units)
-        normal = np.where(size[:, P_N, 0] >= size[:, G_N, 0], P_N, G_N)
-        along = np.where(size[:, P_S, 1] >= size[:, G_S, 1], P_S, G_S)
-        at, both = np.arange(len(slot))[:, None], np.stack([normal, along], axis=1)
-        left = (state - law.offset)[at, both]
         carried = self.solution.reshape(-1, 2).copy()
-        carried[slot] = np.linalg.solve(law.tangent[at, both], left[..., None])[..., 0]
+        carried[slot] = carry_over(carried[slot], self.law, law, self.problem.traction_scale)
         return carried.ravel()
 
     def _guess(self, right: Real, begin: Real | None) -> Real:

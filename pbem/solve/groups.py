@@ -26,7 +26,7 @@ GROUP_ELEMENTS = 48
 # Cracks that meet are divided by place, not by curve: what is enclosed by them moves as a whole. Their groups have so
 # many elements at most, and around them the nearest elements, so many times as many, whichever group those belong to.
 CONNECTED_ELEMENTS = 128
-NEAREST_SHARE = 3.0
+NEAREST_SHARE = 2.0
 # Candidates for the nearest, as a multiple of those taken.
 CANDIDATES = 3
 # Groups around a group are taken until they have so many unknowns together, or so many times those of the group. One
@@ -129,19 +129,25 @@ def surround_groups(
 
 
 def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Group:
-    """A group with the elements that are nearest to it, by the gap between middles less half the lengths."""
-    middle, length = 0.5 * (mesh.start + mesh.end), np.abs(mesh.end - mesh.start)
     least = NEIGHBOUR_UNKNOWNS // (2 * (mesh.order + 1))
-    wanted = min(int(NEAREST_SHARE * widening * max(len(group), least)), mesh.elements - len(group))
+    nearest = find_nearest(mesh, group, elements, int(NEAREST_SHARE * widening * max(len(group), least)))
+    return Group(group, np.union1d(group, nearest), nearest)
+
+
+def find_nearest(mesh: Mesh, group: Integer, elements: cKDTree, count: int) -> Integer:
+    """The elements that are nearest to those of a group, so many at most, the nearest first.
+
+    elements: tree of all elements' middles. Near is a small distance of the middle, less half the length.
+    """
+    middle, length = 0.5 * (mesh.start + mesh.end), np.abs(mesh.end - mesh.start)
     center = middle[group].mean()
-    candidates = min(CANDIDATES * (wanted + len(group)), mesh.elements)
+    candidates = min(CANDIDATES * (count + len(group)), mesh.elements)
     _, near = elements.query([center.real, center.imag], k=candidates)
     near = np.setdiff1d(near, group)
     places = np.concatenate([mesh.start[group], middle[group], mesh.end[group]])
     own = cKDTree(np.column_stack([places.real, places.imag]))
     distance, _ = own.query(np.column_stack([middle[near].real, middle[near].imag]))
-    nearest = near[np.lexsort((near, distance - 0.5 * length[near]))][:wanted]
-    return Group(group, np.union1d(group, nearest), nearest)
+    return np.asarray(near[np.lexsort((near, distance - 0.5 * length[near]))][:count])
 
 
 def _enclose_groups(mesh: Mesh, groups: list[Integer]) -> tuple[Complex, Real]:

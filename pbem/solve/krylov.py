@@ -16,6 +16,7 @@ from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.choice import make_dense_tangent
 from pbem.solve.linear import PREFIX, PETSc, petsc_options
+from pbem.solve.nearby import answers_nearby, respond_nearby
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
 from pbem.solve.tangent import AnyTangent, Solved, select_states, size_residual
@@ -52,6 +53,7 @@ class KrylovTangent:
         self.law: Linearisation | None = None
         self.load: Load | None = None
         self.iterations: list[int] = []
+        self.nearby = answers_nearby(problem)
         self.widening = 1
         rows = problem.operator.rows
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
@@ -172,8 +174,13 @@ class KrylovTangent:
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
     ) -> Real:
-        """See AnyTangent; to RESPONSE of the forces only, as the modes that follow are judged by a full solution."""
+        """See AnyTangent; to RESPONSE of the forces only, as the modes that follow are judged by a full solution.
+
+        Of cracks that meet, with the elements near to the pairs alone.
+        """
         self.constraints = constraints
+        if self.nearby:
+            return respond_nearby(self.problem, self.preconditioner, constraints, load, law, pairs, directions)
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
         result = np.empty((len(unknowns), len(unknowns)))
         usual = self._solver.getTolerances()

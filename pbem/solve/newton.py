@@ -28,6 +28,7 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
+from pbem.solve.nearby import is_nearby, settle_parts
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.search import Caution, Search
@@ -57,7 +58,8 @@ class Solution:
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# The most pairs that are solved by pivoting; with the hierarchical operator each costs two solutions by GMRES.
+# The most pairs that are solved by pivoting; with the hierarchical operator each costs two solutions by GMRES, but for
+# cracks that meet, of which nearby elements answer, and sets that are far from each other are solved one by one.
 MOST_PIVOTED, MOST_PIVOTED_BY_GMRES = 300, 12
 
 
@@ -78,7 +80,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    most_pivoted = MOST_PIVOTED_BY_GMRES if hierarchical else MOST_PIVOTED
+    few = hierarchical and not is_nearby(tangent)
+    most_pivoted = MOST_PIVOTED_BY_GMRES if few else MOST_PIVOTED
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(most_pivoted if is_linear(laws) else 0, laws.follows)
@@ -164,6 +167,8 @@ def _pivot(
     judge = _make_judge(problem, solved, search.caution)
 
     def settle() -> Settled:
+        if is_nearby(tangent):
+            return settle_parts(subset, response, search.proposal.modes, group, judge)
         return settle_subset(subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure))
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)

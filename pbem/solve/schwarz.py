@@ -38,8 +38,9 @@ MOST_LEFT = 900
 class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
 
-    inside: places of the group's own unknowns in around. matrix (own, seen): rows of the local inverse, less what is
-    eliminated within a node, on turned equations; None where there is none. formed: whether it has been tried.
+    inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
+    eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
+    formed: whether it has been tried.
     """
 
     group: Group
@@ -47,6 +48,7 @@ class LocalInverse:
     around: Integer
     inside: Integer
     seen: Integer
+    solved: Integer
     matrix: Real | None = None
     formed: bool = False
 
@@ -82,7 +84,7 @@ class SchwarzPreconditioner:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
         around = list_nodes(self._mesh, group.around)
         inside = number_components(np.searchsorted(around, list_nodes(self._mesh, group.elements)))
-        return LocalInverse(group, number_components(at), number_components(around), inside, inside)
+        return LocalInverse(group, number_components(at), number_components(around), inside, inside, inside)
 
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
@@ -108,7 +110,8 @@ class SchwarzPreconditioner:
         eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], turned.reshape(-1, 2)[nodes]).ravel()
         for inverse in self.inverses:
             if inverse.matrix is not None:
-                result[inverse.own] = inverse.matrix @ turned[inverse.seen] + eliminated[inverse.own]
+                result[inverse.own] = eliminated[inverse.own]
+                result[inverse.own[inverse.solved]] += inverse.matrix @ turned[inverse.seen]
             else:
                 # A group that nothing holds without the rest of the model: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
@@ -121,27 +124,58 @@ class SchwarzPreconditioner:
         local, first = less.local.ravel()[around], less.first.ravel()[around]
         inverse.seen, inverse.matrix, inverse.formed = around[~first], None, True
         if local.all():
-            inverse.matrix = np.zeros((len(inside), 0))
+            inverse.matrix, inverse.solved = np.zeros((0, 0)), np.zeros(0, dtype=np.int64)
             return
+        # In large groups the eliminated follow their own residual alone: what the others do to them GMRES sees in its
+        # next iteration, and no other equation contains them.
         own = np.zeros(len(around), dtype=bool)
-        own[inside] = True
+        own[inside] = not len(inverse.group.nearest)
         rows = np.flatnonzero(~first | own)
         left = np.flatnonzero(~local)
         whole = self._form(elements, around, rows, left, constraints, free, less)
         rest = ~first[rows]
         factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(whole[rest]), overwrite_a=True)
         # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
-        effect = np.zeros((len(inside), len(left)))
         at = np.flatnonzero(~rest)
+        effect = np.zeros((len(inside), len(left)))
         effect[np.searchsorted(inside, rows[at])] = whole[at]
         back = less.inverse[around[inside[::2]] // 2]
         wanted = -(back @ effect.reshape(len(back), 2, -1)).reshape(effect.shape)
         kept = np.flatnonzero(~local[inside])
         wanted[kept, np.searchsorted(left, inside[kept])] = 1.0
+        inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
         if not zero_pivot:
-            matrix = lapack.dgetrs(factors, pivots, wanted.T, trans=1)[0].T
+            matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
             inverse.matrix = np.ascontiguousarray(matrix) if np.isfinite(matrix).all() else None
         self.singular += inverse.matrix is None
+
+    def respond(
+        self, constraints: sparse.csr_matrix, offsets: sparse.csr_matrix, elements: Integer, unknowns: Integer
+    ) -> Real:
+        """What columns of B times offsets (4 n, 2 n) do to the unknowns of the same numbers, (k, k), all else free.
+
+        Of the model the elements alone are there, the nodes of the unknowns among them; constraints: those of `update`.
+        """
+        less = self._less
+        assert less is not None
+        around = number_components(list_nodes(self._mesh, elements))
+        at = np.searchsorted(around, unknowns)
+        local, first = less.local.ravel()[around], less.first.ravel()[around]
+        wanted = np.zeros(len(around), dtype=bool)
+        wanted[at] = True
+        rows, left = np.flatnonzero(~first | wanted), np.flatnonzero(~local)
+        whole, forces = (
+            self._form(elements, around, rows, columns, matrix.tocsc(), (self._free @ matrix).tocsr(), less)
+            for columns, matrix in ((left, constraints), (at, offsets))
+        )
+        rest = ~first[rows]
+        result = np.zeros((len(around), len(at)))
+        result[left] = -np.linalg.solve(whole[rest], forces[rest])
+        turned = np.zeros_like(result)
+        turned[rows[~rest]] = (-forces - whole @ result[left])[~rest]
+        back = less.inverse[around[::2] // 2]
+        result += (back @ turned.reshape(len(back), 2, -1)).reshape(result.shape)
+        return np.asarray(result[at])
 
     def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
         """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""

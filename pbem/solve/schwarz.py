@@ -116,6 +116,17 @@ class SchwarzPreconditioner:
                 # A group that nothing holds without the rest of the model: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
 
+    def correct(self, residual: Real) -> tuple[Real, Real]:
+        """What the eliminated unknowns are off by (own unknowns,), from this rank's part of K x - b, and what is left.
+
+        No other equation contains them, so that their own are fulfilled without a product.
+        """
+        less, nodes = self._less, self._nodes
+        assert less is not None
+        turned = (less.turn[nodes] @ residual.reshape(-1, 2, 1))[..., 0]
+        off = (less.inverse[nodes] @ turned[..., None])[..., 0]
+        return off.ravel(), np.where(less.first[nodes], 0.0, turned).ravel()
+
     def _invert(
         self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix, less: Elimination
     ) -> None:

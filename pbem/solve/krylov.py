@@ -16,7 +16,7 @@ from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.choice import make_dense_tangent
 from pbem.solve.linear import PREFIX, PETSc, petsc_options
-from pbem.solve.nearby import answers_nearby, respond_nearby
+from pbem.solve.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
 from pbem.solve.tangent import AnyTangent, Solved, select_states, size_residual
@@ -184,10 +184,10 @@ class KrylovTangent:
     ) -> Real:
         """See AnyTangent; to RESPONSE of the forces only, as the modes that follow are judged by a full solution.
 
-        Of cracks that meet, with the elements near to the pairs alone.
+        Of cracks that meet, where the pairs are many, with the elements near to them alone.
         """
         self.constraints = constraints
-        if self.nearby:
+        if self.nearby and len(pairs) > MOST_ASKED:
             return respond_nearby(self.problem, self.preconditioner, constraints, load, law, pairs, directions)
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
         result = np.empty((len(unknowns), len(unknowns)))

@@ -32,6 +32,8 @@ from pbem.solve.tangent import AnyTangent
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 
+# So few pairs are answered for by the whole model: what is left at the end can hang on what is far away.
+MOST_ASKED = 12
 # Pairs disturb each other within so many lengths of their elements.
 REACH = 4.0
 # Elements around a set of pairs, as a multiple of the pairs' own, and at least.

@@ -28,7 +28,7 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
-from pbem.solve.nearby import is_nearby, settle_parts
+from pbem.solve.nearby import MOST_ASKED, is_nearby, settle_parts
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.search import Caution, Search
@@ -167,7 +167,7 @@ def _pivot(
     judge = _make_judge(problem, solved, search.caution)
 
     def settle() -> Settled:
-        if is_nearby(tangent):
+        if is_nearby(tangent) and len(group) > MOST_ASKED:
             return settle_parts(subset, response, search.proposal.modes, group, judge)
         return settle_subset(subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure))
 
@@ -178,6 +178,8 @@ def _pivot(
         return None
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[group], sign[group] = found.modes.mode, found.modes.sign
+    if is_nearby(tangent) and ModeState(mode, sign).fingerprint() == modes.fingerprint():
+        return None  # what is near says otherwise than the whole model did
     return follow_leaders(problem.laws, ModeState(mode, sign))
 
 

@@ -13,7 +13,7 @@ from pbem.parallel import world
 from pbem.solve import groups
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.krylov import LOOSE, KrylovTangent, make_tangent
-from pbem.solve.nearby import part_by_distance
+from pbem.solve.nearby import MOST_ASKED, part_by_distance
 from pbem.solve.problem import Problem
 from pbem.solve.response import complete_states
 from tests.identities.solving import assemble_tangent, linearise_pairs
@@ -92,12 +92,12 @@ def test_a_loose_solution_is_told_and_completed(many_groups: None) -> None:
 def test_nearby_elements_answer_nearly_as_the_whole_model_does(many_groups: None) -> None:
     problem = assemble()
     tangent = make_tangent(problem)
-    assert isinstance(tangent, KrylovTangent) and tangent.nearby
+    assert isinstance(tangent, KrylovTangent) and tangent.nearby and MOST_ASKED < 16
     modes = draw_modes(problem.mesh.pairs.count)
     load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
     constraints = problem.constrain(law, load)
     tangent.solve(constraints, load, law)
-    pairs = np.arange(20, 26)
+    pairs = np.arange(20, 36)
     directions = complete_states(law.tangent[pairs], problem.traction_scale)
     found = tangent.respond(constraints, load, law, pairs, directions)
     tangent.nearby = False

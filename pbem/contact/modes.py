@@ -98,6 +98,20 @@ def linearise(
     return Linearisation(tangent, offset, laws.leader)
 
 
+def carry_over(unknowns: Real, before: Linearisation, after: Linearisation, traction_scale: float) -> Real:
+    """Unknowns (m, 2) of pairs in other modes with the tractions and jumps that they had.
+
+    Of a pair's normal and of its tangential values it keeps the one that its mode after leaves free.
+    """
+    state = np.einsum("mij,mj->mi", before.tangent, unknowns) + before.offset
+    size = np.abs(after.tangent) / np.array([traction_scale, traction_scale, 1.0, 1.0])[:, None]
+    normal = np.where(size[:, P_N, 0] >= size[:, G_N, 0], P_N, G_N)
+    along = np.where(size[:, P_S, 1] >= size[:, G_S, 1], P_S, G_S)
+    at, both = np.arange(len(state))[:, None], np.stack([normal, along], axis=1)
+    left = (state - after.offset)[at, both]
+    return np.asarray(np.linalg.solve(after.tangent[at, both], left[..., None])[..., 0])
+
+
 def tensile_limit(laws: PairLaws, memory: Memory) -> Real:
     """Tensile strength (m,), none where a brittle bond is lost."""
     return np.where(memory.broken, 0.0, laws.tensile_strength)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from pbem.bem.tree import build_forest
@@ -15,11 +17,18 @@ from pbem.parallel import share_nodes
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Bool = NDArray[np.bool_]
 
 # A model of so few unknowns is one group, whose matrix is the whole tangent operator.
 ONE_GROUP = 1500
 # Elements of a group at most; both sides of an interface count.
 GROUP_ELEMENTS = 48
+# Cracks that meet are divided by place, not by curve: what is enclosed by them moves as a whole. Their groups have so
+# many elements at most, and around them the nearest elements, so many times as many, whichever group those belong to.
+CONNECTED_ELEMENTS = 128
+NEAREST_SHARE = 2.0
+# Candidates for the nearest, as a multiple of those taken.
+CANDIDATES = 3
 # Groups around a group are taken until they have so many unknowns together, or so many times those of the group. One
 # that has an end point in common with others, like a piece of a longer boundary, always takes these, and more of them.
 NEIGHBOUR_UNKNOWNS = 100
@@ -33,10 +42,15 @@ MOST_AROUND = 3000
 
 @dataclass(frozen=True)
 class Group:
-    """elements: of the group, sorted; around: those and the elements of the groups around it, sorted."""
+    """elements: of the group, sorted; around: those and the elements around it, sorted.
+
+    nearest: of the elements around, those that may be left out where there are too many unknowns, the nearest first;
+    none where whole groups are around.
+    """
 
     elements: Integer
     around: Integer
+    nearest: Integer = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 def divide_model(mesh: Mesh) -> list[Integer]:
@@ -44,14 +58,32 @@ def divide_model(mesh: Mesh) -> list[Integer]:
     if 2 * mesh.nodes <= ONE_GROUP:
         return [np.arange(mesh.elements)]
     bulge = np.zeros(mesh.elements)
-    most = np.full(len(mesh.curve_names), GROUP_ELEMENTS)
-    forest = build_forest(mesh.start, mesh.end, bulge, mesh.curve, most)
+    sets, connected = connect_cracks(mesh)
+    most = np.where(connected, CONNECTED_ELEMENTS, GROUP_ELEMENTS)
+    forest = build_forest(mesh.start, mesh.end, bulge, sets, most)
     groups = [np.sort(forest.items(leaf)) for leaf in forest.leaves]
     middle = 0.5 * (mesh.start + mesh.end)
     center = np.array([middle[group].mean() for group in groups])
     nothing = np.zeros(len(groups), dtype=np.int64)
     order = build_forest(center, center, np.zeros(len(groups)), nothing, np.array([1])).order
     return [groups[k] for k in order]
+
+
+def connect_cracks(mesh: Mesh) -> tuple[Integer, Bool]:
+    """Of every element the number of its set, the cracks that meet or else one curve; and whether a set is of several.
+
+    Cracks meet in a common end of two elements.
+    """
+    own = np.flatnonzero(mesh.crack)
+    curves = len(mesh.curve_names)
+    points, at = np.unique(np.concatenate([mesh.start[own], mesh.end[own]]), return_inverse=True)
+    size = curves + len(points)
+    meeting = (np.ones(len(at)), (np.tile(mesh.curve[own], 2), curves + at.ravel()))
+    _, label = csgraph.connected_components(sparse.coo_matrix(meeting, shape=(size, size)), directed=False)
+    # The number of a set is that of its first curve.
+    _, first, inverse = np.unique(label[:curves], return_index=True, return_inverse=True)
+    set_of_curve = first[inverse.ravel()]
+    return set_of_curve[mesh.curve], np.bincount(set_of_curve, minlength=curves) > 1
 
 
 def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tuple[int, int]:
@@ -73,8 +105,14 @@ def surround_groups(
     most = widening * MOST_NEIGHBOURS
     count = min(4 * most, len(groups))
     ends = [set(np.concatenate([mesh.start[group], mesh.end[group]]).tolist()) for group in groups]
+    sets, connected = connect_cracks(mesh)
+    middle = 0.5 * (mesh.start + mesh.end)
+    elements = cKDTree(np.column_stack([middle.real, middle.imag]))
     result = []
     for number in range(first, last):
+        if len(groups) > 1 and connected[sets[groups[number][0]]]:
+            result.append(_surround_by_nearest(mesh, groups[number], elements, widening))
+            continue
         _, near = tree.query([center[number].real, center[number].imag], k=count)
         near = np.atleast_1d(near)
         near = near[near != number]
@@ -88,6 +126,28 @@ def surround_groups(
         around = np.sort(np.concatenate([groups[number], *(groups[k] for k in taken)]))
         result.append(Group(groups[number], around))
     return tuple(result)
+
+
+def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Group:
+    least = NEIGHBOUR_UNKNOWNS // (2 * (mesh.order + 1))
+    nearest = find_nearest(mesh, group, elements, int(NEAREST_SHARE * widening * max(len(group), least)))
+    return Group(group, np.union1d(group, nearest), nearest)
+
+
+def find_nearest(mesh: Mesh, group: Integer, elements: cKDTree, count: int) -> Integer:
+    """The elements that are nearest to those of a group, so many at most, the nearest first.
+
+    elements: tree of all elements' middles. Near is a small distance of the middle, less half the length.
+    """
+    middle, length = 0.5 * (mesh.start + mesh.end), np.abs(mesh.end - mesh.start)
+    center = middle[group].mean()
+    candidates = min(CANDIDATES * (count + len(group)), mesh.elements)
+    _, near = elements.query([center.real, center.imag], k=candidates)
+    near = np.setdiff1d(near, group)
+    places = np.concatenate([mesh.start[group], middle[group], mesh.end[group]])
+    own = cKDTree(np.column_stack([places.real, places.imag]))
+    distance, _ = own.query(np.column_stack([middle[near].real, middle[near].imag]))
+    return np.asarray(near[np.lexsort((near, distance - 0.5 * length[near]))][:count])
 
 
 def _enclose_groups(mesh: Mesh, groups: list[Integer]) -> tuple[Complex, Real]:

@@ -28,6 +28,7 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
+from pbem.solve.nearby import MOST_ASKED, is_nearby, settle_parts
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.search import Caution, Search
@@ -57,7 +58,8 @@ class Solution:
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# The most pairs that are settled together; with the hierarchical operator each costs two solutions by GMRES.
+# The most pairs that are settled together; with the hierarchical operator each costs two solutions by GMRES, but for
+# cracks that meet, of which nearby elements answer, and sets that are far from each other are settled one by one.
 MOST_SETTLED, MOST_SETTLED_BY_GMRES = 600, 12
 
 
@@ -78,7 +80,8 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
     hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    most_settled = MOST_SETTLED_BY_GMRES if hierarchical else MOST_SETTLED
+    few = hierarchical and not is_nearby(tangent)
+    most_settled = MOST_SETTLED_BY_GMRES if few else MOST_SETTLED
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(
@@ -171,6 +174,8 @@ def _pivot(
         return follow_leaders(problem.laws, ModeState(mode, sign))
 
     def settle() -> Settled:
+        if is_nearby(tangent) and len(group) > MOST_ASKED:
+            return settle_parts(subset, response, search.proposal.modes, group, judge)
         return settle_subset(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
             lambda own: not hold.find_free(complete(own)),
@@ -180,7 +185,12 @@ def _pivot(
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
     if search.conclude(found) and not len(hold.pairs):
         raise _end(hold, "no admissible modes", search.proposal, search)
-    return None if found.modes is None else complete(found.modes)
+    if found.modes is None:
+        return None
+    settled = complete(found.modes)
+    if is_nearby(tangent) and settled.fingerprint() == modes.fingerprint():
+        return None  # what is near says otherwise than the whole model did
+    return settled
 
 
 def _make_judge(problem: Problem, solved: Solved, caution: Caution) -> Callable[..., Proposal]:

@@ -22,6 +22,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
+from pbem.solve.elimination import Elimination, eliminate_tractions
 from pbem.solve.groups import Group
 
 Real = NDArray[np.float64]
@@ -29,17 +30,27 @@ Integer = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 
+# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
+MOST_LEFT = 900
+
+
 @dataclass
 class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
 
-    matrix (own, around): rows of the local inverse; None until it is formed.
+    inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
+    eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
+    formed: whether it has been tried.
     """
 
     group: Group
     own: Integer
     around: Integer
+    inside: Integer
+    seen: Integer
+    solved: Integer
     matrix: Real | None = None
+    formed: bool = False
 
 
 class SchwarzPreconditioner:
@@ -57,7 +68,9 @@ class SchwarzPreconditioner:
         self._nodes = nodes
         # The mesh makes these anew at every call, for all nodes.
         self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
+        self._node_crack = mesh.node_crack
         self._formed: sparse.csr_matrix | None = None
+        self._less: Elimination | None = None
         self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
         self.singular = 0  # groups without an inverse, of those formed last
         self.inverses = [self._place(group) for group in groups]
@@ -70,7 +83,8 @@ class SchwarzPreconditioner:
     def _place(self, group: Group) -> LocalInverse:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
         around = list_nodes(self._mesh, group.around)
-        return LocalInverse(group, number_components(at), number_components(around))
+        inside = number_components(np.searchsorted(around, list_nodes(self._mesh, group.elements)))
+        return LocalInverse(group, number_components(at), number_components(around), inside, inside, inside)
 
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
@@ -80,63 +94,150 @@ class SchwarzPreconditioner:
         changed |= self._find_anchored(constraints)
         by_column = matrix.tocsc()
         free = (self._free @ matrix).tocsr()
+        less = self._less = eliminate_tractions(matrix, free, self._node_crack)
         count, self.singular = 0, 0
         for inverse in self.inverses:
-            if inverse.matrix is None or changed[inverse.around].any():
-                inverse.matrix = self._invert(inverse, by_column, free)
+            if not inverse.formed or changed[inverse.around].any():
+                self._invert(inverse, by_column, free, less)
                 count += 1
         return count
 
     def apply(self, residual: Real, result: Real) -> None:
         """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,)."""
+        less, nodes = self._less, self._nodes
+        assert less is not None
+        turned = less.apply(residual)
+        eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], turned.reshape(-1, 2)[nodes]).ravel()
         for inverse in self.inverses:
-            assert inverse.matrix is not None
-            result[inverse.own] = inverse.matrix @ residual[inverse.around]
+            if inverse.matrix is not None:
+                result[inverse.own] = eliminated[inverse.own]
+                result[inverse.own[inverse.solved]] += inverse.matrix @ turned[inverse.seen]
+            else:
+                # A group that nothing holds without the rest of the model: its residual serves as it is.
+                result[inverse.own] = residual[inverse.around[inverse.inside]]
 
-    def _invert(self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix) -> Real:
-        around = inverse.around
-        local = self._form(inverse.group.around, around, constraints, free)
-        wanted = np.flatnonzero(np.isin(around, number_components(list_nodes(self._mesh, inverse.group.elements))))
-        unit = np.zeros((len(around), len(wanted)))
-        unit[wanted, np.arange(len(wanted))] = 1.0
-        factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(local), overwrite_a=True)
+    def correct(self, residual: Real) -> tuple[Real, Real]:
+        """What the eliminated unknowns are off by (own unknowns,), from this rank's part of K x - b, and what is left.
+
+        No other equation contains them, so that their own are fulfilled without a product.
+        """
+        less, nodes = self._less, self._nodes
+        assert less is not None
+        turned = (less.turn[nodes] @ residual.reshape(-1, 2, 1))[..., 0]
+        off = (less.inverse[nodes] @ turned[..., None])[..., 0]
+        return off.ravel(), np.where(less.first[nodes], 0.0, turned).ravel()
+
+    def _invert(
+        self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix, less: Elimination
+    ) -> None:
+        """Form the rows of a group's inverse; what is eliminated is not in the factors, but follows from the rest."""
+        elements, around, inside = self._narrow(inverse, less)
+        local, first = less.local.ravel()[around], less.first.ravel()[around]
+        inverse.seen, inverse.matrix, inverse.formed = around[~first], None, True
+        if local.all():
+            inverse.matrix, inverse.solved = np.zeros((0, 0)), np.zeros(0, dtype=np.int64)
+            return
+        # In large groups the eliminated follow their own residual alone: what the others do to them GMRES sees in its
+        # next iteration, and no other equation contains them.
+        own = np.zeros(len(around), dtype=bool)
+        own[inside] = not len(inverse.group.nearest)
+        rows = np.flatnonzero(~first | own)
+        left = np.flatnonzero(~local)
+        whole = self._form(elements, around, rows, left, constraints, free, less)
+        rest = ~first[rows]
+        factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(whole[rest]), overwrite_a=True)
+        # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
+        at = np.flatnonzero(~rest)
+        effect = np.zeros((len(inside), len(left)))
+        effect[np.searchsorted(inside, rows[at])] = whole[at]
+        back = less.inverse[around[inside[::2]] // 2]
+        wanted = -(back @ effect.reshape(len(back), 2, -1)).reshape(effect.shape)
+        kept = np.flatnonzero(~local[inside])
+        wanted[kept, np.searchsorted(left, inside[kept])] = 1.0
+        inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
         if not zero_pivot:
-            rows = lapack.dgetrs(factors, pivots, unit, trans=1)[0].T
-            if np.isfinite(rows).all():
-                return np.ascontiguousarray(rows)
-        # A group that nothing holds without the rest of the model: its residual serves as it is.
-        self.singular += 1
-        return np.ascontiguousarray(unit.T)
+            matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
+            inverse.matrix = np.ascontiguousarray(matrix) if np.isfinite(matrix).all() else None
+        self.singular += inverse.matrix is None
+
+    def respond(
+        self, constraints: sparse.csr_matrix, offsets: sparse.csr_matrix, elements: Integer, unknowns: Integer
+    ) -> Real:
+        """What columns of B times offsets (4 n, 2 n) do to the unknowns of the same numbers, (k, k), all else free.
+
+        Of the model the elements alone are there, the nodes of the unknowns among them; constraints: those of `update`.
+        """
+        less = self._less
+        assert less is not None
+        around = number_components(list_nodes(self._mesh, elements))
+        at = np.searchsorted(around, unknowns)
+        local, first = less.local.ravel()[around], less.first.ravel()[around]
+        wanted = np.zeros(len(around), dtype=bool)
+        wanted[at] = True
+        rows, left = np.flatnonzero(~first | wanted), np.flatnonzero(~local)
+        whole, forces = (
+            self._form(elements, around, rows, columns, matrix.tocsc(), (self._free @ matrix).tocsr(), less)
+            for columns, matrix in ((left, constraints), (at, offsets))
+        )
+        rest = ~first[rows]
+        result = np.zeros((len(around), len(at)))
+        result[left] = -np.linalg.solve(whole[rest], forces[rest])
+        turned = np.zeros_like(result)
+        turned[rows[~rest]] = (-forces - whole @ result[left])[~rest]
+        back = less.inverse[around[::2] // 2]
+        result += (back @ turned.reshape(len(back), 2, -1)).reshape(result.shape)
+        return np.asarray(result[at])
+
+    def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
+        """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""
+        group = inverse.group
+        if not len(group.nearest):
+            return group.around, inverse.around, inverse.inside
+        own, width = group.elements, 2 * (self._mesh.order + 1)
+        left = (~less.local).reshape(-1, width).sum(axis=1)
+        sums = left[own].sum() + np.cumsum(left[group.nearest])
+        elements = np.union1d(own, group.nearest[sums <= MOST_LEFT])
+        around = list_nodes(self._mesh, elements)
+        inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
+        return elements, number_components(around), inside
 
     def _form(
-        self, elements: Integer, around: Integer, constraints: sparse.csc_matrix, free: sparse.csr_matrix
+        self, elements: Integer, around: Integer, rows: Integer, left: Integer, constraints: sparse.csc_matrix,
+        free: sparse.csr_matrix, less: Elimination,
     ) -> Real:
-        """The tangent operator's rows and columns of the nodes of elements, dense."""
-        mesh = self._mesh
-        nodes = around[::2] // 2
-        local = np.zeros((len(around), len(around)))
-        row, column, value = _take_entries(free, around)
-        place, known = _find_places(around, column)
-        local[row[known], place[known]] = value[known]
-        column, row, value = _take_entries(constraints, around)
+        """Turned rows of the tangent operator, and its columns that are left, of the nodes of elements, dense.
+
+        rows, left: places in around (k,), the unknowns of elements, rising.
+        """
+        mesh, columns = self._mesh, around[left]
+        nodes = np.unique(around[rows] // 2)
+        formed = np.zeros((2 * len(nodes), len(left)))
+        row, column, value = _take_entries(free, number_components(nodes))
+        place, known = _find_places(columns, column)
+        formed[row[known], place[known]] = value[known]
+        column, row, value = _take_entries(constraints, columns)
         # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
-        moved = np.unique(row // 2 % mesh.nodes)
-        sources = np.union1d(elements, self._node_element[moved])
+        sources = np.unique(self._node_element[row // 2 % mesh.nodes])
         for region in np.unique(mesh.region[elements]):
             own = np.flatnonzero(self._node_region[nodes] == region)
-            values, columns = self._evaluate(int(region), sources[mesh.region[sources] == region], nodes[own])
-            place, known = _find_places(columns, row)
+            seen = sources[mesh.region[sources] == region]
+            if not len(own) or not len(seen):
+                continue
+            values, places = self._evaluate(int(region), seen, nodes[own])
+            place, known = _find_places(places, row)
             entries = (value[known], (place[known], column[known]))
-            chosen = sparse.csr_matrix(entries, shape=(len(columns), len(around)))
-            local[number_components(own)] += (chosen.T @ values.T).T
-        return local
+            chosen = sparse.csr_matrix(entries, shape=(len(places), len(left)))
+            formed[number_components(own)] += (chosen.T @ values.T).T
+        turned = less.turn[nodes] @ formed.reshape(len(nodes), 2, -1)
+        return np.asarray(turned.reshape(2 * len(nodes), -1)[np.searchsorted(number_components(nodes), around[rows])])
 
     def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
         """Rows of B of nodes, less the free terms, on the entries of v of elements of the same region."""
         mesh = self._mesh
         sources: Sources = self._sources[region].select(elements - self._first_element[region])
         bounded = bool((sources.family == 0).any())
-        on = np.searchsorted(elements, self._node_element[nodes])
+        place, there = _find_places(elements, self._node_element[nodes])
+        on = np.where(there, place, -1)
         seen = list_nodes(mesh, elements)
         columns = number_components(seen)
         if bounded:

@@ -1,0 +1,140 @@
+"""Crack networks: groups by place, what nearby elements answer, and solutions that are as good as their use needs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.mesh.generate import generate_mesh
+from pbem.model.build import parse_model
+from pbem.parallel import world
+from pbem.solve import groups
+from pbem.solve.assembly import assemble_problem
+from pbem.solve.krylov import LOOSE, KrylovTangent, make_tangent
+from pbem.solve.nearby import MOST_ASKED, part_by_distance
+from pbem.solve.problem import Problem
+from pbem.solve.response import complete_states
+from tests.identities.solving import assemble_tangent, linearise_pairs
+
+Real = NDArray[np.float64]
+
+
+def write_comb(teeth: int) -> str:
+    """A crack in pieces, with a branch up and one down wherever two of them meet."""
+    curves = {}
+    for k in range(teeth):
+        curves[f"back_{k}"] = [[k, 0], [k + 1, 0]]
+        curves[f"up_{k}"] = [[k + 1, 0], [k + 1.2, 1.5]]
+        curves[f"down_{k}"] = [[k + 1, 0], [k + 0.7, -1.2]]
+    head = """
+materials.rock = { young = 1e3, poisson = 0.25 }
+remote = { sxx = -0.2, syy = -1.0, sxy = 0.3 }
+analysis.steps = 1
+solver.operator = "hierarchical"
+"""
+    text = f'{head}[regions.plane]\nmaterial = "rock"\ninfinite = true\ncracks = {list(curves)}\n[curves]\n'
+    text += "".join(f"{name} = {{ points = {points}, elements = 2 }}\n" for name, points in curves.items())
+    return text + "[interfaces]\n" + "".join(f'{name} = {{ law = "coulomb", friction = 0.4 }}\n' for name in curves)
+
+
+def assemble(operator: str = "hierarchical") -> Problem:
+    _, model = parse_model(write_comb(8).replace("hierarchical", operator))
+    return assemble_problem(model, generate_mesh(model), world)
+
+
+def draw_modes(count: int) -> ModeState:
+    random = np.random.default_rng(3)
+    return ModeState(random.choice([STICK, SLIP, OPEN], count).astype(np.int8), random.choice([-1.0, 1.0], count))
+
+
+@pytest.fixture
+def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups, "ONE_GROUP", 0)
+    monkeypatch.setattr(groups, "CONNECTED_ELEMENTS", 16)
+
+
+def test_cracks_that_meet_are_divided_by_place(many_groups: None) -> None:
+    problem = assemble()
+    mesh, divided = problem.mesh, [group.elements for group in problem.groups]
+    assert sorted(np.concatenate(divided)) == list(range(mesh.elements))
+    assert max(len(np.unique(mesh.curve[group])) for group in divided) > 1
+    middle = 0.5 * (mesh.start + mesh.end)
+    for group in problem.groups:
+        assert set(group.around) == set(group.elements) | set(group.nearest)
+        gap = np.abs(middle[group.nearest][:, None] - np.concatenate(
+            [mesh.start[group.elements], middle[group.elements], mesh.end[group.elements]])).min(axis=1)
+        gap -= 0.5 * np.abs(mesh.end - mesh.start)[group.nearest]
+        assert (np.diff(gap) >= -1e-12).all()
+
+
+def test_a_loose_solution_is_told_and_completed(many_groups: None) -> None:
+    problem = assemble()
+    tangent = make_tangent(problem)
+    assert isinstance(tangent, KrylovTangent)
+    load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
+    constraints = problem.constrain(law, load)
+    loose = tangent.solve(constraints, load, law)
+    assert not loose.checked and 1e-9 < loose.residual <= LOOSE
+    whole = tangent.check(loose, constraints, load, law)
+    assert whole.checked and whole.residual <= 1e-9 and whole.linear_iterations > loose.linear_iterations
+    fresh = make_tangent(problem)
+    exact = fresh.solve(constraints, load)
+    assert exact.checked
+    np.testing.assert_allclose(whole.unknowns, exact.unknowns, rtol=0, atol=1e-7 * np.abs(exact.unknowns).max())
+    # The solution of the same system is the best start of all.
+    assert tangent.solve(constraints, load, law).linear_iterations <= 2
+    for each in (tangent, fresh):
+        each.destroy()
+
+
+def test_nearby_elements_answer_nearly_as_the_whole_model_does(many_groups: None) -> None:
+    problem = assemble()
+    tangent = make_tangent(problem)
+    assert isinstance(tangent, KrylovTangent) and tangent.nearby and MOST_ASKED < 16
+    modes = draw_modes(problem.mesh.pairs.count)
+    load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
+    constraints = problem.constrain(law, load)
+    tangent.solve(constraints, load, law)
+    pairs = np.arange(20, 36)
+    directions = complete_states(law.tangent[pairs], problem.traction_scale)
+    found = tangent.respond(constraints, load, law, pairs, directions)
+    tangent.nearby = False
+    exact = tangent.respond(constraints, load, law, pairs, directions)
+    assert np.abs(found - exact).max() < 0.1 * np.abs(exact).max()
+    tangent.destroy()
+
+
+def test_pairs_at_the_ends_of_the_comb_are_two_sets() -> None:
+    mesh = assemble().mesh
+    x = mesh.position[mesh.pairs.slot].real
+    nodes = mesh.pairs.slot[(x < 0.5) | (x > 8.0)]
+    parts = part_by_distance(mesh, nodes)
+    assert len(parts) == 2
+    for part in parts:
+        assert len(set(mesh.position[nodes[part]].real < 4)) == 1
+    np.testing.assert_array_equal(np.sort(np.concatenate(parts)), np.arange(len(nodes)))
+
+
+def test_large_groups_are_exact_in_what_is_not_eliminated(many_groups: None) -> None:
+    problem = assemble()
+    modes = draw_modes(problem.mesh.pairs.count)
+    tangent = make_tangent(problem)
+    preconditioner = tangent.preconditioner
+    preconditioner.update(problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 0.0)))
+    exact = assemble_tangent(assemble("dense"), modes)
+    residual = np.random.default_rng(2).normal(size=len(exact))
+    found = np.zeros(len(exact))
+    preconditioner.apply(residual, found)
+    less = preconditioner._less
+    unknowns = (2 * problem.operator.nodes[:, None] + np.arange(2)).ravel()
+    for inverse in preconditioner.inverses:
+        around = inverse.around
+        expected = np.linalg.solve(exact[np.ix_(around, around)], residual[around])
+        own = unknowns[inverse.own]
+        kept = ~less.local.ravel()[own]
+        at = np.searchsorted(around, own)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(found[inverse.own][kept], expected[at][kept], rtol=0, atol=1e-8 * size)
+    tangent.destroy()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,10 +32,6 @@ SLOW = 60
 WIDENING, MOST_WIDENING = 4, 16
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
-# While modes change their pairs are judged by solutions to this residual, or to this part of the share of the pairs
-# that have changed if that is less: the fewer change, the nearer to the bounds are those that remain. A solution in
-# which none changes is completed.
-LOOSE, LOOSE_BY_SHARE = 1e-4, 1e-3
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
 
@@ -51,7 +45,6 @@ class KrylovTangent:
         self.constraints: ConstraintMap | None = None
         self.solution: Real | None = None
         self.law: Linearisation | None = None
-        self.load: Load | None = None
         self.iterations: list[int] = []
         self.nearby = answers_nearby(problem)
         self.widening = 1
@@ -85,28 +78,27 @@ class KrylovTangent:
         self._solver = solver
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
-        """Solve B (M x + m) = 0 for a constraint map; without a law to the full tolerance.
+        """Solve B (M x + m) = 0 for a constraint map.
 
         Raises ConvergenceError: "linear solver".
         """
-        goal = self._choose_goal(load, law)
         self.preconditioner.update(constraints)
         self.constraints = constraints
         begin = self._carry_over(law)
-        self.law, self.load = law, load
+        self.law = law
         forced = self.problem.apply(constraints.offset, load, constraints.released)
         if self.problem.measure(forced) == 0.0:
             unknowns = np.zeros(self.problem.unknowns)
             return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
-        return self._complete(constraints, load, forced, self._guess(-forced, begin), goal)
+        return self._complete(constraints, load, forced, self._guess(-forced, begin))
 
-    def _complete(self, constraints: ConstraintMap, load: Load, forced: Real, begin: Real, goal: float) -> Solved:
-        """The solution to a relative residual, from this rank's part of an approximate one on."""
-        problem, full = self.problem, self.problem.model.solver.newton_tolerance
+    def _complete(self, constraints: ConstraintMap, load: Load, forced: Real, begin: Real) -> Solved:
+        """The solution to the tolerance, from this rank's part of an approximate one on."""
+        problem, tolerance = self.problem, self.problem.model.solver.newton_tolerance
         scale = problem.measure(forced)
         self._left.setArray(begin)
         self._right.setArray(-forced)
-        self._solver.setTolerances(rtol=SAFETY * full if goal <= full else 0.5 * goal)
+        self._solver.setTolerances(rtol=SAFETY * tolerance)
         residual, count = np.inf, 0
         for _ in range(MOST_ATTEMPTS):
             before = residual
@@ -115,20 +107,20 @@ class KrylovTangent:
             count += self.iterations[-1]
             own = np.array(self._left.getArray())
             v = constraints.evaluate(self.gather(own))
-            # The tractions of crack pairs are those of the jumps, however exact these are: pairs are judged by them.
+            # The tractions of crack pairs are those of the jumps to rounding: pairs are judged by them.
             off, left = self.preconditioner.correct(problem.apply(v, load, constraints.released))
             unknowns = self.gather(own - off)
             v = constraints.evaluate(unknowns)
             size = size_residual(scale, unknowns)
             residual = problem.measure(left) / size
-            if residual <= full:  # what is said of a complete solution is measured on it
+            if residual <= tolerance:  # what is said of the solution is measured on it
                 residual = problem.measure(problem.apply(v, load, constraints.released)) / size
             self._left.setArray(own - off)
-            solved = residual <= goal
+            solved = residual <= tolerance
             widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
             if solved:
                 self.solution = unknowns
-                return Solved(unknowns, v, residual, checked=residual <= full, linear_iterations=count)
+                return Solved(unknowns, v, residual, linear_iterations=count)
             # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
             if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or not residual < 0.1 * before):
                 break
@@ -139,19 +131,9 @@ class KrylovTangent:
         loose = f"; {singular} groups of elements are held by nothing near to them" if singular else ""
         raise ConvergenceError(
             "linear solver",
-            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {goal:.1e}){loose}"
+            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"
             '; try operator = "dense"',
         )
-
-    def _choose_goal(self, load: Load, law: Linearisation | None) -> float:
-        """The relative residual that is asked for at first: less than all where pairs have changed since the last."""
-        full = self.problem.model.solver.newton_tolerance
-        if law is None or not law.tangent.size:
-            return full
-        if self.law is None or load is not self.load:
-            return max(LOOSE, full)
-        share = float((law.tangent != self.law.tangent).any(axis=(1, 2)).mean())
-        return max(min(LOOSE, LOOSE_BY_SHARE * share), full)
 
     def _widen(self) -> bool:
         """Let the groups of the preconditioner take in more around them; whether there was more to take."""
@@ -168,16 +150,8 @@ class KrylovTangent:
         return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent: a solution that was judged before it was complete is completed, from where it is."""
-        if solved.checked:
-            return solved
-        self.constraints = constraints
-        rows = self.problem.operator.nodes
-        begin = np.ascontiguousarray(solved.unknowns.reshape(-1, 2)[rows].ravel())
-        forced = self.problem.apply(constraints.offset, load, constraints.released)
-        full = self.problem.model.solver.newton_tolerance
-        done = self._complete(constraints, load, forced, begin, full)
-        return replace(done, linear_iterations=solved.linear_iterations + done.linear_iterations)
+        """See AnyTangent; every solution is checked."""
+        return solved
 
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real

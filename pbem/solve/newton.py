@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.custom import asked_by_one_rank
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, is_linear, plastic_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
@@ -61,7 +61,14 @@ STRAIN_FLOOR = 0.1
 MOST_SETTLED, MOST_SETTLED_BY_GMRES = 600, 12
 
 
-def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
+# After so many iterations, and so many more, it is asked whether anything could balance the loads.
+PATIENCE = 8
+
+
+def solve_step(
+    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None,
+) -> Solution:
     """Converge one load step from the memory of the last.
 
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
@@ -82,7 +89,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(
-        most_settled if is_linear(laws) else 0, laws.follows, None if hierarchical else problem.mesh.pairs.interface
+        most_settled, laws.follows | ~find_linear(laws), None if hierarchical else problem.mesh.pairs.interface
     )
     iterations: list[Iteration] = []
     while True:
@@ -121,6 +128,9 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
+        error = refuse(memory) if len(iterations) % PATIENCE == 0 else None
+        if error:
+            raise error
         search.note(proposal)
         if len(search.counts) == problem.model.solver.newton_max_iterations:
             raise _end(hold, "iteration limit", proposal, search)

@@ -224,5 +224,6 @@ def measure_load_share(laws: PairLaws, state: PairState, memory: Memory, pressur
     tension = tensile_limit(laws, memory)
     limit = tension - pressure
     bound = evaluate_strength(laws, np.minimum(state.p_n, limit), memory.path, pressure, memory.broken).bound
-    none = np.finfo(float).tiny
-    return np.maximum((state.p_n + pressure) / np.maximum(tension, none), np.abs(state.p_s) / np.maximum(bound, none))
+    largest = _largest_traction(state)
+    least = ROUNDING * largest if largest > 0 else 1.0
+    return np.maximum((state.p_n + pressure) / np.maximum(tension, least), np.abs(state.p_s) / np.maximum(bound, least))

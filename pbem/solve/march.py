@@ -188,13 +188,15 @@ def _advance(
             return do_on_first(problem.comm, ConvergenceError, lambda: _refuse(problem, memory, now, stage, goal))
 
         try:
-            solution = solve_step(problem, tangent, memory, problem.evaluate_load(stage, target), reporter, refuse)
+            load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
+            solution = solve_step(problem, tangent, memory, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
             balanced = _find_balanced(problem, memory, stage, reached, target)
             if is_proportional(problem, memory, stage, reached):
                 if balanced < target and error.reason != "free motion":
-                    raise _end_at_limit(problem, stage, reached, ceiling.lower(target, balanced, error), error) from error
+                    ceiling = ceiling.lower(target, balanced, error)
+                    raise _end_at_limit(problem, stage, reached, ceiling, error) from error
                 raise _end_at_rest(problem, stage, target, error) from error
             ceiling = ceiling.lower(target, balanced, error)
             if ceiling.is_reached(reached, target, least):
@@ -230,11 +232,10 @@ def _end_at_limit(
 ) -> ConvergenceError:
     """The error at the largest load that the contacts bear; error: of the try at ceiling.tried."""
     name = problem.model.stages[stage].name
-    why = f"no equilibrium was found at {ceiling.tried:.6g}: there {error.detail}"
+    why = f"at {ceiling.tried:.6g} {error.detail}"
     if ceiling.balanced < np.inf:
-        why = f"no forces that the contacts can carry balance the loads beyond {ceiling.balanced:.6g}" + (
-            "" if error.reason == "limit load" else f"; at {ceiling.tried:.6g} {error.detail}"
-        )
+        most = f"no forces that the contacts can carry balance the loads beyond {ceiling.balanced:.6g}"
+        why = f"{why}; up to {ceiling.balanced:.6g} some could" if error.reason == "limit load" else f"{most}; {why}"
     return ConvergenceError(
         "limit load",
         f"limit load reached at fraction {reached:.6g} of stage {name!r}: {why}, or prescribe a displacement in place "

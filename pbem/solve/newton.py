@@ -67,7 +67,7 @@ PATIENCE = 8
 
 def solve_step(
     problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
-    refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None,
+    refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None, hurried: bool = False,
 ) -> Solution:
     """Converge one load step from the memory of the last.
 
@@ -89,7 +89,7 @@ def solve_step(
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(
-        most_settled, laws.follows | ~find_linear(laws), None if hierarchical else problem.mesh.pairs.interface
+        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~find_linear(laws)
     )
     iterations: list[Iteration] = []
     while True:
@@ -128,19 +128,22 @@ def solve_step(
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
-        error = refuse(memory) if len(iterations) % PATIENCE == 0 else None
-        if error:
-            raise error
+        refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
+        if refused:
+            moves = do_on_first(comm, ConvergenceError, lambda now=proposal.modes: (  # type: ignore[misc]
+                hold.describe_collapse(now)))
+            raise ConvergenceError(refused.reason, refused.detail + moves)
         search.note(proposal)
-        if len(search.counts) == problem.model.solver.newton_max_iterations:
+        if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
-        chosen = cascade.modes if cascade else _pivot(
-            hold, tangent, constraints, modes, memory, load, law, solved, search
-        )
+        chosen = cascade.modes if cascade else None
+        # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
+        if not cascade and not hold.share:
+            chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
         if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
             raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
-            chosen = limit_changes(modes, proposal, search.caution.share)
+            chosen = limit_changes(modes, proposal, max(search.caution.share, hold.share))
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
         slipped = plastic_slip(laws, pairs) - memory.slip
@@ -175,8 +178,15 @@ def _pivot(
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
     judge = _make_judge(problem, solved, search.caution)
 
+    # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
+    alone = search.excluded
+    start = ModeState(
+        np.where(alone, search.proposal.modes.mode, modes.mode).astype(np.int8),
+        np.where(alone, search.proposal.modes.sign, modes.sign),
+    )
+
     def complete(own: ModeState) -> ModeState:
-        mode, sign = modes.mode.copy(), modes.sign.copy()
+        mode, sign = start.mode.copy(), start.sign.copy()
         mode[group], sign[group] = own.mode, own.sign
         return follow_leaders(problem.laws, ModeState(mode, sign))
 

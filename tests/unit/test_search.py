@@ -44,7 +44,7 @@ def test_pairs_that_changed_lately_are_pivoted_once_their_number_does_not_fall()
 def test_neighbours_join_where_pairs_change_beside_groups_that_were_solved() -> None:
     interface = np.repeat([0, 1], [12, COUNT - 12])
     follows = np.arange(COUNT) == 8
-    search = Search(50, follows, interface)
+    search = Search(50, interface, follows)
     found = Settled(make_modes(SLIP, count=COUNT), False, 0, np.zeros(0, dtype=bool))
     assert follow(search, [10], [10], [10], [10])[-1] == [10]
     search.conclude(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -180,20 +181,18 @@ def _advance(
     least = problem.model.solver.min_step
     if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
         raise _end_at_limit(problem, stage, reached, ceiling, ceiling.error)
-    target = ceiling.choose(reached, planned, least)
+    target, proportional = ceiling.choose(reached, planned, least), is_proportional(problem, memory, stage, reached)
     while True:
         reporter.start_step(stage, reached, target)
-
-        def refuse(now: Memory, goal: float = target) -> ConvergenceError | None:
-            return do_on_first(problem.comm, ConvergenceError, lambda: _refuse(problem, memory, now, stage, goal))
-
+        # From rest nothing is gained by an early end.
+        refuse = _never if proportional else partial(_refuse, problem, memory, stage, target)
         try:
             load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
             solution = solve_step(problem, tangent, memory, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
             balanced = _find_balanced(problem, memory, stage, reached, target)
-            if is_proportional(problem, memory, stage, reached):
+            if proportional:
                 if balanced < target and error.reason != "free motion":
                     ceiling = ceiling.lower(target, balanced, error)
                     raise _end_at_limit(problem, stage, reached, ceiling, error) from error
@@ -208,9 +207,17 @@ def _advance(
             target = reached + half
 
 
-def _refuse(problem: Problem, memory: Memory, now: Memory, stage: int, target: float) -> ConvergenceError | None:
-    """The error of a step whose loads nothing balances with the bonds that are left now; None if something may."""
-    if can_balance(problem, now, stage, target) is not False:
+def _never(_: Memory) -> ConvergenceError | None:
+    return None
+
+
+def _refuse(problem: Problem, memory: Memory, stage: int, target: float, now: Memory) -> ConvergenceError | None:
+    """The error of a step whose loads nothing balances with the bonds that are left now; None if something may.
+
+    As the first rank finds it.
+    """
+    possible = do_on_first(problem.comm, ConvergenceError, lambda: can_balance(problem, now, stage, target))
+    if possible is not False:
         return None
     if np.array_equal(memory.broken, now.broken):
         return ConvergenceError("limit load", "no forces that the contacts can carry balance the loads")
@@ -232,7 +239,8 @@ def _end_at_limit(
 ) -> ConvergenceError:
     """The error at the largest load that the contacts bear; error: of the try at ceiling.tried."""
     name = problem.model.stages[stage].name
-    why = f"at {ceiling.tried:.6g} {error.detail}"
+    known = error.reason in ("free motion", "limit load")
+    why = f"at {ceiling.tried:.6g} {error.detail if known else 'no modes of the contacts were found that settle'}"
     if ceiling.balanced < np.inf:
         most = f"no forces that the contacts can carry balance the loads beyond {ceiling.balanced:.6g}"
         why = f"{why}; up to {ceiling.balanced:.6g} some could" if error.reason == "limit load" else f"{most}; {why}"

@@ -25,7 +25,7 @@ from pbem.contact.modes import (
 )
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
-from pbem.parallel import do_on_first
+from pbem.parallel import broadcast, do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
 from pbem.solve.problem import Problem
@@ -137,13 +137,15 @@ def solve_step(
         if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
         chosen = cascade.modes if cascade else None
+        # The first rank alone knows which pairs hold a body.
+        share = broadcast(comm, max(search.caution.share, hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
-        if not cascade and not hold.share:
+        if not cascade and not (share > search.caution.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
         if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
             raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
-            chosen = limit_changes(modes, proposal, max(search.caution.share, hold.share))
+            chosen = limit_changes(modes, proposal, share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
         slipped = plastic_slip(laws, pairs) - memory.slip
@@ -198,7 +200,7 @@ def _pivot(
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
-    if search.conclude(found) and not len(hold.pairs):
+    if search.conclude(found) and not broadcast(problem.comm, len(hold.pairs)):
         raise _end(hold, "no admissible modes", search.proposal, search)
     return None if found.modes is None else complete(found.modes)
 

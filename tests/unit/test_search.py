@@ -122,3 +122,23 @@ def test_failures_after_many_choices_end_a_search_in_time() -> None:
     search.restart()
     follow(search, [1, 2], [1, 2], [1, 2], [1, 2])
     assert not any(search.conclude(fail(False, 1)) for _ in range(2 * FUTILE))
+
+
+def test_pairs_that_are_excluded_are_in_no_group() -> None:
+    excluded = np.isin(np.arange(COUNT), [2, 4])
+    search = Search(50, excluded=excluded)
+    assert follow(search, [1, 2], [1, 2], [1, 2], [1, 2, 4])[-1] == [1]
+    assert follow(Search(50, excluded=excluded), [2], [2], [2], [2, 4])[-1] == []
+
+
+def test_a_search_is_stuck_where_no_fewer_pairs_change_for_long() -> None:
+    falling, level = Search(50), Search(50)
+    follow(falling, *(list(range(count)) for count in range(60, 30, -1)))
+    assert not falling.is_stuck()
+    follow(level, *[list(range(40))] * 19)
+    assert not level.is_stuck()
+    follow(level, list(range(41)))
+    assert level.is_stuck()
+    # No change at all is no sign of it: the laws still settle.
+    follow(level, [])
+    assert not level.is_stuck()

@@ -142,3 +142,6 @@ def test_a_search_is_stuck_where_no_fewer_pairs_change_for_long() -> None:
     # No change at all is no sign of it: the laws still settle.
     follow(level, [])
     assert not level.is_stuck()
+    still = Search(50)
+    follow(still, *[[]] * 25)
+    assert not still.is_stuck()

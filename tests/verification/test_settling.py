@@ -114,6 +114,14 @@ def test_friction_that_weakens_on_one_crack_leaves_the_others_to_pivoting(load: 
     steps = run(f"{head}\nfar = {{ friction = {weakens}{tail[tail.index(' }'):]}")
     assert [len(step.iterations) <= 12 for step in steps] == [True]
 
+
+@pytest.mark.parametrize("load", [(1.0, -10.0, 0.0), (0.2, -1.0, 0.6), (-1.0, -1.0, 1.5)])
+def test_pairs_of_weakening_friction_change_while_their_neighbours_are_pivoted(load: Load) -> None:
+    text = write_plane(make_junction(0, 30, 60, elements=12), {"friction": 0.8}, load)
+    weakens = "\nb0 = { friction = 0.8, friction_dynamic = 0.5, slip_distance = 0.01"
+    steps = run(text.replace("\nb0 = { friction = 0.8", weakens))
+    assert [len(step.iterations) <= 12 for step in steps] == [True]
+
 LOADS: tuple[Load, ...] = ((1.0, -10.0, 0.0), (0.3, -1.0, 0.2), (-0.3, 1.0, 0.2), (1.0, -1.0, 0.0), (-1.0, -3.0, 1.0))
 
 

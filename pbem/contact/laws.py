@@ -220,9 +220,12 @@ def resists_slip(laws: PairLaws) -> Bool:
     return resists
 
 
-def is_linear(laws: PairLaws) -> bool:
-    """Whether all friction bounds are linear in the normal traction alone, as Coulomb's."""
-    return all(group.law is coulomb for group in laws.strengths)
+def find_linear(laws: PairLaws) -> Bool:
+    """The pairs (m,) whose friction bound is linear in the normal traction alone, as Coulomb's."""
+    linear = np.zeros(laws.count, dtype=bool)
+    for group in laws.strengths:
+        linear[group.pairs] = group.law is coulomb
+    return linear
 
 
 def start_memory(laws: PairLaws) -> Memory:

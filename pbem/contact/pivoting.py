@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dger
 
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -66,8 +67,8 @@ def _exchange(table: Real, row: int, column: int) -> None:
     table[row] /= table[row, column]
     others = table[:, column].copy()
     others[row] = 0.0
-    changed = np.flatnonzero(others)
-    table[changed] -= others[changed, None] * table[row]
+    # In place: tables of hundreds of pairs are larger than the caches.
+    dger(-1.0, table[row].copy(), others, a=table.T, overwrite_a=1)
 
 
 def _choose_row(table: Real, basis: NDArray[np.int64], entering: int, scale: float) -> int | None:

@@ -183,6 +183,8 @@ def _step(
     Along a slender wedge the end of contact moves by an element or two in a step, however many there are.
     """
     for share in SHARES:
+        if share == 1.0 and len(modes.mode) > MOST_STEPS:  # it would not come to the end
+            break
         seen: set[bytes] = set()
         while len(seen) < MOST_STEPS and modes.fingerprint() not in seen:
             seen.add(modes.fingerprint())

@@ -26,6 +26,7 @@ MOST_HELD = 12
 UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
+SHARES = (0.0, 0.3, 1.0)
 
 
 class Hold:
@@ -46,6 +47,9 @@ class Hold:
         self.count = 0
         self.driven = False
         self.repeated = 0
+        # Only violations of this share of the largest change modes, once those that hold a body came back: many changes
+        # at a time free a body whose contact only wants to move on around it.
+        self.share = 0.0
 
     def release(self, constraints: ConstraintMap, modes: ModeState) -> ConstraintMap:
         """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
@@ -76,6 +80,8 @@ class Hold:
         # Pairs that hold a body only by pulling open again each time: there is no state in which they hold it.
         same = before is not None and held is not modes and held.fingerprint() == before.fingerprint()
         self.repeated = self.repeated + 1 if same else 0
+        if same:
+            self.share = SHARES[min(self.repeated, len(SHARES) - 1)]
         if self.repeated == MOST_REPEATED:
             self.refuse_free_motion(modes)
         return held
@@ -143,6 +149,12 @@ class Hold:
             return None
         detail = f"nothing in the present contact prevents a {free}; {advice}"
         return ConvergenceError("free motion", detail)
+
+    def describe_collapse(self, modes: ModeState) -> str:
+        """The motions that friction alone prevents in some modes, as the end of a sentence; "" if it prevents none."""
+        gives_way = (modes.mode == STICK) & ~self.problem.laws.bonded
+        free = self.find_free(ModeState(np.where(gives_way, SLIP, modes.mode).astype(np.int8), modes.sign))
+        return f"; nothing but friction prevents a {free}" if free else ""
 
     def refuse_free_motion(self, modes: ModeState) -> None:
         """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""

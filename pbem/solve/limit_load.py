@@ -7,6 +7,8 @@ no smaller step finds an equilibrium. A linear programme in the tractions of the
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -25,6 +27,8 @@ Real = NDArray[np.float64]
 BALANCED = 1e-3
 # A share that is less than the whole by no more than this is the whole.
 ROUNDING = 1e-6
+# How a linear programme can end.
+SOLVED, INFEASIBLE = 0, 2
 # Models with more pairs are not asked.
 MOST_PAIRS = 20_000
 
@@ -35,6 +39,29 @@ def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached
     Without what pairs have lost for good, but as if none of them had slipped. Unknown for laws of one's own, models
     without finite bodies, and where the programme finds no balance at `reached` itself.
     """
+    solved = _solve(problem, memory, stage, reached, target)
+    share = solved.share if solved else None
+    if share is None or share > 1 - ROUNDING:
+        return None if share is None else target
+    return reached + share * (target - reached)
+
+
+def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -> bool | None:
+    """Whether some tractions balance the loads at a fraction of a stage; None if unknown, as above."""
+    solved = _solve(problem, memory, stage, fraction, fraction)
+    return None if solved is None or not solved.certain else solved.share is not None
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """The largest share of a change of loads that is balanced, None if no share is; certain: whether that is so."""
+
+    share: float | None
+    certain: bool
+
+
+def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> _Solved | None:
+    """For the change from one fraction of a stage to another one; None where the programme cannot be posed."""
     mesh, laws = problem.mesh, problem.laws
     finite = np.array([not region.infinite for region in problem.model.regions])
     if laws.count > MOST_PAIRS or not finite.any() or not (~mesh.pairs.crack).any():
@@ -45,11 +72,8 @@ def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached
     matrix, before, after = _sum_up(problem, loads, np.flatnonzero(finite))
     size = max(np.abs(before).max(), np.abs(after).max())
     if not size > 0:
-        return target
-    share = _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size)
-    if share is None or share > 1 - ROUNDING:
-        return None if share is None else target
-    return reached + share * (target - reached)
+        return _Solved(1.0, True)
+    return _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size)
 
 
 def _sum_up(
@@ -83,8 +107,8 @@ def _sum_up(
 def _maximise(
     problem: Problem, memory: Memory, loads: list[Load], matrix: sparse.csr_matrix, constant: Real, change: Real,
     size: float,
-) -> float | None:
-    """The largest share of the change that is balanced, None if no share is.
+) -> _Solved:
+    """The largest share of the change that is balanced.
 
     Unknowns: tractions times the model's length over `size`, in the order of the map's unknowns, and the share.
     """
@@ -135,7 +159,9 @@ def _maximise(
         b_eq=-pressure[parted] if len(parted) else None,
         bounds=np.stack([low, high], axis=1)[used], method="highs",
     )  # fmt: skip
-    return float(np.clip(found.x[-1], 0.0, 1.0)) if found.status == 0 else None
+    if found.status != SOLVED:
+        return _Solved(None, found.status == INFEASIBLE)
+    return _Solved(float(np.clip(found.x[-1], 0.0, 1.0)), True)
 
 
 def _find_strongest(laws: PairLaws, memory: Memory) -> tuple[Real, Real]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.balance import describe_imbalance, measure_balance
 from pbem.solve.krylov import make_tangent
-from pbem.solve.limit_load import find_balanced_fraction
+from pbem.solve.limit_load import can_balance, find_balanced_fraction
 from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_linearity
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
@@ -24,6 +25,60 @@ from pbem.solve.tangent import AnyTangent
 NEAR = 0.02
 # Of what forces in the contacts could still balance, a step takes this part.
 SAFE = 0.97
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """What is known of the fractions of a stage that could not be reached.
+
+    failed: the least one at which a try failed that was not reached since; free: the least one at which a body was
+    found to move freely, or nothing to balance the loads once bonds had failed; balanced: the largest one at which
+    forces in the contacts could balance the loads. Infinity if none. error: of the last try that failed, at `tried`.
+    """
+
+    failed: float = np.inf
+    free: float = np.inf
+    balanced: float = np.inf
+    tried: float = 0.0
+    error: ConvergenceError | None = None
+
+    def choose(self, reached: float, planned: float, least: float) -> float:
+        """The fraction to try next: one that failed is tried again from nearer, and none above it before.
+
+        Free bodies are halved towards, as they are free from everywhere.
+        """
+        target = min(planned, self.failed)
+        if self.free <= target:
+            middle = 0.5 * (reached + self.free)
+            target = middle if middle - reached >= least else self.free
+        if self.balanced < target:
+            target = reached + max(SAFE * (self.balanced - reached), least)
+        return target
+
+    def is_reached(self, reached: float, target: float, least: float) -> bool:
+        """Whether hardly anything is left between what was reached and what cannot be.
+
+        Beyond a fraction that failed in some other way is a limit load only if there is one: where forces balance less
+        than the whole, friction can bear less than they, as bodies part and slip where they are loaded most.
+        """
+        lowest = min(self.balanced, self.free, self.failed if self.balanced < np.inf else np.inf)
+        return lowest <= target and lowest - reached < max(least, NEAR * lowest)
+
+    def lower(self, target: float, balanced: float, error: ConvergenceError) -> Ceiling:
+        """With a try that failed; balanced: up to the target, which it is if all of it may be in balance."""
+        collapsed = error.reason == "free motion" or (error.reason == "limit load" and balanced >= target)
+        return Ceiling(
+            min(self.failed, target), min(self.free, target if collapsed else np.inf),
+            min(self.balanced, balanced if balanced < target else np.inf), target, error,
+        )  # fmt: skip
+
+    def pass_by(self, reached: float) -> Ceiling:
+        """With a try that has come so far."""
+        return replace(
+            self, failed=self.failed if self.failed > reached else np.inf,
+            free=self.free if self.free > reached else np.inf,
+            balanced=self.balanced if self.balanced > reached else np.inf,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -63,7 +118,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
             reached = begin.factor if stage == begin.stage else 0.0
-            ceiling = np.inf
+            ceiling = Ceiling()
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
                 solution, reached, ceiling = _advance(
@@ -116,39 +171,59 @@ def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Rep
 
 
 def _advance(
-    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float, ceiling: float,
+    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float, ceiling: Ceiling,
     reporter: Reporter,
-) -> tuple[Solution, float, float]:
+) -> tuple[Solution, float, Ceiling]:
     """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
 
-    ceiling: the least fraction of the stage at which a body was found to move freely, infinity if none was: it is
-    halved towards rather than tried again.
+    Raises ConvergenceError: of the last try, or "limit load".
     """
     least = problem.model.solver.min_step
-    target = planned
-    if reached < ceiling <= planned:
-        middle = 0.5 * (reached + ceiling)
-        target = middle if middle - reached >= least else ceiling
+    if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
+        raise _end_at_limit(problem, stage, reached, ceiling, ceiling.error)
+    target, proportional = ceiling.choose(reached, planned, least), is_proportional(problem, memory, stage, reached)
     while True:
         reporter.start_step(stage, reached, target)
+        # From rest nothing is gained by an early end.
+        refuse = _never if proportional else partial(_refuse, problem, memory, stage, target)
         try:
-            solution = solve_step(problem, tangent, memory, problem.evaluate_load(stage, target), reporter)
-            return solution, target, ceiling if target < ceiling else np.inf
+            load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
+            solution = solve_step(problem, tangent, memory, load, reporter, refuse, hurried)
+            return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
-            half = 0.5 * (target - reached)
-            if is_proportional(problem, memory, stage, reached):
-                raise _end_at_rest(problem, stage, target, error) from error
-            if error.reason == "free motion":
-                ceiling = min(ceiling, target)
             balanced = _find_balanced(problem, memory, stage, reached, target)
-            if balanced < target and balanced - reached < max(least, NEAR * balanced):
-                raise _end_out_of_balance(problem, stage, reached, target, error) from error
-            if balanced < target:
-                half = min(half, SAFE * (balanced - reached)) if half < least else SAFE * (balanced - reached)
+            if proportional:
+                if balanced < target and error.reason != "free motion":
+                    ceiling = ceiling.lower(target, balanced, error)
+                    raise _end_at_limit(problem, stage, reached, ceiling, error) from error
+                raise _end_at_rest(problem, stage, target, error) from error
+            ceiling = ceiling.lower(target, balanced, error)
+            if ceiling.is_reached(reached, target, least):
+                raise _end_at_limit(problem, stage, reached, ceiling, error) from error
+            half = SAFE * (balanced - reached) if balanced < target else 0.5 * (target - reached)
             if half < least:
                 raise _end_march(problem, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
             target = reached + half
+
+
+def _never(_: Memory) -> ConvergenceError | None:
+    return None
+
+
+def _refuse(problem: Problem, memory: Memory, stage: int, target: float, now: Memory) -> ConvergenceError | None:
+    """The error of a step whose loads nothing balances with the bonds that are left now; None if something may.
+
+    As the first rank finds it.
+    """
+    possible = do_on_first(problem.comm, ConvergenceError, lambda: can_balance(problem, now, stage, target))
+    if possible is not False:
+        return None
+    if np.array_equal(memory.broken, now.broken):
+        return ConvergenceError("limit load", "no forces that the contacts can carry balance the loads")
+    return ConvergenceError(
+        "limit load", "bonds fail one after the other until no forces that the contacts can carry balance the loads"
+    )
 
 
 def _find_balanced(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float:
@@ -159,14 +234,20 @@ def _find_balanced(problem: Problem, memory: Memory, stage: int, reached: float,
     return target if found is None else found
 
 
-def _end_out_of_balance(
-    problem: Problem, stage: int, reached: float, target: float, error: ConvergenceError
+def _end_at_limit(
+    problem: Problem, stage: int, reached: float, ceiling: Ceiling, error: ConvergenceError
 ) -> ConvergenceError:
+    """The error at the largest load that the contacts bear; error: of the try at ceiling.tried."""
     name = problem.model.stages[stage].name
+    known = error.reason in ("free motion", "limit load")
+    why = f"at {ceiling.tried:.6g} {error.detail if known else 'no modes of the contacts were found that settle'}"
+    if ceiling.balanced < np.inf:
+        most = f"no forces that the contacts can carry balance the loads beyond {ceiling.balanced:.6g}"
+        why = f"{why}; up to {ceiling.balanced:.6g} some could" if error.reason == "limit load" else f"{most}; {why}"
     return ConvergenceError(
         "limit load",
-        f"limit load reached at fraction {reached:.6g} of stage {name!r}: no forces that the contacts can carry "
-        f"balance the loads at {target:.6g}; there {error.detail}, or prescribe a displacement in place of the load",
+        f"limit load reached at fraction {reached:.6g} of stage {name!r}: {why}, or prescribe a displacement in place "
+        "of the load",
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.custom import asked_by_one_rank
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, is_linear, plastic_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
@@ -25,7 +25,7 @@ from pbem.contact.modes import (
 )
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset, take_subset
 from pbem.errors import ConvergenceError
-from pbem.parallel import do_on_first
+from pbem.parallel import broadcast, do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
 from pbem.solve.nearby import MOST_ASKED, is_nearby, settle_parts
@@ -63,7 +63,14 @@ STRAIN_FLOOR = 0.1
 MOST_SETTLED, MOST_SETTLED_BY_GMRES = 600, 12
 
 
-def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter) -> Solution:
+# After so many iterations, and so many more, it is asked whether anything could balance the loads.
+PATIENCE = 8
+
+
+def solve_step(
+    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None, hurried: bool = False,
+) -> Solution:
     """Converge one load step from the memory of the last.
 
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
@@ -85,7 +92,7 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(
-        most_settled if is_linear(laws) else 0, laws.follows, None if hierarchical else problem.mesh.pairs.interface
+        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~find_linear(laws)
     )
     iterations: list[Iteration] = []
     while True:
@@ -124,16 +131,24 @@ def solve_step(problem: Problem, tangent: AnyTangent, memory: Memory, load: Load
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
+        refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
+        if refused:
+            moves = do_on_first(comm, ConvergenceError, lambda now=proposal.modes: (  # type: ignore[misc]
+                hold.describe_collapse(now)))
+            raise ConvergenceError(refused.reason, refused.detail + moves)
         search.note(proposal)
-        if len(search.counts) == problem.model.solver.newton_max_iterations:
+        if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
-        chosen = cascade.modes if cascade else _pivot(
-            hold, tangent, constraints, modes, memory, load, law, solved, search
-        )
+        chosen = cascade.modes if cascade else None
+        # The first rank alone knows which pairs hold a body.
+        share = broadcast(comm, max(search.caution.share, hold.share))
+        # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
+        if not cascade and not (share > search.caution.share):
+            chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
         if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
             raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
-            chosen = limit_changes(modes, proposal, search.caution.share)
+            chosen = limit_changes(modes, proposal, share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
         slipped = plastic_slip(laws, pairs) - memory.slip
@@ -168,8 +183,15 @@ def _pivot(
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
     judge = _make_judge(problem, solved, search.caution)
 
+    # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
+    alone = search.excluded
+    start = ModeState(
+        np.where(alone, search.proposal.modes.mode, modes.mode).astype(np.int8),
+        np.where(alone, search.proposal.modes.sign, modes.sign),
+    )
+
     def complete(own: ModeState) -> ModeState:
-        mode, sign = modes.mode.copy(), modes.sign.copy()
+        mode, sign = start.mode.copy(), start.sign.copy()
         mode[group], sign[group] = own.mode, own.sign
         return follow_leaders(problem.laws, ModeState(mode, sign))
 
@@ -183,7 +205,7 @@ def _pivot(
 
     found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
-    if search.conclude(found) and not len(hold.pairs):
+    if search.conclude(found) and not broadcast(problem.comm, len(hold.pairs)):
         raise _end(hold, "no admissible modes", search.proposal, search)
     if found.modes is None:
         return None

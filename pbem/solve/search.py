@@ -50,6 +50,8 @@ CAUTIONS = (
 
 # Changes that fall to no less than this part of the fewest before are a sign of pairs that disturb each other.
 SLOW = 0.5
+# Iterations in which the number of changes should have fallen.
+LONG = 10
 # Iterations that are plain Newton steps whatever they change.
 PLAIN = 3
 # Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
@@ -61,15 +63,17 @@ FUTILE = 6
 class Search:
     """Watches the changes of modes and says what comes next; the same on all ranks, from the same proposals.
 
-    most_pivoted: the largest group of pairs that is solved by pivoting. follows (m,): pairs that take the mode of
-    another one, which are in no such group. interface (m,): of each pair, in order along it; given where larger groups
-    cost little: then ever more neighbours join the pairs that change beside a group which has been solved.
+    most_pivoted: the largest group of pairs that is solved by pivoting. interface (m,): of each pair, in order along
+    it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
+    has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
+    is not linear.
     """
 
     def __init__(
-        self, most_pivoted: int, follows: NDArray[np.bool_] | None = None, interface: Integer | None = None
+        self, most_pivoted: int, interface: Integer | None = None, excluded: NDArray[np.bool_] | None = None
     ) -> None:
-        self.most_pivoted, self.follows, self.interface = most_pivoted, follows, interface
+        self.most_pivoted, self.interface = most_pivoted, interface
+        self.excluded: NDArray[np.bool_] = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.restart()
 
     def restart(self) -> None:
@@ -92,11 +96,15 @@ class Search:
     def note(self, proposal: Proposal) -> None:
         """Take note of what the last solution asks for."""
         self.proposal = proposal
-        own = proposal.changed if self.follows is None else proposal.changed & ~self.follows
-        self.changed.append(np.flatnonzero(own))
+        self.changed.append(np.flatnonzero(proposal.changed & ~self.excluded))
         self.counts.append(int(proposal.changed.sum()))
         if not self.counts[-1] and self.level and not self.returned:
             self.level, self.returned = 0, True
+
+    def is_stuck(self) -> bool:
+        """Whether in the last LONG iterations no fewer pairs changed than at best in as many or more before."""
+        before, lately = self.counts[:-LONG], self.counts[-LONG:]
+        return len(before) >= LONG and min(lately) >= max(1, min(before))
 
     def choose_group(self) -> Integer:
         """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
@@ -124,7 +132,7 @@ class Search:
         near = pairs[:, None] + np.arange(-reach, reach + 1)
         inside = np.clip(near, 0, len(self.interface) - 1)
         near = inside[(near == inside) & (self.interface[inside] == self.interface[pairs][:, None])]
-        return np.unique(near if self.follows is None else near[~self.follows[near]])
+        return np.unique(near[~np.broadcast_to(self.excluded, self.interface.shape)[near]])
 
     def conclude(self, found: Settled) -> bool:
         """Take note of what pivoting found for the group; True if there seems to be nothing to be found.

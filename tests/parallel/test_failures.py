@@ -109,7 +109,8 @@ def test_a_run_that_finds_no_equilibrium_returns_3(ranks: int, folder: Path, mpi
     assert done.stderr.count("pbem: not converged: limit load: limit load reached at fraction 0.5") == 1
     assert "translation along x of 'upper'" in done.stderr and "away.h5 holds every step reached" in done.stderr
     assert "Traceback" not in done.stderr
-    assert "the step is halved" in done.stdout
+    # What forces could balance tells the limit at once: no step is halved towards it.
+    assert "the step is halved" not in done.stdout
     results = open_results(folder / "away.h5")
     assert results.status == "failed"
     assert results.failure.startswith("limit load: limit load reached at fraction 0.5")
@@ -185,3 +186,24 @@ def test_a_step_that_cannot_be_stored_ends_all_ranks_and_keeps_those_before(
     results = open_results(folder / "blocks.h5")
     assert (results.status, len(results.steps)) == ("failed", 2)
     assert "No space left on device" in results.failure
+
+
+# Bonds that fail one after the other under a push that all of them together would bear.
+UNZIPS = SLIDES_AWAY.replace(
+    "friction = 0.2", "friction = 0.2\ncohesion = 0.15\ntensile_strength = 0.5\ncohesion_lost = true"
+).replace("tx = 0.4", "tx = 0.33")
+
+
+@pytest.mark.parametrize("name", ["can_balance", "find_balanced_fraction"])
+def test_what_forces_could_balance_is_asked_on_the_first_rank_alone(
+    name: str, folder: Path, mpirun_snippet: Launch
+) -> None:
+    (folder / "away.toml").write_text(UNZIPS)
+    told = []
+    for rank in (0, 1):
+        arguments = (str(rank), "pbem.solve.march", name, "1", "ConvergenceError('asked', 'on this rank')")
+        done = mpirun_snippet(2, BROKEN, *arguments, "run", "away.toml", "--quiet", "--force", cwd=folder, timeout=SOON)
+        assert done.returncode == 3, done.stderr
+        told.append(done.stderr)
+    # It is asked, and what the first rank finds holds for both: the second one is not.
+    assert "asked" in told[0] and "asked" not in told[1] and told[1].count("bonds fail one after the other") == 1

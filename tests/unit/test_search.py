@@ -44,7 +44,7 @@ def test_pairs_that_changed_lately_are_pivoted_once_their_number_does_not_fall()
 def test_neighbours_join_where_pairs_change_beside_groups_that_were_solved() -> None:
     interface = np.repeat([0, 1], [12, COUNT - 12])
     follows = np.arange(COUNT) == 8
-    search = Search(50, follows, interface)
+    search = Search(50, interface, follows)
     found = Settled(make_modes(SLIP, count=COUNT), False, 0, np.zeros(0, dtype=bool))
     assert follow(search, [10], [10], [10], [10])[-1] == [10]
     search.conclude(found)
@@ -122,3 +122,26 @@ def test_failures_after_many_choices_end_a_search_in_time() -> None:
     search.restart()
     follow(search, [1, 2], [1, 2], [1, 2], [1, 2])
     assert not any(search.conclude(fail(False, 1)) for _ in range(2 * FUTILE))
+
+
+def test_pairs_that_are_excluded_are_in_no_group() -> None:
+    excluded = np.isin(np.arange(COUNT), [2, 4])
+    search = Search(50, excluded=excluded)
+    assert follow(search, [1, 2], [1, 2], [1, 2], [1, 2, 4])[-1] == [1]
+    assert follow(Search(50, excluded=excluded), [2], [2], [2], [2, 4])[-1] == []
+
+
+def test_a_search_is_stuck_where_no_fewer_pairs_change_for_long() -> None:
+    falling, level = Search(50), Search(50)
+    follow(falling, *(list(range(count)) for count in range(60, 30, -1)))
+    assert not falling.is_stuck()
+    follow(level, *[list(range(40))] * 19)
+    assert not level.is_stuck()
+    follow(level, list(range(41)))
+    assert level.is_stuck()
+    # No change at all is no sign of it: the laws still settle.
+    follow(level, [])
+    assert not level.is_stuck()
+    still = Search(50)
+    follow(still, *[[]] * 25)
+    assert not still.is_stuck()

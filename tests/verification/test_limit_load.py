@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pbem.contact.laws import start_memory
@@ -11,7 +13,7 @@ from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve import march
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.limit_load import find_balanced_fraction
+from pbem.solve.limit_load import can_balance, find_balanced_fraction
 from tests.verification.proofs.proof import write_case
 from tests.verification.test_settling import BLOCKS, Listener, run
 
@@ -82,3 +84,51 @@ def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: 
     with pytest.raises(ConvergenceError) as caught:
         next(march.march(assembled, Listener(), start))
     assert caught.value.reason == "mode cycle"
+
+
+BONDED = {"friction": 0.25, "cohesion": 0.3, "tensile_strength": 0.5, "cohesion_lost": True}
+
+
+def test_bonds_that_all_fail_in_turn_end_at_a_limit_load() -> None:
+    # All bonds together bear 0.55, friction alone 0.25; they fail from an end on, where the stress is largest.
+    text = write_pushed_block(0.5, BONDED)
+    assert find(text) == 1.0
+
+    class Counter(Listener):
+        iterations = 0
+
+        def iterate(self, iteration: object) -> None:
+            self.iterations += 1
+
+    counter = Counter()
+    with pytest.raises(ConvergenceError, match=r"bonds fail one after the other.*translation along x") as caught:
+        run(text, counter)
+    assert caught.value.reason == "limit load"
+    assert counter.tried <= 12 and counter.iterations <= 8 * counter.tried
+
+
+@pytest.mark.parametrize(("shear", "intact", "lost"), [(0.2, True, True), (0.4, True, False), (0.6, False, False)])
+def test_whether_the_loads_can_be_balanced_depends_on_the_bonds_that_are_left(
+    shear: float, intact: bool, lost: bool
+) -> None:
+    model = parse_model(write_pushed_block(shear, BONDED))[1]
+    problem = assemble_problem(model, generate_mesh(model), world)
+    memory = start_memory(problem.laws)
+    assert can_balance(problem, memory, 1, 1.0) is intact
+    assert can_balance(problem, replace(memory, broken=problem.laws.brittle), 1, 1.0) is lost
+
+
+def test_what_is_known_to_fail_is_not_tried_again_before_it_is_near() -> None:
+    fails = ConvergenceError("mode cycle", "")
+    ceiling = march.Ceiling().lower(1.0, 1.0, fails).lower(0.5, 0.5, fails)
+    assert ceiling.choose(0.25, 1.0, 1e-4) == 0.5
+    assert ceiling.pass_by(0.5).choose(0.5, 1.0, 1e-4) == 1.0
+    # A body that is free at a fraction is free there from everywhere; and beyond what forces balance nothing is.
+    free = march.Ceiling().lower(0.5, 0.5, ConvergenceError("free motion", ""))
+    assert free.choose(0.25, 1.0, 1e-4) == 0.375
+    limited = march.Ceiling().lower(1.0, 0.4, fails)
+    assert 0.39 < limited.choose(0.1, 1.0, 1e-4) < 0.4
+    assert not limited.is_reached(0.3, 1.0, 1e-4) and limited.is_reached(0.395, 1.0, 1e-4)
+    # Tries that fail are a limit load only where there is one.
+    assert not ceiling.is_reached(0.499, 1.0, 1e-4)
+    assert limited.lower(0.35, 0.35, fails).is_reached(0.345, 1.0, 1e-4)

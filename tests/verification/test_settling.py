@@ -104,6 +104,24 @@ def test_three_branches_with_30_degrees_between_settle(load: Load, friction: flo
     assert (step.contact.mode == OPEN).any() and (step.contact.mode == SLIP).any()
 
 
+@pytest.mark.parametrize(
+    ("load", "friction"), [((1.0, -10.0, 0.0), 0.3), ((0.2, -1.0, 0.6), 0.8), ((-1.0, -1.0, 1.5), 0.8)]
+)
+def test_friction_that_weakens_on_one_crack_leaves_the_others_to_pivoting(load: Load, friction: float) -> None:
+    curves = make_junction(0, 30, 60, elements=12) | {"far": line(4 + 3j, 5 + 4j, 6)}
+    head, tail = write_plane(curves, {"friction": friction}, load).split("\nfar = { friction = ")
+    weakens = f"{friction}, friction_dynamic = {friction / 2}, slip_distance = 1e-3"
+    steps = run(f"{head}\nfar = {{ friction = {weakens}{tail[tail.index(' }'):]}")
+    assert [len(step.iterations) <= 12 for step in steps] == [True]
+
+
+@pytest.mark.parametrize("load", [(1.0, -10.0, 0.0), (0.2, -1.0, 0.6), (-1.0, -1.0, 1.5)])
+def test_pairs_of_weakening_friction_change_while_their_neighbours_are_pivoted(load: Load) -> None:
+    text = write_plane(make_junction(0, 30, 60, elements=12), {"friction": 0.8}, load)
+    weakens = "\nb0 = { friction = 0.8, friction_dynamic = 0.5, slip_distance = 0.01"
+    steps = run(text.replace("\nb0 = { friction = 0.8", weakens))
+    assert [len(step.iterations) <= 12 for step in steps] == [True]
+
 LOADS: tuple[Load, ...] = ((1.0, -10.0, 0.0), (0.3, -1.0, 0.2), (-0.3, 1.0, 0.2), (1.0, -1.0, 0.0), (-1.0, -3.0, 1.0))
 
 

@@ -171,7 +171,7 @@ def test_a_crack_drawn_twice_is_refused() -> None:
     crack = 'curves.k = {{ points = [[-1, {y}], [0.5, {y}]], elements = 6 }}\n'
     text = PLANE.replace('infinite = true', 'infinite = true, cracks = ["j", "k"]').replace("[0, 0]", "[0, 9]")
     text += "curves.j = { points = [[0, 3], [1, 3]], elements = 6 }\nremote.syy = -1.0\n"
-    with pytest.raises(CaseError, match=r"curve 'j' beside curve 'k', at most 1e-06 apart"):
+    with pytest.raises(CaseError, match=r"curve 'k' beside curve 'j', at most 1e-06 apart"):
         build(text + crack.format(y=3.000001))
     build(text + crack.format(y=3.01))
 

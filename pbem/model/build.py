@@ -124,7 +124,8 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
 def _find_topology(case: Case, roles: Roles) -> _Topology:
     shapes = shape_curves(case, roles)
     split = split_at_junctions(shapes.curves, shapes.tolerance)
-    curves, opposite = split.curves, {}
+    curves = split.curves
+    opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
     # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.
     touching = {

@@ -235,13 +235,42 @@ def test_schemes_choose_the_equation_of_every_side(scheme: str, listed: str) -> 
     for region in mesh.region_names:
         for curve in mesh.curve_names:
             nodes = select(mesh, region, curve)
-            if nodes.any() and mesh.traction_equation[nodes].all():
+            by_element = mesh.traction_equation[nodes].reshape(-1, 3)
+            # The elements at both ends keep the displacement equation: corners, but on circles and cracks.
+            inner = slice(1, -1) if curve in SQUARE else slice(None)
+            if nodes.any() and by_element[inner].all():
                 found[region].add(curve)
+                assert by_element.sum() == by_element[inner].size
             else:
-                assert not mesh.traction_equation[nodes].any()
+                assert not by_element.any()
     expected = {name: set(curves) for name, curves in EQUATIONS[scheme].items()}
     expected["lower"].add("crack")
     assert found == expected
+
+
+@pytest.mark.parametrize("grading", ["none", "both"])
+def test_a_corner_within_a_curve_keeps_the_displacement_equation(grading: str) -> None:
+    # The angle of an L is one curve of two legs; where legs go straight on nothing is singular.
+    outline = {"angle": [2 + 0j, 2 + 1j, 1 + 1j, 1 + 2j], "rest": [1 + 2j, 2j, 1j, 0j, 2 + 0j]}
+    body = Body(outline, {"l": (ROCK, list(outline))}, {"rest": {"ux": 0.0, "uy": 0.0}},
+                elements=12, grading=grading, scheme="THST")  # fmt: skip
+    model, mesh = mesh_body(body)
+    for curve, straight in (("angle", ()), ("rest", (2,))):  # joints of the legs; the second of the rest is at 1j
+        by_element = mesh.traction_equation[select(mesh, "l", curve)].reshape(-1, 3).all(axis=1)
+        joints = np.cumsum([leg.elements for leg in model.curves[curve].legs])[:-1]
+        corners = np.delete(joints, [number - 1 for number in straight])
+        expected = np.ones(len(by_element), dtype=bool)
+        expected[[0, -1, *(corners - 1), *corners]] = False
+        np.testing.assert_array_equal(by_element, expected)
+
+
+def test_a_curve_of_corner_elements_alone_is_told() -> None:
+    regions = {"lower": (ROCK, ["bottom", "right", "joint", "left"]), "upper": (ROCK, ["joint", "right2", "top", "left2"])}
+    _, mesh = mesh_body(Body(SQUARE, regions, {"bottom": {"ux": 0.0, "uy": 0.0}}, {"joint": {"law": "bonded"}},
+                             elements=2, scheme="HST"))  # fmt: skip
+    assert not mesh.traction_equation.any()
+    told = [note for note in mesh.notes if "too few elements for HST" in note]
+    assert len(told) == 1 and "'joint'" in told[0]
 
 
 @pytest.mark.parametrize(("scheme", "loops"), [("SST", 0), ("DBEM", 0), ("HST", 1), ("THST", 2)])

@@ -266,8 +266,8 @@ def test_a_corner_within_a_curve_keeps_the_displacement_equation(grading: str) -
 
 def test_a_curve_of_corner_elements_alone_is_told() -> None:
     regions = {"lower": (ROCK, ["bottom", "right", "joint", "left"]), "upper": (ROCK, ["joint", "right2", "top", "left2"])}
-    _, mesh = mesh_body(Body(SQUARE, regions, {"bottom": {"ux": 0.0, "uy": 0.0}}, {"joint": {"law": "bonded"}},
-                             elements=2, scheme="HST"))  # fmt: skip
+    laws, held = {"joint": {"law": "bonded"}}, {"bottom": {"ux": 0.0, "uy": 0.0}}
+    _, mesh = mesh_body(Body(SQUARE, regions, held, laws, elements=2, scheme="HST"))
     assert not mesh.traction_equation.any()
     told = [note for note in mesh.notes if "too few elements for HST" in note]
     assert len(told) == 1 and "'joint'" in told[0]

@@ -10,6 +10,7 @@ import pytest
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.model.build import parse_model
 from pbem.model.model import Model
 from tests.identities.bodies import ROCK, Body, mesh_body
 
@@ -264,8 +265,29 @@ def test_a_corner_within_a_curve_keeps_the_displacement_equation(grading: str) -
         np.testing.assert_array_equal(by_element, expected)
 
 
+@pytest.mark.parametrize(("scheme", "beside", "opposite"),
+                         [("DBEM", False, True), ("HST", False, True), ("THST", True, True), ("SST", False, False)])
+def test_free_parts_of_a_face_in_contact_have_the_equation_of_free_faces(
+    scheme: str, beside: bool, opposite: bool
+) -> None:
+    # A narrow block on a wide one, whose top is the contact's second curve.
+    outline = {"wide": [0j, 3 + 0j, 3 + 1j], "face": [3 + 1j, 1j], "rest": [1j, 0j], "foot": [1 + 1j, 2 + 1j],
+               "above": [2 + 1j, 2 + 2j, 1 + 2j, 1 + 1j]}  # fmt: skip
+    regions = {"a": (ROCK, ["wide", "face", "rest"]), "b": (ROCK, ["foot", "above"])}
+    held = {"wide": {"ux": 0.0, "uy": 0.0}}
+    body = Body(outline, regions, held, elements=18, grading="both", scheme=scheme)
+    mesh = generate_mesh(parse_model(body.write() + '\n[contacts.k]\nbetween = ["foot", "face"]\n')[1])
+    own = select(mesh, "a", "face")
+    by_element = mesh.traction_equation[own].reshape(-1, 3).all(axis=1)
+    x = mesh.position[own].real.reshape(-1, 3).mean(axis=1)
+    middle = (x > 1) & (x < 2)
+    assert by_element[middle].sum() == opposite * (middle.sum() - 2)
+    assert by_element[~middle].sum() == beside * ((~middle).sum() - 4)
+
+
 def test_a_curve_of_corner_elements_alone_is_told() -> None:
-    regions = {"lower": (ROCK, ["bottom", "right", "joint", "left"]), "upper": (ROCK, ["joint", "right2", "top", "left2"])}
+    lower, upper = ["bottom", "right", "joint", "left"], ["joint", "right2", "top", "left2"]
+    regions = {"lower": (ROCK, lower), "upper": (ROCK, upper)}
     laws, held = {"joint": {"law": "bonded"}}, {"bottom": {"ux": 0.0, "uy": 0.0}}
     _, mesh = mesh_body(Body(SQUARE, regions, held, laws, elements=2, scheme="HST"))
     assert not mesh.traction_equation.any()

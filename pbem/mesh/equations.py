@@ -1,10 +1,12 @@
-"""Which boundary integral equation is collocated on which side: the four schemes and their two exceptions."""
+"""Which boundary integral equation is collocated on which side: the four schemes and their exceptions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from pbem.case.finding import list_names
+from pbem.model.curve import Curve
 from pbem.model.facing import Strip, find_strips
 from pbem.model.model import Model, Region
 
@@ -15,19 +17,21 @@ MOST_NOTES = 6
 @dataclass(frozen=True)
 class Equations:
     """traction: for every (number of the region, curve) on its loops, whether the traction equation (else the
-    displacement equation) is collocated on each leg of the curve, in the curve's own direction; notes: exceptions."""
+    displacement equation) is collocated on each element of the curve, in the curve's own direction; notes: exceptions.
+    """
 
     traction: Mapping[tuple[int, str], tuple[bool, ...]]
     notes: tuple[str, ...]
 
 
 def choose_equations(model: Model) -> Equations:
-    """What the scheme asks for, but for two exceptions.
+    """What the scheme asks for, but for three exceptions.
 
     A rigid motion of a closed inner curve produces nothing in the region outside it through the traction equation, so
     that an inner loop always keeps the displacement equation; with DBEM the side across it takes the traction equation.
     Traction equations on both faces of a narrow slot say nearly the same: there one of the faces keeps the displacement
     equation, as on the faces of a crack; both do on the faces of a thin part, which a traction equation hardly bends.
+    Elements at corners, ends of contact and changes of condition keep the displacement equation, see `_keep_ends`.
     """
     inner = find_inner_curves(model)
     traction: dict[tuple[int, str], tuple[bool, ...]] = {}
@@ -45,11 +49,38 @@ def choose_equations(model: Model) -> Equations:
             legs = traction[number, curve]
             traction[number, curve] = tuple(asks and (curve, leg) not in kept for leg, asks in enumerate(legs))
         notes += _explain_strips(model, region, strips, kept)
+    elements = {
+        (number, curve): _keep_ends(model.curves[curve], legs) for (number, curve), legs in traction.items()
+    }
+    lost = dict.fromkeys(curve for (number, curve), legs in traction.items()
+                         if any(legs) and not any(elements[number, curve]))  # fmt: skip
     if len(notes) > MOST_NOTES:
         scheme = model.analysis.scheme
         notes = [f"{len(notes)} curves keep the displacement equation as one face of a slot or thin part: "
                  f"{scheme} has traction equations on both faces, which do not tell them apart"]  # fmt: skip
-    return Equations(traction, (*_explain_inner_loops(model, inner), *notes))
+    if lost:
+        names = list_names([f"'{curve}'" for curve in lost], MOST_NOTES)
+        notes.append(f"too few elements for {model.analysis.scheme}: all of those of {names} are at corners or ends of "
+                     "contact, where they keep the displacement equation")  # fmt: skip
+    return Equations(elements, (*_explain_inner_loops(model, inner), *notes))
+
+
+def _keep_ends(curve: Curve, legs: Sequence[bool]) -> tuple[bool, ...]:
+    """Whether each element has the traction equation, if each leg does but for its elements at singular ends.
+
+    Elements do not share nodes: displacements may jump between them. Beside a singular point, where shapes follow them
+    badly, they do; a traction equation hardly opposes a jump, which costs it no more than the logarithm of the distance
+    over the length of the elements. In the element next to the point the displacement equation fixes it.
+    """
+    result: list[bool] = []
+    for leg, asks in zip(curve.legs, legs, strict=True):
+        own = [asks] * leg.elements
+        if leg.singular_start:
+            own[0] = False
+        if leg.singular_end:
+            own[-1] = False
+        result += own
+    return tuple(result)
 
 
 def _cover_strips(strips: Sequence[Strip]) -> set[tuple[str, int]]:

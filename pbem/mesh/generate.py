@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import divide_curve
 from pbem.mesh.equations import Equations, choose_equations
 from pbem.mesh.facing import describe_sparse_meshes
-from pbem.mesh.mesh import Mesh, Pairs
+from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.pairing import pair_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
 from pbem.model.model import Model
@@ -25,6 +26,7 @@ def generate_mesh(model: Model) -> Mesh:
     curve_names = tuple(model.curves)
     number = {name: at for at, name in enumerate(curve_names)}
     pairs, links = pair_nodes(model, chains)
+    faces_nothing = _find_free_elements(model, chains, pairs, links)
 
     def repeat(values: list, dtype: type) -> np.ndarray:
         return np.repeat(np.array(values, dtype=dtype), counts)
@@ -47,7 +49,7 @@ def generate_mesh(model: Model) -> Mesh:
         position=join(lambda chain: chain.elements.place(chain.local)),
         normal=join(lambda chain: chain.elements.normals(chain.local)),
         weight=join(lambda chain: chain.elements.weights(chain.local)),
-        traction_equation=np.repeat(join(lambda chain: chain.traction), order + 1),
+        traction_equation=np.repeat(join(lambda chain: chain.traction) & ~faces_nothing, order + 1),
         pairs=pairs,
         links=links,
         region_names=tuple(region.name for region in model.regions),
@@ -57,6 +59,18 @@ def generate_mesh(model: Model) -> Mesh:
     )
 
 
+def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: Links) -> NDArray[np.bool_]:
+    """Elements (elements,) of curves in contact that meet nothing of the other curve.
+
+    They are free surface, and with HST and DBEM keep the displacement equation like any other.
+    """
+    faces = {name for contact in model.contacts.values() for name in (contact.first, contact.second)}
+    free = np.concatenate([np.full(chain.elements.count, chain.curve in faces) for chain in chains])
+    for nodes in (pairs.slot, links.displacement_node, links.traction_node):
+        free[nodes // (model.analysis.order + 1)] = False
+    return free & (model.analysis.scheme != "THST")
+
+
 def _list_chains(model: Model, equations: Equations) -> list[Chain]:
     order = model.analysis.order
     chains: list[Chain] = []
@@ -64,14 +78,12 @@ def _list_chains(model: Model, equations: Equations) -> list[Chain]:
     for number, region in enumerate(model.regions):
         sides = [(side.curve, side.forward, False) for loop in region.loops for side in loop.sides]
         for curve, forward, crack in [*sides, *((crack, True, True) for crack in region.cracks)]:
-            legs = model.curves[curve].legs
-            # A crack always has the traction equation.
-            traction = (True,) * len(legs) if crack else equations.traction[number, curve]
-            by_element = np.repeat(traction, [leg.elements for leg in legs])
             elements = divide_curve(model.curves[curve])
+            # A crack always has the traction equation.
+            traction = np.array(equations.traction[number, curve]) if not crack else np.full(elements.count, True)
             if not forward:
-                elements, by_element = elements.reverse(), by_element[::-1]
-            chains.append(Chain(number, curve, forward, crack, by_element, elements, first_node, order))
+                elements, traction = elements.reverse(), traction[::-1]
+            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order))
             first_node += elements.count * (order + 1)
     return chains
 

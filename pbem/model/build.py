@@ -45,6 +45,7 @@ MOST_FAULTS = 5
 class _Topology:
     curves: Mapping[str, Curve]
     breaks: Mapping[str, tuple[complex, ...]]
+    opposite: Mapping[str, Mapping[complex, tuple[str, complex]]]
     loops: Loops
     tips: Mapping[str, tuple[bool, bool]]
     size: float
@@ -124,6 +125,7 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     shapes = shape_curves(case, roles)
     split = split_at_junctions(shapes.curves, shapes.tolerance)
     curves = split.curves
+    opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
     # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.
     touching = {
@@ -144,12 +146,13 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         notes += cuts
     if not faults:
         written = {name for name in curves if case.curves[name].expression}
-        curves, opposite = split_opposite_ends(curves, loops, roles.contacts, written)
-        notes += opposite
+        seats = split_opposite_ends(curves, loops, roles.contacts, written)
+        curves, opposite = seats.curves, seats.opposite
+        notes += seats.notes
     tips = find_tips(curves, cracks)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, loops, tips, shapes.size, tuple(notes), tuple(faults))
+    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
@@ -165,7 +168,9 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
     behaviour |= {curve: ("contact", name) for curve, name in roles.in_contact.items()}
     with_tips = frozenset(roles.cracks) if case.analysis.tips else frozenset()
     partners = {curve: other for pair in roles.contacts.values() for curve, other in (pair, pair[::-1])}
-    curves, grading = grade_curves(case, topology.curves, topology.breaks, behaviour, with_tips, partners)
+    curves, grading = grade_curves(
+        case, topology.curves, topology.breaks, behaviour, with_tips, partners, topology.opposite
+    )
     materials = {
         name: Material(name, table.young, table.poisson, table.plane, table.density)
         for name, table in case.materials.items()

@@ -18,7 +18,7 @@ class Leg:
     A circular leg has its `center` and the signed angle `sweep` (radians, counter-clockwise positive) it runs
     through. Element ends lie at t^power from every refined end (t uniform); with no refined end they are uniform.
     Where `fractions` (elements + 1, rising from 0 to 1) is given, the element ends lie at these fractions of the
-    length instead.
+    length instead. At a `singular` end stress may be infinite or jump, whether or not it is refined.
     """
 
     start: complex
@@ -30,6 +30,8 @@ class Leg:
     center: complex | None = None
     sweep: float = 0.0
     fractions: tuple[float, ...] | None = None
+    singular_start: bool = False
+    singular_end: bool = False
 
     @property
     def length(self) -> float:
@@ -57,14 +59,20 @@ class Leg:
         return replace(
             self, start=self.end, end=self.start, sweep=-self.sweep,
             refine_start=self.refine_end, refine_end=self.refine_start,
+            singular_start=self.singular_end, singular_end=self.singular_start,
             fractions=None if self.fractions is None else tuple(1.0 - t for t in reversed(self.fractions)),
         )
 
     def split(self, t: float, elements: tuple[int, int]) -> tuple[Leg, Leg]:
-        """Two legs that meet at the fraction t, with the given numbers of elements and no refined ends at t."""
+        """Two legs that meet smoothly at the fraction t, with the given numbers of elements, not refined there."""
         middle, whole = complex(self.point(np.array(t))), replace(self, fractions=None)
-        first = replace(whole, end=middle, elements=elements[0], sweep=self.sweep * t, refine_end=False)
-        second = replace(whole, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False)
+        first = replace(
+            whole, end=middle, elements=elements[0], sweep=self.sweep * t, refine_end=False, singular_end=False
+        )
+        second = replace(
+            whole, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False,
+            singular_start=False,
+        )
         return first, second
 
     def element_fractions(self) -> NDArray[np.float64]:

@@ -45,6 +45,16 @@ class Sight:
 
 
 @dataclass(frozen=True)
+class Seats:
+    """curves: with legs that end opposite the ends of curves in contact; opposite: per curve the points where they do,
+    each with the curve that ends there and the point at which it ends; notes: a sentence for each."""
+
+    curves: Mapping[str, Curve]
+    opposite: Mapping[str, Mapping[complex, tuple[str, complex]]]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Strip:
     """Two legs of one region's boundary, each (curve, number of the leg), with a narrow strip in between.
 
@@ -144,7 +154,7 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
 
 def split_opposite_ends(
     curves: Mapping[str, Curve], loops: Loops, contacts: Mapping[str, tuple[str, str]], kept: Set[str] = frozenset()
-) -> tuple[dict[str, Curve], list[str]]:
+) -> Seats:
     """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
 
     Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well, and
@@ -153,22 +163,25 @@ def split_opposite_ends(
     """
     sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
     result, notes = dict(curves), []
+    opposite: dict[str, dict[complex, tuple[str, complex]]] = {}
     for pair in contacts.values():
         for name, other in (pair, pair[::-1]):
             if name in kept or name not in sides or other not in sides:
                 continue
-            cuts: dict[int, list[float]] = {}
+            cuts: dict[int, dict[float, complex]] = {}
             for end, normal in _outward_ends(curves[other], sides[other]):
                 found = _find_opposite(curves[name], sides[name].forward, end, normal, curves[other].length)
                 if found is not None:
-                    cuts.setdefault(found[0], []).append(found[1])
+                    cuts.setdefault(found[0], {})[found[1]] = end
             legs = []
             for number, leg in enumerate(result[name].legs):
                 points = {complex(leg.point(np.array(t))): t for t in cuts.get(number, ())}
                 legs += split_leg(leg, points)
+                for at, t in points.items():
+                    opposite.setdefault(name, {})[at] = (other, cuts[number][t])
                 notes += [f"'{name}' is split at {format_point(at)}, opposite an end of '{other}'." for at in points]
             result[name] = Curve(name, tuple(legs))
-    return result, notes
+    return Seats(result, opposite, tuple(notes))
 
 
 def _outward_ends(curve: Curve, side: Side) -> list[tuple[complex, complex]]:

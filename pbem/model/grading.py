@@ -35,34 +35,38 @@ def grade_curves(
     behaviour: Mapping[str, Hashable],
     tip_elements: frozenset[str],
     partners: Mapping[str, str],
+    opposite: Mapping[str, Mapping[complex, tuple[str, complex]]],
 ) -> tuple[dict[str, Curve], tuple[str, ...]]:
-    """Set the refined ends of every leg, and say in sentences which were chosen.
+    """Set the refined and the singular ends of every leg, and say in sentences which are refined by choice.
 
     behaviour: what a curve does, equal for two curves if the solution may go on smoothly from one to the other;
     tip_elements: cracks whose tips have elements of their own shape and need no refinement; partners: curve to the one
-    that it is in contact with, which it may pass by.
+    that it is in contact with, which it may pass by; opposite: points of a curve that an end of its partner faces, at
+    whatever distance: a corner there presses into the curve, whose stress is as singular as that of the corner.
     """
     meetings = _collect(curves)
 
     def is_singular(name: str, point: complex) -> bool:
         meeting = _leave_out_partner(meetings[point], partners.get(name))
-        return _is_singular(meeting, behaviour, tip_elements)
+        if _is_singular(meeting, behaviour, tip_elements):
+            return True
+        other, end = opposite.get(name, {}).get(point, (None, point))
+        return other is not None and is_singular(other, end)
 
     result = {}
     for name, curve in curves.items():
-        grading = case.curves[name].grading
-        if case.curves[name].expression:  # its legs are its elements
-            result[name] = curve
-            continue
-        if grading == "auto":
-            wanted = [
-                (is_singular(name, leg.start), is_singular(name, leg.end)) for leg in curve.legs
-            ]
-        else:
-            wanted = _explicit(curve, grading, breaks.get(name, ()), case.curves[name].center is not None)
+        singular = [(is_singular(name, leg.start), is_singular(name, leg.end)) for leg in curve.legs]
+        grading, wanted = case.curves[name].grading, singular
+        if case.curves[name].expression:  # its legs are its elements, and their corners none of the curve's
+            last = len(curve.legs) - 1
+            singular = [(a and at == 0, b and at == last) for at, (a, b) in enumerate(singular)]
+            wanted = [(leg.refine_start, leg.refine_end) for leg in curve.legs]
+        elif grading != "auto":
+            met = (*breaks.get(name, ()), *(at for at in opposite.get(name, ()) if is_singular(name, at)))
+            wanted = _explicit(curve, grading, met, case.curves[name].center is not None)
         legs = [
-            replace(leg, refine_start=start, refine_end=end)
-            for leg, (start, end) in zip(curve.legs, wanted, strict=True)
+            replace(leg, refine_start=start, refine_end=end, singular_start=singular_start, singular_end=singular_end)
+            for leg, (start, end), (singular_start, singular_end) in zip(curve.legs, wanted, singular, strict=True)
         ]
         result[name] = Curve(name, tuple(legs))
     return result, _describe(case, result)

@@ -10,6 +10,7 @@ import pytest
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.model.build import parse_model
 from pbem.model.model import Model
 from tests.identities.bodies import ROCK, Body, mesh_body
 
@@ -235,13 +236,63 @@ def test_schemes_choose_the_equation_of_every_side(scheme: str, listed: str) -> 
     for region in mesh.region_names:
         for curve in mesh.curve_names:
             nodes = select(mesh, region, curve)
-            if nodes.any() and mesh.traction_equation[nodes].all():
+            by_element = mesh.traction_equation[nodes].reshape(-1, 3)
+            # The elements at both ends keep the displacement equation: corners, but on circles and cracks.
+            inner = slice(1, -1) if curve in SQUARE else slice(None)
+            if nodes.any() and by_element[inner].all():
                 found[region].add(curve)
+                assert by_element.sum() == by_element[inner].size
             else:
-                assert not mesh.traction_equation[nodes].any()
+                assert not by_element.any()
     expected = {name: set(curves) for name, curves in EQUATIONS[scheme].items()}
     expected["lower"].add("crack")
     assert found == expected
+
+
+@pytest.mark.parametrize("grading", ["none", "both"])
+def test_a_corner_within_a_curve_keeps_the_displacement_equation(grading: str) -> None:
+    # The angle of an L is one curve of two legs; where legs go straight on nothing is singular.
+    outline = {"angle": [2 + 0j, 2 + 1j, 1 + 1j, 1 + 2j], "rest": [1 + 2j, 2j, 1j, 0j, 2 + 0j]}
+    body = Body(outline, {"l": (ROCK, list(outline))}, {"rest": {"ux": 0.0, "uy": 0.0}},
+                elements=12, grading=grading, scheme="THST")  # fmt: skip
+    model, mesh = mesh_body(body)
+    for curve, straight in (("angle", ()), ("rest", (2,))):  # joints of the legs; the second of the rest is at 1j
+        by_element = mesh.traction_equation[select(mesh, "l", curve)].reshape(-1, 3).all(axis=1)
+        joints = np.cumsum([leg.elements for leg in model.curves[curve].legs])[:-1]
+        corners = np.delete(joints, [number - 1 for number in straight])
+        expected = np.ones(len(by_element), dtype=bool)
+        expected[[0, -1, *(corners - 1), *corners]] = False
+        np.testing.assert_array_equal(by_element, expected)
+
+
+@pytest.mark.parametrize(("scheme", "beside", "opposite"),
+                         [("DBEM", False, True), ("HST", False, True), ("THST", True, True), ("SST", False, False)])
+def test_free_parts_of_a_face_in_contact_have_the_equation_of_free_faces(
+    scheme: str, beside: bool, opposite: bool
+) -> None:
+    # A narrow block on a wide one, whose top is the contact's second curve.
+    outline = {"wide": [0j, 3 + 0j, 3 + 1j], "face": [3 + 1j, 1j], "rest": [1j, 0j], "foot": [1 + 1j, 2 + 1j],
+               "above": [2 + 1j, 2 + 2j, 1 + 2j, 1 + 1j]}  # fmt: skip
+    regions = {"a": (ROCK, ["wide", "face", "rest"]), "b": (ROCK, ["foot", "above"])}
+    held = {"wide": {"ux": 0.0, "uy": 0.0}}
+    body = Body(outline, regions, held, elements=18, grading="both", scheme=scheme)
+    mesh = generate_mesh(parse_model(body.write() + '\n[contacts.k]\nbetween = ["foot", "face"]\n')[1])
+    own = select(mesh, "a", "face")
+    by_element = mesh.traction_equation[own].reshape(-1, 3).all(axis=1)
+    x = mesh.position[own].real.reshape(-1, 3).mean(axis=1)
+    middle = (x > 1) & (x < 2)
+    assert by_element[middle].sum() == opposite * (middle.sum() - 2)
+    assert by_element[~middle].sum() == beside * ((~middle).sum() - 4)
+
+
+def test_a_curve_of_corner_elements_alone_is_told() -> None:
+    lower, upper = ["bottom", "right", "joint", "left"], ["joint", "right2", "top", "left2"]
+    regions = {"lower": (ROCK, lower), "upper": (ROCK, upper)}
+    laws, held = {"joint": {"law": "bonded"}}, {"bottom": {"ux": 0.0, "uy": 0.0}}
+    _, mesh = mesh_body(Body(SQUARE, regions, held, laws, elements=2, scheme="HST"))
+    assert not mesh.traction_equation.any()
+    told = [note for note in mesh.notes if "too few elements for HST" in note]
+    assert len(told) == 1 and "'joint'" in told[0]
 
 
 @pytest.mark.parametrize(("scheme", "loops"), [("SST", 0), ("DBEM", 0), ("HST", 1), ("THST", 2)])

@@ -97,6 +97,22 @@ def test_punch_on_a_base() -> None:
     assert [(leg.refine_start, leg.refine_end) for leg in model.curves["base_face"].legs] == [(True, True)] * 3
 
 
+@pytest.mark.parametrize("lift", [0.0, 1e-12, 1e-6, 0.01])
+@pytest.mark.parametrize("angle", [0.0, 28.0])
+def test_a_face_is_refined_opposite_a_corner_however_far_it_is(angle: float, lift: float) -> None:
+    legs = build(write(angle, lift=lift)).curves["base_face"].legs
+    assert [(leg.refine_start, leg.refine_end) for leg in legs] == [(True, True)] * 3
+    assert [(leg.singular_start, leg.singular_end) for leg in legs] == [(True, True)] * 3
+    explicit = change(write(angle, lift=lift), ("elements = 16 }", 'elements = 16, grading = "start" }'))
+    legs = build(explicit).curves["base_face"].legs
+    refined = [(leg.refine_start, leg.refine_end) for leg in legs]
+    assert refined == [(True, True), (True, True), (True, False)]
+    plain = change(write(angle, lift=lift), ("elements = 16 }", 'elements = 16, grading = "none" }'))
+    legs = build(plain).curves["base_face"].legs
+    assert not any(leg.refine_start or leg.refine_end for leg in legs)
+    assert all(leg.singular_start and leg.singular_end for leg in legs)
+
+
 def test_default_law_is_frictionless_contact() -> None:
     text = change(write(), ("friction = 0.3\n", ""))
     assert build(text).contacts["seat"].law == Law("coulomb")

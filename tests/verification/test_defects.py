@@ -133,12 +133,17 @@ def test_the_hoop_stress_in_a_thin_ligament(solve: Solve) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "scheme"), [("slot_hst", "HST"), ("self_contact_hst", "HST"), ("self_contact_thst", "THST")]
-)
-def test_the_faces_of_a_slot_by_any_scheme(name: str, scheme: str, solve: Solve) -> None:
-    given = find_largest_displacement(solve(name))
-    expected = find_largest_displacement(solve(name, (f'"{scheme}"', '"SST"')))
-    assert given == pytest.approx(expected, rel=1e-3)
+    ("name", "order", "part"),
+    # With order 1 displacements by traction equations lose an order: THST is off by the elements' length.
+    [("slot_hst", None, 1e-3), ("self_contact_hst", None, 1e-3), ("self_contact_thst", None, 5e-3),
+     ("self_contact_thst", 2, 4e-4)],
+)  # fmt: skip
+def test_the_faces_of_a_slot_by_any_scheme(name: str, order: int | None, part: float, solve: Solve) -> None:
+    changes = [("order = 1", f"order = {order}")] if order else []
+    given = find_largest_displacement(solve(name, *changes))
+    scheme = name.split("_")[-1].upper()
+    expected = find_largest_displacement(solve(name, *changes, (f'"{scheme}"', '"SST"')))
+    assert given == pytest.approx(expected, rel=part)
 
 
 # Narrow wedges

@@ -231,13 +231,3 @@ def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Re
     if worst <= ROUNDING * max(_largest_traction(state), floor):
         return np.zeros(laws.count, dtype=bool)
     return overload >= FAIL_TOGETHER * worst
-
-
-def measure_load_share(laws: PairLaws, state: PairState, memory: Memory, pressure: Real) -> Real:
-    """How much of their strength the intact bonds bear, (m,): 1 where they fail, in tension or in shear."""
-    tension = tensile_limit(laws, memory)
-    limit = tension - pressure
-    bound = evaluate_strength(laws, np.minimum(state.p_n, limit), memory.path, pressure, memory.broken).bound
-    largest = _largest_traction(state)
-    least = ROUNDING * largest if largest > 0 else 1.0
-    return np.maximum((state.p_n + pressure) / np.maximum(tension, least), np.abs(state.p_s) / np.maximum(bound, least))

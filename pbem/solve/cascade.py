@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
-from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, measure_load_share, propose_modes
+from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, propose_modes
 from pbem.contact.subset import Response, Subset, settle_subset, take_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
@@ -53,8 +53,8 @@ def run_cascade(
     """
     broken = memory.broken | failing
     leader = problem.laws.leader
-    pairs = _choose_pairs(problem, memory, load, law, solved, broken, most)
-    if not len(pairs):
+    pairs = np.flatnonzero(problem.laws.brittle & ~problem.laws.follows)
+    if len(pairs) > most:
         return Cascade(broken, None)
     response = find_response(problem, tangent, constraints, load, law, solved, pairs)
     scale = problem.traction_scale
@@ -68,32 +68,6 @@ def run_cascade(
     mode, sign = modes.mode.copy(), modes.sign.copy()
     mode[pairs], sign[pairs] = own.mode, own.sign
     return Cascade(broken, ModeState(mode[leader], sign[leader]))
-
-
-def _choose_pairs(
-    problem: Problem, memory: Memory, load: Load, law: Linearisation, solved: Solved, broken: Bool, most: int
-) -> Integer:
-    """The brittle pairs (s,), rising, that are followed: all, or if they are too many those that fail and, of the
-    intact ones, the most loaded. None if even those that fail are too many. Decided by the first rank.
-
-    Bonds that were lost before keep their modes then; what they make of it, and overloads among the others, is for the
-    solutions that follow.
-    """
-    laws = problem.laws
-    pairs = np.flatnonzero(laws.brittle & ~laws.follows)
-    if len(pairs) <= most:
-        return pairs
-    failing = np.flatnonzero(broken & ~memory.broken & ~laws.follows)
-    if len(failing) > most:
-        return failing[:0]
-
-    def choose() -> Integer:
-        load_share = measure_load_share(laws, evaluate_pairs(problem.mesh, law, solved.unknowns), memory, load.pressure)
-        load_share[broken] = -np.inf
-        intact = pairs[np.argsort(-load_share[pairs], kind="stable")][: most - len(failing)]
-        return np.union1d(failing, intact[~broken[intact]])
-
-    return do_on_first(problem.comm, ConvergenceError, choose)
 
 
 def _follow(subset: Subset, response: Response, scale: float, floor: float) -> tuple[Bool, ModeState | None]:

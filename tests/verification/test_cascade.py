@@ -51,18 +51,3 @@ def test_a_cascade_ends_as_with_a_solution_for_each_bond_and_takes_few_iteration
     for name in ("opening", "slip", "traction_n", "traction_s"):
         ours, theirs = getattr(fast.contact["fault"], name), getattr(slow.contact["fault"], name)
         np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max())
-
-
-def test_of_too_many_bonds_the_most_loaded_are_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "some").mkdir()
-    (tmp_path / "one").mkdir()
-    whole = run_plate(tmp_path, -0.004)
-    with monkeypatch.context() as patch:
-        patch.setattr(newton, "MOST_PIVOTED", 16)
-        some = run_plate(tmp_path / "some", -0.004)
-        patch.setattr(newton, "MOST_PIVOTED", 0)
-        one = run_plate(tmp_path / "one", -0.004)
-    assert whole.pairs.count > 2 * 16
-    np.testing.assert_array_equal(some.pairs.at("broken", 0), whole.pairs.at("broken", 0))
-    np.testing.assert_array_equal(some.contact["fault"].mode, whole.contact["fault"].mode)
-    assert some.steps.iterations[0] <= 0.6 * one.steps.iterations[0]

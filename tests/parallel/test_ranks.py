@@ -33,12 +33,14 @@ SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
     "KI": "intensity", "KII": "intensity", "T": "stress",
-    "reactions": "force", "resultant": "force", "J": "force",  # both per thickness: stress times length
+    "reactions": "force", "resultant": "force", "part_resultant": "force", "whole": "force",
+    "J": "force",  # per thickness, as forces are: stress times length
     # Parts of the largest value, and of the sums of forces.
-    **dict.fromkeys(("penetration", "tension", "cone", "relative", "carried"), "part"),
+    **dict.fromkeys(("penetration", "tension", "cone", "carried"), "part"),
+    **dict.fromkeys(("relative", "part_relative", "whole_relative"), "part"),
     **{f"relative_{kind}": "part" for kind in ("reactions", "jumps", "tractions", "factors", "displacement")},
 }  # fmt: skip
-GROUPS = {"reactions": "force", "energy": "energy"}
+GROUPS = {"reactions": "force", "energy": "energy", "linearity": "part"}
 
 Array = NDArray[Any]
 

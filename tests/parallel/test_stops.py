@@ -114,8 +114,8 @@ def test_too_little_memory_is_told_in_one_message(ranks: int, rank: int, folder:
     assert done.returncode == 1, done.stderr
     assert done.stderr.count("out of memory") == 1 and "Traceback" not in done.stderr, done.stderr
     results = open_results(folder / "case.h5")
-    # The launcher ends the first rank for the other, with a signal that it notes if it comes to look: then the status is
-    # "stopped", and it may not have come to write the third step.
+    # The launcher ends the first rank for the other by a signal. It notes that if it comes to look: then the status is
+    # "stopped". It may not have come to write the third step.
     assert results.status in ("stopped", "running")[: 1 + (rank > 0)] and 2 <= len(results.steps) <= 3
     expect_equal(pbem.run(folder / "case.toml", folder / "case.h5", resume=True), whole)
 

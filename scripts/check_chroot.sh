@@ -48,7 +48,7 @@ mount_system() {
 }
 
 run_inside() {
-    chroot "$chroot" /usr/bin/env -i HOME=/root LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
+    chroot "$chroot" /usr/bin/env -i HOME=/checkout LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
         OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 bash -c "$1" bash "${@:2}"
 }
 
@@ -56,6 +56,6 @@ run_inside() {
 make_chroot
 take_settings
 mount_system
-rm -rf "$chroot/root/pbem"
-git clone -q --no-hardlinks "$root" "$chroot/root/pbem"
-run_inside 'cat /etc/debian_version && cd /root/pbem && bash scripts/demo.sh && exec bash scripts/test.sh "$@"' "$@"
+rm -rf "$chroot/checkout"
+git clone -q --no-hardlinks "$root" "$chroot/checkout"
+run_inside 'cat /etc/debian_version && cd /checkout && bash scripts/demo.sh && exec bash scripts/test.sh "$@"' "$@"

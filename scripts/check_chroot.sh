@@ -48,7 +48,7 @@ mount_system() {
 }
 
 run_inside() {
-    chroot "$chroot" /usr/bin/env -i HOME=/checkout LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
+    chroot "$chroot" /usr/bin/env -i HOME=/ LANG=C.UTF-8 PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
         OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 bash -c "$1" bash "${@:2}"
 }
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import linprog
 
 from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import Memory, PairLaws
@@ -151,6 +150,8 @@ def _maximise(
                                         len(change))), shape=balance.shape)
     cost = np.zeros(columns + 1)
     cost[-1] = -1.0
+    from scipy.optimize import linprog  # here, as few runs need it and it is a tenth of what a start imports
+
     found = linprog(
         cost[used],
         A_ub=sparse.vstack([above, balance - left, -balance - left]).tocsr()[:, used],

@@ -192,6 +192,11 @@ def gather_parts(comm: MPI.Intracomm, part: Real) -> Real:
     return whole
 
 
+def gather_rows(comm: MPI.Intracomm, part: Real) -> Real:
+    """All ranks' rows (k, c) one after the other, on every rank."""
+    return gather_parts(comm, part.ravel()).reshape(-1, part.shape[1])
+
+
 def add_up(comm: MPI.Intracomm, part: Real) -> Real:
     """The sum over the ranks of arrays of the same shape, on every rank."""
     if comm.size == 1:

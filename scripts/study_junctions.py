@@ -131,7 +131,7 @@ class Solver:
     def __init__(self, junction: Junction, bit: float = 1.0) -> None:
         self.junction = junction
         usual = sliver.measure_last_bit
-        with mock.patch.object(sliver, "measure_last_bit", lambda angle: bit * usual(angle)):
+        with mock.patch.object(sliver, "measure_last_bit", lambda *corner: bit * usual(*corner)):
             # Columns of tractions that are zero are not assembled: none is under this load.
             self.model = parse_model(junction.write(0.5, LOADS["mixed opening"]))[1]
             self.mesh = generate_mesh(self.model)
@@ -140,8 +140,8 @@ class Solver:
     def solve(self, friction: float, load: tuple[float, float, float]) -> Outcome:
         """One step from rest."""
         model = parse_model(self.junction.write(friction, load))[1]
-        # The curves are those of the mesh at hand.
-        model = replace(model, curves=self.model.curves)
+        # The curves are those of the mesh at hand, and so are the bits of its wedges.
+        model = replace(model, curves=self.model.curves, ties=self.model.ties)
         problem = replace(
             self.problem, model=model, laws=collect_laws(model, self.mesh), outer=collect_outer_nodes(model, self.mesh)
         )
@@ -190,7 +190,7 @@ def study(kind: str, angle: float, frictions: tuple[float, ...], elements: int, 
     """Print the rows of a kind and an angle."""
     given = Solver(Junction(kind, angle, elements))
     fine = Solver(Junction(kind, angle, finer * elements))
-    half = Solver(Junction(kind, angle, elements), 0.5) if angle < WEDGE else None
+    half = Solver(Junction(kind, angle, elements), 0.5) if angle < WEDGE or kind == "t" else None
     for friction in frictions:
         rows = []
         for name, load in LOADS.items():

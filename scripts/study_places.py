@@ -96,10 +96,12 @@ def move_case(case: dict[str, Any], move: Move, size: float) -> dict[str, Any]:
             law["gap"] = {"expression": f"{move.length!r}*({_move_back(law['gap']['expression'], move, size)})"}
         elif "gap" in law:
             law["gap"] = law["gap"] * move.length
+    known: dict[str, dict[str, float]] = {"remote": {}, "gravity": {}}
     for tables in (result, *result.get("stages", [])):
-        for key in ("remote", "gravity"):
+        for key, before in known.items():
             if key in tables:
-                tables[key] = _move_field(tables[key], key, move)
+                before |= tables[key]  # what a stage does not name stays as it was
+                tables[key] = _move_field(before, key, move)
         _move_conditions(tables.get("boundary", {}), move)
     for stress in result.get("initial_stress", {}).values():
         stress |= _move_field(stress, "remote", move)

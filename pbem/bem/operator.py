@@ -60,7 +60,7 @@ class RowOperator:
         return 2 * (self.last_node - self.first_node)
 
     def apply(self, v: Real) -> Real:
-        """This rank's rows of B v, lengths, for v of shape (4 nodes,)."""
+        """This rank's rows of B v, lengths, for v of shape (4 nodes,) or, for many at a time, (4 nodes, c)."""
         result: Real = self.free @ v
         for block in self.blocks:
             result[block.rows] += block.matrix @ v[block.columns]

@@ -38,7 +38,11 @@ def project_nodes(position: Complex, normal: Complex, elements: Elements, overla
     inside = (np.abs(local) <= 1 + OVERSHOOT) & facing & (distance >= -overlap[:, None])
     distance = np.where(inside, distance, np.inf).reshape(len(position), -1)
     local = local.reshape(distance.shape)
-    best = np.argmin(np.abs(distance), axis=1)
+    # Where two elements meet both may be seen, at distances that rounding tells apart: the point is on one of them.
+    away = np.abs(distance)
+    alike = np.repeat(OVERSHOOT * elements.lengths, 2)
+    near = away <= away.min(axis=1, initial=np.inf)[:, None] + alike
+    best = np.argmin(np.where(near & np.isfinite(away), np.abs(local), np.inf), axis=1)
     rows = np.arange(len(position))
     hit = np.isfinite(distance[rows, best])
     return Projection(

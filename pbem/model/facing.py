@@ -213,7 +213,10 @@ def _find_opposite(
 
 
 def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]]) -> list[Strip]:
-    """Pairs of chosen legs (curve, number of the leg) of a region with a narrow slot or a thin part in between."""
+    """Pairs of chosen legs (curve, number of the leg) of a region with a narrow slot or a thin part in between.
+
+    The first of each is that which comes first in the file: the way round the region is another in a mirrored model.
+    """
     legs: list[Leg] = []
     names: list[tuple[str, int]] = []
     for side in (side for loop in region.loops for side in loop.sides):
@@ -223,7 +226,9 @@ def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]])
         names += [(side.curve, number) for number in numbers]
     wanted = set(chosen)
     strips: dict[frozenset[tuple[str, int]], Strip] = {}
-    for (name, leg), near in zip(zip(names, legs, strict=True), _find_near(legs), strict=True):
+    place, nearby = {curve: at for at, curve in enumerate(model.curves)}, _find_near(legs)
+    for at in sorted(range(len(legs)), key=lambda at: (place[names[at][0]], names[at][1])):
+        name, leg, near = names[at], legs[at], nearby[at]
         if name not in wanted:
             continue
         around = Surroundings([legs[number] for number in near])

@@ -85,11 +85,11 @@ class Surroundings:
     """The faces of all regions, and which of them a leg does not see: itself, and those that it meets at a corner.
 
     legs: of all curves, one after the other; regions: names of the curves of every region;
-    blind: further pairs of legs (numbers) that do not see each other.
+    blind: further pairs of legs (numbers) that do not see each other; cracks: names of the curves that are cracks.
     """
 
     def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]],
-                 blind: Sequence[tuple[int, int]] = ()) -> None:
+                 blind: Sequence[tuple[int, int]] = (), cracks: frozenset[str] = frozenset()) -> None:
         self.legs: list[Leg] = [leg for curve in curves.values() for leg in curve.legs]
         self.curve = [name for name, curve in curves.items() for _ in curve.legs]
         self.pieces = cut_legs(self.legs)
@@ -101,7 +101,8 @@ class Surroundings:
         for names in regions:
             numbers = [first[name] + at for name in dict.fromkeys(names) for at in range(len(curves[name].legs))]
             self._members.append(np.array(sorted(numbers), dtype=np.int64))
-        self.corners, met = _find_meetings(self.legs, self._members)
+        crack_legs = frozenset(number for number, name in enumerate(self.curve) if name in cracks)
+        self.corners, met = _find_meetings(self.legs, self._members, crack_legs)
         unseen = [min(pair) * len(self.legs) + max(pair) for pair in blind]
         self._unseen = np.union1d(met, np.array(unseen, dtype=np.int64))
 
@@ -147,10 +148,11 @@ def _surround(pieces: Pieces) -> Boxes:
 
 @dataclass(frozen=True)
 class Corner:
-    """Legs that meet at a point and enclose wedges there.
+    """Legs that meet at a point and enclose wedges there, or of which one crack branches off another.
 
     ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
-    two legs `sides`; beside: further legs that end at the point, in corners that are no wedges.
+    two legs `sides`; beside: further legs that end at the point, in corners that are no wedges; branching: whether
+    three ends of cracks meet, and nothing else does.
     """
 
     point: complex
@@ -158,11 +160,14 @@ class Corner:
     angle: float
     sides: tuple[int, int]
     beside: tuple[tuple[int, bool], ...] = ()
+    branching: bool = False
 
 
-def _find_meetings(legs: Sequence[Leg], members: Sequence[Integer]) -> tuple[list[Corner], Integer]:
-    """The corners of wedges, and codes of the pairs of legs that meet but enclose no wedge; members: legs of every
-    region, as legs of different regions do not see each other."""
+def _find_meetings(
+    legs: Sequence[Leg], members: Sequence[Integer], cracks: frozenset[int]
+) -> tuple[list[Corner], Integer]:
+    """The corners, and codes of the pairs of legs that meet but enclose no wedge; members: legs of every region, as
+    legs of different regions do not see each other; cracks: legs of cracks."""
     regions: list[set[int]] = [set() for _ in legs]
     for region, own in enumerate(members):
         for number in own.tolist():
@@ -173,6 +178,7 @@ def _find_meetings(legs: Sequence[Leg], members: Sequence[Integer]) -> tuple[lis
     for point, ends in _collect_ends(legs).items():
         found: list[tuple[float, int, int]] = []
         around: dict[tuple[int, bool], None] = {}
+        widest: list[tuple[float, int, int]] = []
         for i, (one, one_ray, one_end) in enumerate(ends):
             for other, other_ray, other_end in ends[i + 1:]:
                 pair = (min(one, other), max(one, other))
@@ -180,17 +186,19 @@ def _find_meetings(legs: Sequence[Leg], members: Sequence[Integer]) -> tuple[lis
                     continue
                 met.add(pair)
                 angle = abs(float(np.angle(other_ray / one_ray)))
+                widest.append((angle, *pair))
                 if angle < math.radians(WEDGE):
                     narrow.add(pair)
                     found.append((angle, *pair))
                     around |= {(one, one_end): None, (other, other_end): None}
-        if found:
-            angle, one, other = min(found)
+        branching = len(ends) == 3 == len(widest) and all(leg in cracks for leg, _, _ in ends)
+        if found or branching:
+            angle, one, other = min(found or widest)
             beside = [
                 (leg, at_end) for leg, _, at_end in ends
-                if (leg, at_end) not in around and any(regions[leg] & regions[side] for side, _ in around)
+                if (leg, at_end) not in around and (branching or any(regions[leg] & regions[at] for at, _ in around))
             ]
-            corners.append(Corner(point, tuple(around), angle, (one, other), tuple(beside)))
+            corners.append(Corner(point, tuple(around), angle, (one, other), tuple(beside), branching))
     return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
 
 

@@ -78,7 +78,8 @@ def fit_lengths(
     every = [leg for curve in curves.values() for leg in curve.legs]
     slots = find_slots(every, [name for name, curve in curves.items() for _ in curve.legs], regions)
     surroundings = Surroundings(
-        curves, [[side.curve for side in sides] for sides in regions], [(slot.first, slot.second) for slot in slots]
+        curves, [[side.curve for side in sides] for sides in regions], [(slot.first, slot.second) for slot in slots],
+        frozenset(side.curve for sides in regions for side in sides if side.forward is None),
     )
     wedges = find_wedges(surroundings)
     field = LengthField(surroundings, wedges, tips, kept, order)

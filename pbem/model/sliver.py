@@ -8,17 +8,23 @@ Faces tied to zero jump there would pin cracks that cross: 30 % of the slip, fal
 
 Further legs that end in the corner are graded in the same way, though no wedge lies beside them: where a branch leaves
 a crack, jumps that elements of a tenfold length cannot follow turn the needle between the two (30 % of the slip).
+
+Where a crack branches off another its slip ends in the corner or opens the crack, at whatever angle: jumps vary with
+a small power of the distance, and what the element in the corner cannot follow spoils the slip far around it (2 to 4 %
+of the largest at 70 to 45 degrees with lengths at t^3). There lengths fall geometrically as well, unless the elements
+that are asked for are too few for it to matter.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.model.curve import Leg
 from pbem.model.nearness import Corner, Surroundings
 
 Real = NDArray[np.float64]
@@ -27,6 +33,9 @@ Real = NDArray[np.float64]
 # with the power of the angle, and its bounds. What it spoils grows in proportion to it, and as slender bodies bend.
 LAST_BIT, AT_ANGLE, POWER = 2e-4, 8.0, 2.5
 LEAST_BIT, MOST_BIT = 5e-5, 1e-2
+# Most of it where a crack branches off another, in a wedge or in none, and the least number of elements from there to
+# the other end, or to the middle of a leg that is refined at both ends, in the mean of the three legs.
+BRANCH_BIT, LEAST_ASKED = 6e-5, 5
 # Degrees: below, the last bit follows its neighbour.
 TIED = 25.0
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
@@ -96,12 +105,20 @@ def measure_growth(angle: float, reach: float) -> float:
 
 
 def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: float) -> float:
-    return MOST_GROWTH if end in corner.beside else measure_growth(corner.angle, reach)
+    if end in corner.beside:
+        return MOST_GROWTH if corner.ends else reach
+    return measure_growth(corner.angle, reach)
 
 
-def measure_last_bit(angle: float) -> float:
+def measure_last_bit(angle: float, branching: bool = False) -> float:
     """Length of the last bit in the corner of a wedge (radians), as a part of its shortest leg."""
-    return min(max(LAST_BIT * (math.degrees(angle) / AT_ANGLE) ** POWER, LEAST_BIT), MOST_BIT)
+    most = BRANCH_BIT if branching else MOST_BIT
+    return min(max(LAST_BIT * (math.degrees(angle) / AT_ANGLE) ** POWER, LEAST_BIT), most)
+
+
+def _count_asked(leg: Leg) -> float:
+    """Elements from an end of a leg on that is refined, up to where those of the other end begin."""
+    return leg.elements / (2 if leg.refine_start and leg.refine_end else 1)
 
 
 def find_wedges(surroundings: Surroundings) -> Wedges:
@@ -112,8 +129,15 @@ def find_wedges(surroundings: Surroundings) -> Wedges:
         same = names[number - 1] == names[number]
         before.append(before[-1] + legs[number - 1].length if same else 0.0)
     bits, ties = [], []
+    corners = []
     for corner in surroundings.corners:
-        bit = measure_last_bit(corner.angle) * min(legs[number].length for number, _ in corner.ends)
+        ends = corner.ends or corner.beside
+        asked = np.mean([_count_asked(legs[number]) for number, _ in corner.ends + corner.beside])
+        fine = corner.branching and bool(asked >= LEAST_ASKED)
+        if not (fine or corner.ends):
+            continue
+        corners.append(replace(corner, branching=fine))
+        bit = measure_last_bit(corner.angle, fine) * min(legs[number].length for number, _ in ends)
         bits.append(bit)
         if math.degrees(corner.angle) >= TIED:
             continue
@@ -121,5 +145,5 @@ def find_wedges(surroundings: Surroundings) -> Wedges:
             first = before[number] + (legs[number].length - bit if at_end else 0.0)
             other = names[corner.sides[corner.sides[0] == number]]
             ties.append(Tie(names[number], first, first + bit, corner.point, math.degrees(corner.angle), other))
-    at = {end: number for number, corner in enumerate(surroundings.corners) for end in corner.ends + corner.beside}
-    return Wedges(tuple(surroundings.corners), tuple(bits), tuple(ties), at)
+    at = {end: number for number, corner in enumerate(corners) for end in corner.ends + corner.beside}
+    return Wedges(tuple(corners), tuple(bits), tuple(ties), at)

@@ -47,9 +47,10 @@ class Split:
         return Split(self.a_tangent, none, self.b_tangent, none)
 
     def find_b(self, unknowns: Real) -> Real:
-        """b (k, 2) from the pairs' unknowns (k, 2)."""
-        result: Real = np.einsum("mij,mj->mi", self.b_tangent, unknowns) + self.b_offset
-        return result
+        """b (2 k, c) from the pairs' unknowns (2 k, c) of c solutions."""
+        count, columns = len(self.b_offset), unknowns.shape[1]
+        result: Real = self.b_tangent @ unknowns.reshape(count, 2, columns) + self.b_offset[:, :, None]
+        return result.reshape(2 * count, columns)
 
 
 class PairBases:
@@ -78,7 +79,7 @@ class PairBases:
 
 @dataclass(frozen=True)
 class PairSolution:
-    """Unknowns x_c (k, 2) of the pairs.
+    """Unknowns x_c (2 k, c) of the pairs, in c solutions.
 
     rcond: reciprocal condition of their system, 0 if it is singular; residual: of the system, relative to its right.
     """
@@ -89,12 +90,12 @@ class PairSolution:
 
 
 def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
-    """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k,)."""
+    """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k, c) for each of c solutions."""
     count = len(split.a_offset)
     varied = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)) | (split.b_offset != 0).any(axis=1))
     active = (2 * varied[:, None] + np.arange(2)).ravel()
-    rhs = given - split.a_offset.ravel() - coupling[:, active] @ split.b_offset[varied].ravel()
-    unknowns, rcond, residual = np.zeros(2 * count), 1.0, 0.0
+    rhs = given - (split.a_offset.ravel() + coupling[:, active] @ split.b_offset[varied].ravel())[:, None]
+    unknowns, rcond, residual = np.zeros(given.shape), 1.0, 0.0
     rest = np.ones(2 * count, dtype=bool)
     if len(active):
         changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
@@ -114,8 +115,9 @@ def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
         rest[own] = False
         rhs = rhs - effect @ unknowns[own]
     others = np.flatnonzero(rest[::2])
-    unknowns[rest] = np.linalg.solve(split.a_tangent[others], rhs[rest].reshape(-1, 2, 1)).ravel()
-    return PairSolution(unknowns.reshape(-1, 2), rcond, residual)
+    solved = np.linalg.solve(split.a_tangent[others], rhs[rest].reshape(len(others), 2, given.shape[1]))
+    unknowns[rest] = solved.reshape(2 * len(others), given.shape[1])
+    return PairSolution(unknowns, rcond, residual)
 
 
 def respond_pairs(coupling: Real, split: Split, at: Integer, a_offset: Real, b_offset: Real) -> Real:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import G_N, P_N, P_S, Linearisation
-from pbem.parallel import broadcast, gather_parts
+from pbem.parallel import broadcast, gather_rows
 from pbem.solve.condensation import PairBases, PairSolution, Split, respond_pairs, solve_pairs
 from pbem.solve.effort import Effort
 from pbem.solve.linear import choose_method
@@ -58,13 +58,18 @@ class CondensedTangent:
         if fresh or not self._reach(law):
             fresh = True
             self._refer(load, law)
-        unknowns, pairs = self._condense(self._find_load_solution(load, law), self._split(law))
+        unknowns, pairs = self._combine(load, law)
         if pairs.rcond < LEAST_RCOND and self._can_refer_better(law):
             fresh = True
             self._refer(load, law)
-            unknowns, pairs = self._condense(self._find_load_solution(load, law), self._split(law))
+            unknowns, pairs = self._combine(load, law)
         solved = Solved(unknowns, constraints.evaluate(unknowns), pairs.residual, checked=False)
         return self.check(solved, constraints, load, law) if fresh or pairs.rcond < LEAST_RCOND else solved
+
+    def _combine(self, load: Load, law: Linearisation) -> tuple[Real, PairSolution]:
+        """x (2 nodes,) of the load in the laws' modes, and the solution of the pairs' system."""
+        unknowns, pairs = self._condense(self._find_load_solution(load, law)[:, None], self._split(law))
+        return unknowns[:, 0], pairs
 
     def _reach(self, law: Linearisation) -> bool:
         """Compute the columns of the pairs that have changed, unless new factors cost less."""
@@ -107,7 +112,7 @@ class CondensedTangent:
             best = Solved(unknowns, v, residual)
             if left_over <= GOOD_RESIDUAL * scale or not np.isfinite(residual):
                 break
-            unknowns = unknowns + self._condense(self._solve_system(-left), split)[0]
+            unknowns = unknowns + self._condense(self._solve_system(-left[:, None]), split)[0][:, 0]
         assert best is not None
         return best
 
@@ -167,30 +172,30 @@ class CondensedTangent:
         return self.problem.measure(self.load_forces + own)
 
     def _solve_load(self, forces: Real) -> Real:
-        return self._solve_system(-forces)
+        return self._solve_system(-forces[:, None])[:, 0]
 
     def _solve_system(self, rhs: Real) -> Real:
-        """K0^-1 of this rank's part of a right-hand side, (2 nodes,) on every rank."""
-        return gather_parts(self.problem.comm, self.reference.solve_columns(rhs[:, None])[:, 0])
+        """K0^-1 of this rank's part (rows, c) of right-hand sides, (2 nodes, c) on every rank."""
+        return gather_rows(self.problem.comm, self.reference.solve_columns(rhs))
 
     def _condense(self, given: Real, split: Split) -> tuple[Real, PairSolution]:
-        """x (2 nodes,) for y, and the solution of the known pairs' system, by the first rank."""
+        """x (2 nodes, c) for c columns y, and the solution of the known pairs' system, by the first rank."""
         problem, known = self.problem, self.columns.known
         rest = np.setdiff1d(np.arange(len(self.varying)), known)
         if split.b_offset[rest].any():
             constant = np.zeros_like(split.b_offset)
             constant[rest] = split.b_offset[rest]
-            given = given - self._solve_system(self.columns.find_forces(constant))
+            given = given - self._solve_system(self.columns.find_forces(constant)[:, None])
         found: PairSolution | None = None
         of_pairs = self.unknowns.reshape(-1, 2)
         if problem.comm.rank == 0:
-            found = solve_pairs(self.columns.coupling, given[of_pairs[known]].ravel(), split.take(known))
+            found = solve_pairs(self.columns.coupling, given[of_pairs[known].ravel()], split.take(known))
         found = broadcast(problem.comm, found)
         assert found is not None
         unknowns = given - self.columns.combine(split.take(known).find_b(found.unknowns))
-        unknowns[of_pairs[known]] = found.unknowns
-        others = (unknowns[of_pairs[rest]] - split.a_offset[rest])[:, :, None]
-        unknowns[of_pairs[rest]] = np.linalg.solve(split.a_tangent[rest], others)[:, :, 0]
+        unknowns[of_pairs[known].ravel()] = found.unknowns
+        others = unknowns[of_pairs[rest]] - split.a_offset[rest, :, None]
+        unknowns[of_pairs[rest]] = np.linalg.solve(split.a_tangent[rest], others)
         return unknowns, found
 
     def respond(

@@ -80,7 +80,7 @@ class FactoredTangent:
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See AnyTangent."""
         self.reference.present = constraints.matrix
-        return self._solve_by_any(constraints, forces)
+        return np.stack([self._solve_by_any(constraints, each) for each in forces.T], axis=1)
 
     def solve_system(self, rhs: Real) -> Real:
         """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side, by the factors."""

@@ -91,8 +91,10 @@ def solve_step(
     most_settled = MOST_SETTLED_BY_GMRES if few else MOST_SETTLED
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
+    linear = find_linear(laws)
     search = Search(
-        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~find_linear(laws)
+        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~linear,
+        varying=not bool(linear.all()),
     )
     iterations: list[Iteration] = []
     while True:
@@ -136,7 +138,7 @@ def solve_step(
             moves = do_on_first(comm, ConvergenceError, lambda now=proposal.modes: (  # type: ignore[misc]
                 hold.describe_collapse(now)))
             raise ConvergenceError(refused.reason, refused.detail + moves)
-        search.note(proposal)
+        search.note(proposal, outcome.law_error)
         if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
         chosen = cascade.modes if cascade else None
@@ -235,6 +237,7 @@ class _Outcome:
     proposal: Proposal
     settled: bool
     failing: NDArray[np.bool_]
+    law_error: float
 
 
 def _judge(
@@ -252,7 +255,7 @@ def _judge(
             law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
             failing = find_failures(laws, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-        return _Outcome(pairs, proposal, settled, failing)
+        return _Outcome(pairs, proposal, settled, failing, law_error)
 
     return do_on_first(problem.comm, ConvergenceError, judge)
 

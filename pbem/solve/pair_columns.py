@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pbem.parallel import gather_parts
+from pbem.parallel import gather_rows
 from pbem.solve.reference import Reference, apply_narrow, form_columns
 
 Real = NDArray[np.float64]
@@ -57,8 +57,8 @@ class PairColumns:
             self.coupling = np.concatenate(parts)[np.argsort(np.argsort(wanted))]
 
     def combine(self, b: Real) -> Real:
-        """W b (2 nodes,) on every rank, for b (j, 2) of the known pairs."""
-        return gather_parts(self.reference.problem.comm, self.effect @ b.ravel())
+        """W b (2 nodes, c) on every rank, for c columns b (2 j, c) of the known pairs."""
+        return gather_rows(self.reference.problem.comm, self.effect @ b)
 
     def find_forces(self, b: Real) -> Real:
         """This rank's rows of B E C b, for b (k, 2) of all pairs."""

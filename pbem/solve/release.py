@@ -28,6 +28,8 @@ Integer = NDArray[np.int64]
 # Solutions are corrected until they are as good as this, though the tolerance may be weaker.
 GOOD_RESIDUAL = 1e-12
 MOST_CORRECTIONS = 2
+# Right-hand sides that are solved together.
+COLUMNS_AT_ONCE = 512
 
 
 class ReleasedTangent:
@@ -60,10 +62,8 @@ class ReleasedTangent:
         problem = self.problem
         assert constraints.released is not None
         forces = self._share_forces(constraints.released)
-        self.responses = np.stack(
-            [self.anchored.solve_forces(constraints, load, law, force) for force in forces.T], axis=1
-        )
-        unknowns = self._complete(held.unknowns, held.v - load.known, constraints)
+        self.responses = self.anchored.solve_forces(constraints, load, law, forces)
+        unknowns = self._complete(held.unknowns[:, None], (held.v - load.known)[:, None], constraints)[:, 0]
         if not held.checked:
             return Solved(unknowns, constraints.evaluate(unknowns), held.residual, checked=False)
         scale = problem.measure(problem.apply(constraints.offset, load, constraints.released)) or 1.0
@@ -77,8 +77,8 @@ class ReleasedTangent:
             best = Solved(unknowns, v, residual)
             if residual <= GOOD_RESIDUAL or not np.isfinite(residual):
                 break
-            change = self.anchored.solve_forces(constraints, load, law, -left)
-            unknowns = unknowns + self._complete(change, constraints.matrix @ change, constraints)
+            change = self.anchored.solve_forces(constraints, load, law, -left[:, None])
+            unknowns = unknowns + self._complete(change, constraints.matrix @ change, constraints)[:, 0]
         assert best is not None
         tolerance = problem.model.solver.newton_tolerance
         if not best.residual <= tolerance:
@@ -91,7 +91,7 @@ class ReleasedTangent:
         return result
 
     def _complete(self, unknowns: Real, v: Real, constraints: ConstraintMap) -> Real:
-        """x_0 + X b for x_0 (2 nodes,) and its v_0 (4 nodes,), less known fields."""
+        """x_0 + X b for c columns x_0 (2 nodes, c) and their v_0 (4 nodes, c), less known fields."""
         released = constraints.released
         assert released is not None
         functional = self.problem.anchor_parts[1]
@@ -107,15 +107,16 @@ class ReleasedTangent:
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
     ) -> Real:
-        """See AnyTangent; with released anchors by a solution for every column."""
+        """See AnyTangent; with released anchors by whole solutions, many at a time."""
         if not _releases(constraints):
             return self.anchored.respond(constraints, load, law, pairs, directions)
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
         result = np.empty((len(unknowns), len(unknowns)))
-        for column in range(len(unknowns)):
-            state = np.asarray(states[:, column])
-            change = self.anchored.solve_forces(constraints, load, law, self.problem.operator.apply(-state))
-            result[:, column] = self._complete(change, constraints.matrix @ change + state, constraints)[unknowns]
+        for first in range(0, len(unknowns), COLUMNS_AT_ONCE):
+            some = states[:, first : first + COLUMNS_AT_ONCE]
+            change = self.anchored.solve_forces(constraints, load, law, self.problem.operator.apply(-some))
+            whole = self._complete(change, constraints.matrix @ change + some, constraints)
+            result[:, first : first + COLUMNS_AT_ONCE] = whole[unknowns]
         return result
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:

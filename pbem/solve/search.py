@@ -48,6 +48,9 @@ CAUTIONS = (
     Caution(0.01, 1.0, "strength"),
 )
 
+# Errors of the laws, as parts of the bound, up to which the full tangent comes back where friction changes with slip:
+# from further off its steps leave the states through which faces that run away come to rest.
+NEAR = 0.02
 # Changes that fall to no less than this part of the fewest before are a sign of pairs that disturb each other.
 SLOW = 0.5
 # Iterations in which the number of changes should have fallen.
@@ -66,13 +69,14 @@ class Search:
     most_pivoted: the largest group of pairs that is solved by pivoting. interface (m,): of each pair, in order along
     it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
     has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
-    is not linear.
+    is not linear. varying: whether any law is not linear, so that its friction changes with slip.
     """
 
     def __init__(
-        self, most_pivoted: int, interface: Integer | None = None, excluded: NDArray[np.bool_] | None = None
+        self, most_pivoted: int, interface: Integer | None = None, excluded: NDArray[np.bool_] | None = None,
+        varying: bool = False,
     ) -> None:
-        self.most_pivoted, self.interface = most_pivoted, interface
+        self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.excluded: NDArray[np.bool_] = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.restart()
 
@@ -93,12 +97,13 @@ class Search:
     def caution(self) -> Caution:
         return CAUTIONS[self.level]
 
-    def note(self, proposal: Proposal) -> None:
-        """Take note of what the last solution asks for."""
+    def note(self, proposal: Proposal, law_error: float = 0.0) -> None:
+        """Take note of what the last solution asks for, and of how far the laws of slipping pairs are from holding."""
         self.proposal = proposal
         self.changed.append(np.flatnonzero(proposal.changed & ~self.excluded))
         self.counts.append(int(proposal.changed.sum()))
-        if not self.counts[-1] and self.level and not self.returned:
+        near = law_error <= NEAR or not self.varying
+        if not self.counts[-1] and self.level and near and not self.returned:
             self.level, self.returned = 0, True
 
     def is_stuck(self) -> bool:

@@ -58,7 +58,7 @@ class AnyTangent(Protocol):
         """
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
-        """The unknowns (2 nodes,), on every rank, for this rank's part of a right-hand side; all anchors act.
+        """The unknowns (2 nodes, c) on every rank for this rank's rows (rows, c) of right-hand sides; all anchors act.
 
         After `solve` with the same constraints. Raises ConvergenceError: "singular tangent", "linear solver".
         """

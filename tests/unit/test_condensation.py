@@ -245,23 +245,23 @@ def test_factors_of_other_modes_serve_as_preconditioner() -> None:
 def test_the_small_system_is_that_of_its_definition() -> None:
     random = np.random.default_rng(1)
     count = 7
-    coupling, given = random.normal(size=(2 * count, 2 * count)), random.normal(size=2 * count)
+    coupling, given = random.normal(size=(2 * count, 2 * count)), random.normal(size=(2 * count, 3))
     parts = [random.normal(size=(count, *shape)) for shape in ((2, 2), (2,), (2, 2), (2,))]
     parts[2][:3] = 0.0  # three pairs as in the reference, of which one has no offset
     parts[3][0] = 0.0
     split = Split(*parts)
     solution = solve_pairs(coupling, given, split)
-    x = solution.unknowns
-    a = np.einsum("mij,mj->mi", split.a_tangent, x) + split.a_offset
-    np.testing.assert_allclose(a.ravel() + coupling @ split.find_b(x).ravel(), given, atol=1e-12)
+    for x, wanted in zip(solution.unknowns.T, given.T, strict=True):
+        a = np.einsum("mij,mj->mi", split.a_tangent, x.reshape(count, 2)) + split.a_offset
+        np.testing.assert_allclose(a.ravel() + coupling @ split.find_b(x[:, None])[:, 0], wanted, atol=1e-12)
     assert 0 < solution.rcond < 1 and solution.residual < 1e-13
 
 
 def test_a_singular_small_system_is_known_by_its_condition() -> None:
     none = np.zeros((1, 2))
     split = Split(np.zeros((1, 2, 2)), none, np.eye(2)[None], none)
-    assert solve_pairs(np.ones((2, 2)), np.ones(2), split).rcond < 1e-15
-    assert solve_pairs(np.full((2, 2), np.nan), np.ones(2), split).rcond == 0.0
+    assert solve_pairs(np.ones((2, 2)), np.ones((2, 1)), split).rcond < 1e-15
+    assert solve_pairs(np.full((2, 2), np.nan), np.ones((2, 1)), split).rcond == 0.0
 
 
 def test_states_are_split_and_put_together() -> None:
@@ -273,7 +273,8 @@ def test_states_are_split_and_put_together() -> None:
     split = bases.split(tangent, offset)
     state = np.einsum("mij,mj->mi", tangent, x) + offset
     a = np.einsum("mij,mj->mi", split.a_tangent, x) + split.a_offset
-    along = np.einsum("mij,mj->mi", bases.reference, a) + np.einsum("mij,mj->mi", bases.complement, split.find_b(x))
+    b = split.find_b(x.reshape(-1, 1)).reshape(x.shape)
+    along = np.einsum("mij,mj->mi", bases.reference, a) + np.einsum("mij,mj->mi", bases.complement, b)
     np.testing.assert_allclose(along / units[:, 0], state / units[:, 0], atol=1e-11)
     same = bases.split(bases.reference, np.zeros((5, 4)))
     assert not same.b_tangent.any() and np.array_equal(same.a_tangent, np.tile(np.eye(2), (5, 1, 1)))

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from pbem.mesh.equations import choose_equations
 from pbem.mesh.generate import generate_mesh
 from pbem.model.curve import Leg
 from pbem.model.facing import Surroundings
@@ -178,3 +179,29 @@ def test_contacts_on_few_elements_are_noted() -> None:
     few = change(write_blocks("top", "foot", 0.0), ("elements = 7", "elements = 3"))
     (note,) = [note for note in generate_mesh(build(few)).notes if "seat" in note]
     assert "3 elements" in note
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_of_the_faces_of_a_slot_the_first_in_the_file_keeps_the_displacement_equation(mirror: float) -> None:
+    """Also in the mirrored model, whose region is travelled the other way round."""
+    corners = {"bottom": (0, -1, 3, -1), "rl": (3, -1, 3, -0.005), "lower": (3, -0.005, 1, -0.005),
+               "end": (1, -0.005, 1, 0.005), "upper": (1, 0.005, 3, 0.005), "ru": (3, 0.005, 3, 1),
+               "top": (3, 1, 0, 1), "left": (0, 1, 0, -1)}  # fmt: skip
+    lines = [f"{name} = {{ points = [[{mirror * a}, {b}], [{mirror * c}, {d}]], elements = 8 }}"
+             for name, (a, b, c, d) in corners.items()]  # fmt: skip
+    names = ", ".join(f'"{name}"' for name in corners)
+    text = MATERIAL + "[curves]\n" + "\n".join(lines) + f"""
+[regions.plate]
+material = "soft"
+boundary = [{names}]
+[boundary.bottom]
+ux = 0.0
+uy = 0.0
+[contacts.slot]
+between = ["lower", "upper"]
+friction = 0.3
+[analysis]
+scheme = "HST"
+"""
+    equations = choose_equations(build(text))
+    assert not any(equations.traction[0, "lower"]) and any(equations.traction[0, "upper"])

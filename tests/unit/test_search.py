@@ -145,3 +145,11 @@ def test_a_search_is_stuck_where_no_fewer_pairs_change_for_long() -> None:
     still = Search(50)
     follow(still, *[[]] * 25)
     assert not still.is_stuck()
+
+
+def test_the_full_tangent_waits_until_friction_that_changes_with_slip_is_near_its_law() -> None:
+    for varying, law_error, level in ((True, 0.3, 2), (True, 0.01, 0), (False, 0.3, 0)):
+        search = Search(50, varying=varying)
+        assert search.descend() and search.descend()
+        search.note(propose([]), law_error)
+        assert search.level == level

@@ -139,3 +139,26 @@ loaded = { ty = -1.0 }
     assert model.curves["loaded"].legs[0].refine_end and model.curves["free"].legs[0].refine_start
     _, same = parse_model(text.replace("loaded = { ty = -1.0 }", "loaded = { ty = -1.0 }\nfree = { ty = -1.0 }"))
     assert not same.curves["loaded"].legs[0].refine_end
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_lengths_fall_geometrically_where_a_crack_branches_off(scale: float) -> None:
+    def branch(elements: int) -> Model:
+        return build(
+            scale, left=f"-0.8,0 0,0; elements = {elements}", right=f"0,0 1,0; elements = {elements}",
+            branch=f"0,0 0.3,0.8; elements = {elements}",
+        )
+
+    fine = branch(8)
+    from_corner = [lengths(fine, "left")[::-1], lengths(fine, "right"), lengths(fine, "branch")]
+    for own in from_corner:
+        # Equal on all three; growing by no more than twice the distance from the corner.
+        np.testing.assert_allclose(own[:6], from_corner[0][:6], rtol=1e-9)
+        assert own[0] == pytest.approx(6e-5 * 0.8 * scale, rel=1e-9)
+        assert (own[1:] <= 2 * np.cumsum(own)[:-1] * (1 + 1e-9)).all()
+        assert own.max() <= 0.13 * scale
+    # Four elements are too coarse for that to matter, and what crosses is no branch.
+    assert len(lengths(branch(4), "branch")) == 4
+    crossing = build(scale, left="-0.8,0 0,0; elements = 8", right="0,0 1,0; elements = 8",
+                     up="0,0 0.3,0.8; elements = 8", down="0,0 -0.3,-0.8; elements = 8")  # fmt: skip
+    assert len(lengths(crossing, "up")) == 8

@@ -7,9 +7,9 @@
     .venv/bin/python scripts/fuzz.py runs --count 3000
 
 cases: what `pbem check` does, in this process. results: damaged files are read, described, drawn and resumed in
-processes of their own, since HDF5 may crash. commands: the command line, but for runs. runs: small cases are computed, each in a process of its
-own; those that finish have no values that are not numbers, and their forces balance or a note says that they do not.
-Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind of failure
+processes of their own, since HDF5 may crash. commands: the command line, but for runs. runs: small cases are computed, each in a process of
+its own; those that finish have no values that are not numbers, and their forces balance or a note says that they do
+not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind of failure
 (exception and place in the program) with the number of the mutant, which --only makes again; exit code 1 if there are
 any. Anything that lasts more than a minute is a failure, and so are control characters in what is said.
 """

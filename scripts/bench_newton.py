@@ -89,7 +89,7 @@ def solve_classically(problem: Problem, tangent: FactoredTangent, load: Load, fa
         trial = problem.traction_scale * read_pair_unknowns(problem.mesh, unknowns)
         state = project(problem, trial, stiffness, nothing, load)
         offset = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
-        given = problem.constrain(Linearisation(np.zeros((count, 4, 2)), offset), load)
+        given = problem.constrain(Linearisation(np.zeros((count, 4, 2)), offset, problem.laws.leader), load)
         unbalanced = problem.apply(given.evaluate(unknowns), load)
         if problem.measure(unbalanced) <= problem.model.solver.newton_tolerance * scale:
             return state, number - 1

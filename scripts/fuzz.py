@@ -4,16 +4,21 @@
     .venv/bin/python scripts/fuzz.py cases --count 20000 [--seed 1]
     .venv/bin/python scripts/fuzz.py results --count 1000
     .venv/bin/python scripts/fuzz.py commands --count 2000
+    .venv/bin/python scripts/fuzz.py runs --count 3000
 
 cases: what `pbem check` does, in this process. results: damaged files are read, described, drawn and resumed in
-processes of their own, since HDF5 may crash. commands: the command line, but for runs. Prints each new kind of failure
-(exception and place in the program) with the number of the mutant, which --only makes again; exit code 1 if there are
-any. Anything that lasts more than a minute is a failure, and so are control characters in what is said.
+processes of their own, since HDF5 may crash. commands: the command line, but for runs. runs: small cases are computed,
+each in a process of its own; those that finish have no values that are not numbers, and their forces balance or a note
+says that they do not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind
+of failure (exception and place in the program) with the number of the mutant, which --only makes again; exit code 1 if
+there are any. Anything that takes more than a minute of processor time is a failure, and so are control
+characters in what is said.
 """
 
 from __future__ import annotations
 
 import argparse
+import collections
 import contextlib
 import io
 import os
@@ -24,7 +29,7 @@ import sys
 import tempfile
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -32,9 +37,11 @@ import numpy as np
 
 from pbem import cli
 from pbem.contact.strength import read_checked_model
-from pbem.errors import PbemError, is_control
+from pbem.errors import CaseError, ConvergenceError, PbemError, is_control
 from pbem.mesh.generate import generate_mesh
 from pbem.results.describe import describe_model, describe_results
+from pbem.results.reader import Results
+from pbem.solve.step import SilentReporter, Step
 
 ROOT = Path(__file__).resolve().parent.parent
 PATIENCE = 60
@@ -212,12 +219,29 @@ CHANGES: tuple[Change, ...] = (replace_value, replace_value, replace_number, rep
                                change_lines, change_characters)
 
 
-def mutate(seed: int, number: int, seeds: list[str]) -> str:
+def nudge_number(chance: random.Random, text: str, seeds: list[str]) -> str:
+    """A number by one that is not far from it, or of other size: most mutants of this kind can be computed."""
+    # Points that are moved alone mostly open a loop.
+    fixed = [each.span() for each in re.finditer(r"points = .*\]\]", text)] if chance.random() < 0.8 else []
+    found = [each for each in NUMBER.finditer(text) if not any(a <= each.start() < b for a, b in fixed)]
+    if not found:
+        return text
+    at = chance.choice(found)
+    value = float(at[0])
+    changed = value * chance.choice([0.5, 0.9, 0.99, 1.01, 1.1, 1.5, 2, 3, -1, 1e-3, 1e3])
+    whole = "." not in at[0] and chance.random() < 0.9
+    return text[: at.start()] + (str(round(changed)) if whole else f"{changed:.12g}") + text[at.end() :]
+
+
+CHANGES_OF_RUNS = (*CHANGES, *[nudge_number] * 21)
+
+
+def mutate(seed: int, number: int, seeds: list[str], changes: tuple[Change, ...] = CHANGES) -> str:
     """The mutant of this number."""
     chance = random.Random(f"{seed}/{number}")
     text = chance.choice(seeds)
     for _ in range(chance.choice([1, 1, 1, 2, 3, 6])):
-        text = chance.choice(CHANGES)(chance, text, seeds)
+        text = chance.choice(changes)(chance, text, seeds)
     return text
 
 
@@ -280,14 +304,16 @@ def fuzz_cases(seed: int, numbers: range, failures: Failures) -> int:
     return accepted
 
 
-def damage(chance: random.Random, whole: bytes) -> bytes:
-    """The file cut off, with other bits, bytes, pages; sometimes without its checksums, as other programs leave it."""
+def damage(chance: random.Random, whole: bytes, other: bytes) -> bytes:
+    """The file cut off, with other bits, bytes, pages, with pages of another file, or that one in its place."""
     data = bytearray(whole)
+    if chance.random() < 0.05:
+        return other
     if chance.random() < 0.3:
         del data[-chance.randint(1, 2000) :]
     for _ in range(chance.choice([1, 1, 2, 8])):
         at = chance.randrange(len(data))
-        kind = chance.randrange(7)
+        kind = chance.randrange(8)
         if kind == 0:
             data[at] ^= 1 << chance.randrange(8)
         elif kind == 1:
@@ -296,12 +322,15 @@ def damage(chance: random.Random, whole: bytes) -> bytes:
             length = chance.choice([8, 64, 512, 4096])
             data[at : at + length] = bytes(len(data[at : at + length]))
         elif kind == 3:
-            other = chance.randrange(len(data))
-            data[at : at + 512], data[other : other + 512] = data[other : other + 512], data[at : at + 512]
+            there = chance.randrange(len(data))
+            data[at : at + 512], data[there : there + 512] = data[there : there + 512], data[at : at + 512]
         elif kind == 4:
             del data[at : at + chance.randint(1, 100)]
         elif kind == 5:
             data[at:at] = bytes(chance.randint(1, 100))
+        elif kind == 6:
+            at, length = at - at % 4096, 4096 * chance.choice([1, 1, 4, 1000])
+            data[at : at + length] = other[at : at + length]
         else:
             del data[chance.randrange(len(data)) :]
         if not data:
@@ -309,7 +338,40 @@ def damage(chance: random.Random, whole: bytes) -> bytes:
     return bytes(data)
 
 
-def use_results(path: Path, draw: bool, resume: Callable[[], object]) -> None:
+class Snapshot(SilentReporter):
+    """Keeps the file as it is when a step of this number has been accepted: of a run that goes on."""
+
+    def __init__(self, number: int, path: Path) -> None:
+        self._number, self._path, self.data = number, path, b""
+
+    def accept(self, step: Step) -> None:
+        """Read the file, in which the steps before are."""
+        if step.number == self._number:
+            self.data = self._path.read_bytes()
+
+
+def expect_prefix(path: Path, expected: Sequence[Results]) -> None:
+    """Raise AssertionError if the file has other numbers than one of these, or than its first steps.
+
+    Files without checksums, as other programs leave them, are not compared. Raises ResultFileError if it is damaged.
+    """
+    from pbem.results.reader import open_results
+    from pbem.results.tail import read_tail
+
+    found = open_results(path)
+    with path.open("rb") as disk:
+        if read_tail(disk.fileno()) is None:
+            return
+    whole = next(each for each in expected if each.case == found.case)
+    k = len(found.steps)
+    for name in ("displacement", "traction", "hoop_stress"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name)[:k])
+    for name in ("slip", "traction_n", "mode", "opening"):
+        np.testing.assert_array_equal(getattr(found.contact["seat"], name), getattr(whole.contact["seat"], name)[:k])
+    np.testing.assert_array_equal(found.energy.elastic, whole.energy.elastic[:k])
+
+
+def use_results(path: Path, draw: bool, expected: Sequence[Results], resume: Callable[[], object]) -> None:
     """Read, describe, draw, resume: each may say that the file is damaged."""
     from pbem.results.plots import plot_results
     from pbem.results.reader import open_results
@@ -320,7 +382,10 @@ def use_results(path: Path, draw: bool, resume: Callable[[], object]) -> None:
         if draw:
             plot_results(results, path.with_suffix(".png"))
     with contextlib.suppress(PbemError):
+        expect_prefix(path, expected)
+    with contextlib.suppress(PbemError):
         resume()
+        expect_prefix(path, expected[:1])
 
 
 def in_child(action: Callable[[], None]) -> BaseException | None:
@@ -330,8 +395,11 @@ def in_child(action: Callable[[], None]) -> BaseException | None:
     if child == 0:
         os.close(reader)
         code = 0
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process, also within HDF5
-        signal.alarm(PATIENCE)
+        # Both end the process, also within HDF5: by its own time, and if it waits for something.
+        for number, timer, seconds in ((signal.SIGPROF, signal.ITIMER_PROF, PATIENCE),
+                                       (signal.SIGALRM, signal.ITIMER_REAL, 10 * PATIENCE)):
+            signal.signal(number, signal.SIG_DFL)
+            signal.setitimer(timer, seconds)
         try:
             action()
         except BaseException as error:
@@ -350,35 +418,31 @@ def in_child(action: Callable[[], None]) -> BaseException | None:
 def fuzz_results(seed: int, numbers: range, failures: Failures) -> int:
     """Use so many damaged files; returns how many were used. None may give other numbers than those written."""
     import pbem
-    from pbem.results.reader import open_results
     from pbem.results.writer import ResultWriter
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        case = folder / "case.toml"
+        case, another = folder / "case.toml", folder / "another.toml"
         case.write_text(SMALL.replace('name = "more"', 'name = "more"\nsteps = 2'), encoding="utf-8")
-        whole = pbem.run(case, folder / "whole.h5")
-        expected = (whole.traction, whole.contact["seat"].slip, whole.energy.elastic)
+        another.write_text(SMALL.replace("uy = -0.6", "uy = -0.5"), encoding="utf-8")
+        snapshot = Snapshot(3, folder / "whole.h5")
+        expected = (pbem.run(case, folder / "whole.h5", reporter=snapshot), pbem.run(another, folder / "another.h5"))
+        for each in expected:  # loaded here, once for all processes
+            assert len(each.displacement) == len(each.traction) == len(each.hoop_stress)
+            assert len(each.displacement) == len(each.contact["seat"].slip)
         model = read_checked_model(case)
         mesh = generate_mesh(model)
-        data = (folder / "whole.h5").read_bytes()
+        files = (folder / "whole.h5").read_bytes(), snapshot.data
+        other = (folder / "another.h5").read_bytes()
         path = folder / "mutant.h5"
         for number in numbers:
             chance = random.Random(f"{seed}/{number}")
-            changed = damage(chance, data)
-            path.write_bytes(changed)
-            sound = changed[-60:] == data[-60:]  # it still has its checksums
+            path.write_bytes(damage(chance, chance.choice(files), other))
 
-            def resume(sound: bool = sound) -> None:
-                writer = ResultWriter.resume(path, model, mesh, 1, "", (), np.zeros(len(model.interior_points), int))
-                writer.finish()
-                if sound:
-                    found = open_results(path)
-                    for one, other in zip(expected, (found.traction, found.contact["seat"].slip, found.energy.elastic),
-                                          strict=True):
-                        np.testing.assert_array_equal(one, other)
+            def resume() -> None:
+                ResultWriter.resume(path, model, mesh, 1, "", (), np.zeros(len(model.interior_points), int)).finish()
 
-            error = in_child(partial(use_results, path, chance.random() < 0.1, resume))
+            error = in_child(partial(use_results, path, chance.random() < 0.03, expected, resume))
             if error is not None:
                 failures.add(number, error)
     return len(numbers)
@@ -437,8 +501,235 @@ def fuzz_commands(seed: int, numbers: range, failures: Failures) -> int:
     return accepted
 
 
+PRESSED = """\
+[materials]
+a = { young = 1000.0, poisson = 0.3 }
+b = { young = 400.0, poisson = 0.2 }
+[curves]
+bottom = { points = [[0, 0], [2, 0]], elements = 2 }
+sides = { points = [[2, 0], [2, 1], [1.5, 1]], elements = [2, 1] }
+seat = { points = [[0.5, 1], [1.5, 1]], elements = 4 }
+others = { points = [[0.5, 1], [0, 1], [0, 0]], elements = [1, 2] }
+right = { points = [[1.5, 1], [1.5, 2]], elements = 2 }
+top = { points = [[1.5, 2], [0.5, 2]], elements = 2 }
+left = { points = [[0.5, 2], [0.5, 1]], elements = 2 }
+[regions]
+lower = { material = "a", boundary = ["bottom", "sides", "seat", "others"] }
+upper = { material = "b", boundary = ["seat", "right", "top", "left"] }
+[boundary]
+bottom = { ux = 0.0, uy = 0.0 }
+left = { pressure = 0.01 }
+[interfaces.seat]
+law = "coulomb"
+friction = 0.4
+cohesion = 0.02
+cohesion_lost = true
+[[stages]]
+steps = 1
+boundary.top = { tx = 0.0, ty = -0.5 }
+[[stages]]
+steps = 2
+boundary.top = { tx = 0.1 }
+"""
+
+CRACKED = """\
+materials.rock = { young = 1e3, poisson = 0.2 }
+[curves]
+one = { points = [[-1, 0], [1, 0.2]], elements = 4 }
+two = { points = [[-0.5, 1], [1, 1]], elements = 4 }
+ring = { center = [0, -2], radius = 0.7, elements = 8 }
+[regions]
+plane = { material = "rock", infinite = true, boundary = ["ring"], cracks = ["one", "two"] }
+grain = { material = "rock", boundary = ["ring"] }
+[interfaces]
+one = { friction = 0.3 }
+two = { law = "frictionless", pressure = 0.1 }
+ring = { law = "coulomb", friction = 0.5, cohesion = 0.1, tensile_strength = 0.1 }
+[remote]
+syy = -1.0
+sxx = -0.3
+sxy = 0.2
+[analysis]
+steps = 2
+[output]
+points = [[0.0, 0.5], [0, -2]]
+"""
+
+LOOSE = """\
+materials.m = { young = 1.0, poisson = 0.25, plane = "stress" }
+[curves]
+b1 = { points = [[0, 0], [1, 0], [1, 1]], elements = 2 }
+t1 = { points = [[1, 1], [0, 1]], elements = 3 }
+l1 = { points = [[0, 1], [0, 0]], elements = 2 }
+b2 = { points = [[0, 1.001], [1, 1.001]], elements = 3 }
+s2 = { points = [[1, 1.001], [1, 2], [0, 2], [0, 1.001]], elements = 6 }
+b3 = { points = [[0.1, 2], [0.9, 2]], elements = 3 }
+s3 = { points = [[0.9, 2], [0.9, 3]], elements = 2 }
+t3 = { points = [[0.9, 3], [0.1, 3]], elements = 2 }
+l3 = { points = [[0.1, 3], [0.1, 2]], elements = 2 }
+[regions]
+foot = { material = "m", boundary = ["b1", "t1", "l1"] }
+middle = { material = "m", boundary = ["b2", "s2"] }
+head = { material = "m", boundary = ["b3", "s3", "t3", "l3"] }
+[contacts]
+lower = { between = ["t1", "b2"], friction = 0.3 }
+upper = { between = ["s2", "b3"], friction = 0.5 }
+[boundary]
+b1 = { ux = 0, uy = 0 }
+t3 = { ux = 0, uy = 0 }
+[[stages]]
+steps = 2
+boundary.t3 = { uy = -0.01 }
+[analysis]
+scheme = "DBEM"
+"""
+
+MADE = """\
+materials.rock = { young = 2.0e4, poisson = 0.25, density = 1e-3 }
+regions.host = { material = "rock", infinite = true }
+remote = { sxx = -2.0, syy = -1.0, sxy = 0.4 }
+analysis.steps = 1
+analysis.order = 1
+[[generate]]
+kind = "cracks"
+name = "crack"
+region = "host"
+count = 4
+elements = 4
+half_length = 1.0
+orientation = 30.0
+orientation_spread = 60.0
+density = 0.05
+distance = 0.2
+friction = 0.3
+seed = 3
+[[generate]]
+kind = "inclusions"
+name = "grain"
+region = "host"
+material = "rock"
+count = 2
+elements = 8
+radius = 0.5
+density = 0.05
+distance = 0.2
+law = "coulomb"
+friction = 0.6
+"""
+
+MOST_NODES, MOST_STEPS = 800, 40
+OUT_OF_BALANCE = 1e-2
+
+
+def read_run_seeds() -> list[str]:
+    """Small cases with one of each kind of thing, of few nodes and steps, that are run."""
+    return [PRESSED, CRACKED, LOOSE, MADE]
+
+
+class Notes(SilentReporter):
+    """Keeps what a run notes."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Keep it."""
+        self.texts.append(text)
+
+
+def compute_case(path: Path) -> str:
+    """Run the case; how it ended: "finished", or the reason.
+
+    Raises AssertionError if what it finished with holds values that are not numbers, or forces that do not balance
+    without a note that says so.
+    """
+    import pbem
+
+    notes = Notes()
+    try:
+        results = pbem.run(path, path.with_suffix(".h5"), force=True, reporter=notes)
+    except CaseError as error:
+        assert str(error).count("\n  ") >= 1 and ": found " in str(error), f"a fault without its place: {error}"
+        return "refused"
+    except ConvergenceError as error:
+        assert error.detail, f"{error.reason} without a word"
+        return error.reason
+    except PbemError as error:
+        return type(error).__name__
+    expect_numbers(results)
+    noted = any("balance" in text for text in notes.texts)
+    balance = results.balance
+    assert balance is not None
+    worst = max(float(np.max(each, initial=0.0)) for each in (balance.relative, balance.whole_relative))
+    assert noted or worst <= OUT_OF_BALANCE, f"out of balance by {worst:.1e} without a note"
+    return "finished"
+
+
+def expect_numbers(results: Results) -> None:
+    """Raise AssertionError where a result is not a number; but for factors at ends that are no tips, and estimates."""
+    inside = None if results.interior is None else results.interior.region >= 0
+    values = {
+        "displacement": results.displacement, "traction": results.traction, "hoop stress": results.hoop_stress,
+        "residual": results.steps.residual,
+        **{f"reaction of {name}": each for name, each in results.reactions.items()},
+        **{f"energy {name}": getattr(results.energy, name) for name in vars(results.energy)},
+        **{f"{what} of {name}": getattr(each, what) for name, each in results.contact.items()
+           for what in ("opening", "slip", "traction_n", "traction_s")},
+    }  # fmt: skip
+    if results.interior is not None:
+        values["stress inside"] = results.interior.stress[:, inside]
+        values["displacement inside"] = results.interior.displacement[:, inside]
+    if results.balance is not None:
+        values["balance"] = results.balance.relative
+    for name, each in values.items():
+        assert np.isfinite(each).all(), f"{name} is not a number"
+    for name, tips in results.tips.items():
+        known = np.isfinite(tips.KI)
+        assert (known == known[:1]).all() and not np.isinf(tips.KI).any(), f"K of {name} is a number now and then"
+
+
+def fuzz_runs(seed: int, numbers: range, failures: Failures) -> int:
+    """Run so many mutants; returns how many were finished. How the others ended is printed."""
+    import pbem  # so that each process need not
+
+    assert pbem.run
+    seeds = read_run_seeds()
+    ends: collections.Counter[str] = collections.Counter()
+    with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        path = Path(name) / "mutant.toml"
+        number = numbers.start
+        while sum(ends.values()) < len(numbers):
+            path.write_text(mutate(seed, number, seeds, CHANGES_OF_RUNS), encoding="utf-8", errors="surrogatepass")
+            end = Path(name) / "end"
+            end.unlink(missing_ok=True)
+
+            def compute(end: Path = end) -> None:
+                end.write_text("too large" if is_too_large(path) else compute_case(path))
+
+            error = in_child(compute)
+            ending = "failure" if error is not None else end.read_text()
+            if error is not None:
+                failures.add(number, error)
+            if ending != "too large" or len(numbers) == 1:
+                ends[ending] += 1
+            number += 1
+    print(", ".join(f"{ending} {count}" for ending, count in ends.most_common()))
+    return ends["finished"]
+
+
+def is_too_large(path: Path) -> bool:
+    """Whether a case that is right takes too long to be computed a thousand times."""
+    try:
+        model = read_checked_model(path)
+        nodes = generate_mesh(model).nodes
+    except PbemError:
+        return False
+    return nodes > MOST_NODES or sum(stage.steps for stage in model.stages) > MOST_STEPS
+
+
 KINDS: dict[str, Callable[[int, range, Failures], int]] = {
-    "cases": fuzz_cases, "results": fuzz_results, "commands": fuzz_commands,
+    "cases": fuzz_cases, "results": fuzz_results, "commands": fuzz_commands, "runs": fuzz_runs,
 }
 
 
@@ -456,10 +747,11 @@ def main() -> int:
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="number of one mutant; of cases, its text is printed")
+    parser.add_argument("--only", type=int, help="number of one mutant; of cases and runs, its text is printed")
     options = parser.parse_args()
-    if options.only is not None and options.kind == "cases":
-        print(mutate(options.seed, options.only, read_seeds()))
+    if options.only is not None and options.kind in ("cases", "runs"):
+        print(mutate(options.seed, options.only, read_seeds()) if options.kind == "cases" else
+              mutate(options.seed, options.only, read_run_seeds(), CHANGES_OF_RUNS))
     accepted, failures = fuzz(options.kind, options.count, options.seed, options.only)
     print(f"{options.kind}: {options.count} mutants, {accepted} accepted, {failures.count} failures of "
           f"{len(failures.found)} kinds")

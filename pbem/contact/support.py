@@ -17,7 +17,7 @@ from pbem.model.support import FreeMotion, PairTie, Tie, find_free_motions
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
-# Two sticking pairs that are further apart than this part of the model's size hold all three motions.
+# Two sticking pairs that are further apart than this part of their interface's extent hold all three motions.
 APART = 1e-6
 # A motion is one of those that are anchored if it differs by less than this part of itself.
 ANCHORED = 1e-6
@@ -32,7 +32,8 @@ def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie | Pai
     closed = np.flatnonzero((modes.mode != OPEN) & ~pairs.crack)
     closed = closed[np.argsort(pairs.interface[closed], kind="stable")]
     bounds = np.searchsorted(pairs.interface[closed], np.arange(len(names) + 1))
-    held = _measure_span(mesh, closed[modes.mode[closed] == STICK]) > APART * model.size
+    extent = _measure_span(mesh, np.arange(pairs.count))
+    held = _measure_span(mesh, closed[modes.mode[closed] == STICK]) > APART * extent
     ties: dict[str, Tie | PairTie] = {}
     for number, name in enumerate(names):
         if name in model.interfaces and model.interfaces[name].second is None:

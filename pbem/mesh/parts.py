@@ -20,8 +20,14 @@ from pbem.mesh.mesh import Mesh
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
 
-# End points nearer to each other than this part of the model's size are one.
+# End points nearer to each other than this part of the shorter of their curves are one, as in the case file; and so are
+# those that differ by the rounding of the coordinates.
 COINCIDENT = 1e-9
+ROUNDINGS = 16
+# But not those that are further apart than this part of an element that ends there.
+WITHIN = 1e-3
+# What encloses less than this part of its own length squared encloses nothing.
+FLAT = 1e-9
 # Directions that differ by less (radians) are one.
 SAME_WAY = 1e-9
 
@@ -68,29 +74,29 @@ def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
     back_leave, back_arrive = _find_directions(mesh, cracks)
     leave, arrive = np.concatenate([leave, -back_arrive]), np.concatenate([arrive, -back_leave])
     count = len(start)
-    vertex = _number_vertices(np.concatenate([start, end]))
+    vertex = _number_vertices(np.concatenate([start, end]), np.tile(_measure_reach(mesh, own, cracks), 2))
     follower = _follow(vertex[:count], vertex[count:], np.angle(leave), np.angle(-arrive))
     loops, label = connected_components(
         sparse.csr_matrix((np.ones(count), (np.arange(count), follower)), shape=(count, count)), directed=False
     )
-    # Twice the area, and of an arc what lies beyond its chord.
-    origin = start.mean()
+    # Twice the area, and of an arc what lies beyond its chord; about a point of each loop, as it may be small.
+    _, at = np.unique(label, return_index=True)
+    origin = start[at][label]
     area = np.asarray((np.conj(start - origin) * (end - origin)).imag, dtype=float)
     sweep = np.concatenate([mesh.sweep[own], -mesh.sweep[cracks]])
     radius = np.abs(start - np.concatenate([mesh.center[own], mesh.center[cracks]]))
     beyond = np.where(sweep != 0, radius**2 * (sweep - np.sin(sweep)), 0.0)
     area = np.asarray(np.bincount(label, area + beyond, loops), dtype=float)
-    size = np.abs(start - origin).max() ** 2
-    outer = np.flatnonzero(area > COINCIDENT * size)
+    around = np.asarray(np.bincount(label, np.abs(end - start), loops), dtype=float)
+    outer = np.flatnonzero(area > FLAT * around**2)
     outer = outer[np.argsort(area[outer], kind="stable")]
     if not len(outer):
         return np.zeros(count, dtype=np.int64), 1
     # Both sides of closed cracks cancel: what is left is the material's area, or that of the holes in a plane.
-    bounded = float(area.sum()) > COINCIDENT * size
+    bounded = float(area.sum()) > FLAT * np.abs(start - start.mean()).max() ** 2
     part = np.full(loops, 0 if bounded else len(outer), dtype=np.int64)
     part[outer] = np.arange(len(outer))
     inner = np.setdiff1d(np.arange(loops), outer)
-    _, at = np.unique(label, return_index=True)
     for number in reversed(range(len(outer))):
         edges = label == outer[number]
         part[inner[_is_inside(start[at[inner]], start[edges], end[edges])]] = number
@@ -103,9 +109,24 @@ def _find_directions(mesh: Mesh, elements: Integer) -> tuple[Complex, Complex]:
     return chord * np.exp(-0.5j * sweep), chord * np.exp(0.5j * sweep)
 
 
-def _number_vertices(points: Complex) -> Integer:
+def _measure_reach(mesh: Mesh, own: Integer, cracks: Integer) -> NDArray[np.float64]:
+    """Of every way along the elements of a region: how near its ends are to points that are the same."""
+    length = np.abs(mesh.end - mesh.start)
+    of_curve = np.bincount(mesh.curve[own], length[own], len(mesh.curve_names))
+    points = np.concatenate([mesh.start[own], mesh.end[own]])
+    rounding = ROUNDINGS * float(np.finfo(float).eps) * float(np.abs(points).max())
+    ways = np.concatenate([own, cracks])
+    # Elements may be shorter than that by far, where they are graded or a curve is divided by others.
+    reach = np.minimum(COINCIDENT * of_curve[mesh.curve[ways]], WITHIN * length[ways])
+    return np.maximum(reach, rounding)
+
+
+def _number_vertices(points: Complex, reach: NDArray[np.float64]) -> Integer:
+    """Numbers (n,) of points, the same for those that are nearer to each other than both of their reaches."""
     places = np.stack([points.real, points.imag], axis=1)
-    near = cKDTree(places).query_pairs(COINCIDENT * float(np.abs(points - points.mean()).max()), output_type="ndarray")
+    near = cKDTree(places).query_pairs(float(reach.max()), output_type="ndarray")
+    apart = np.abs(points[near[:, 0]] - points[near[:, 1]])
+    near = near[apart <= np.minimum(reach[near[:, 0]], reach[near[:, 1]])]
     count = len(points)
     links = sparse.csr_matrix((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(count, count))
     return np.asarray(connected_components(links, directed=False)[1])

@@ -3,17 +3,15 @@
 HDF5 writes a file in no fixed order, so that a kill between two writes can leave it unreadable. Here all its writes are
 held back in memory until `JournaledFile.commit`, which
 
-1. writes what lies beyond the committed end of the file; nothing refers to it yet,
-2. writes a tail after it and brings it to the disk: the pages that change within the committed part (the journal), and
-   a checksum for each page of the new state,
-3. writes these pages to their places.
+1. writes a tail (see `pbem.results.tail`) beyond the committed file and its compact tail, and brings it to the disk:
+   all pages that change (the journal), and a checksum for each page of the new state,
+2. writes these pages to their places, and the compact tail of the new state behind them,
+3. writes the compact tail once more, at the end of the file.
 
-A kill before the tail is complete leaves the former state; a kill after it leaves the new one, since whoever opens the
-file takes the pages from the journal. HDF5 itself ignores what follows its own end of the file. Programs that change
-the file without this module cut the tail off; it is then read without checksums.
-
-The tail: checksums (4 bytes a page), numbers of the pages in the journal (8 bytes each), these pages; then the footer:
-magic, length of the HDF5 file, number of pages in the journal, checksum of all before it in the tail, and of itself.
+A kill before the tail is complete leaves the former state, of which nothing has been touched; a kill after it leaves
+the new one, since whoever opens the file takes the pages from the journal. What lies between the two tails then is room
+for the next journal: where the disk or a quota has none for another step, there is some for the reason that the run
+ended.
 """
 
 from __future__ import annotations
@@ -21,124 +19,29 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
-import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-PAGE = 4096
-MAGIC = b"pbemtail"
-FOOTER = struct.Struct("<8sQQI")
-CHECK = struct.Struct("<I")
-FOOTER_SIZE = FOOTER.size + CHECK.size
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-BLOCK = 256 * PAGE
+from pbem.results.tail import (
+    BLOCK,
+    PAGE,
+    Tail,
+    check_pages,
+    count_pages,
+    find_length,
+    measure_tail,
+    pack_tail,
+    read_fully,
+    sum_pages,
+    write_fully,
+)
 
-
-class DamageError(OSError):
-    """The contents of a file are not those that were written."""
-
-
-@dataclass(frozen=True)
-class Tail:
-    """length: of the HDF5 file (bytes); sums: checksum of each of its pages; pages: the journal, by page number."""
-
-    length: int
-    sums: NDArray[np.uint32]
-    pages: Mapping[int, bytes]
-
-
-def count_pages(length: int) -> int:
-    """Pages of a file of so many bytes; the last may be shorter."""
-    return -(-length // PAGE)
-
-
-def pack_tail(tail: Tail) -> bytes:
-    """The bytes of a tail, footer included."""
-    numbers = np.array(list(tail.pages), dtype="<u8").tobytes()
-    body = b"".join([tail.sums.astype("<u4").tobytes(), numbers, *(page.ljust(PAGE, b"\0") for page in
-                                                                   tail.pages.values())])
-    footer = FOOTER.pack(MAGIC, tail.length, len(tail.pages), zlib.crc32(body))
-    return body + footer + CHECK.pack(zlib.crc32(footer))
-
-
-def read_tail(disk: int) -> Tail | None:
-    """The tail of an open file (descriptor); None if there is none, or it is not complete."""
-    size = os.fstat(disk).st_size
-    if size < FOOTER_SIZE:
-        return None
-    end = os.pread(disk, FOOTER_SIZE, size - FOOTER_SIZE)
-    if len(end) < FOOTER_SIZE or not end.startswith(MAGIC):
-        return None
-    _, length, count, body_sum = FOOTER.unpack(end[: FOOTER.size])
-    if zlib.crc32(end[: FOOTER.size]) != CHECK.unpack(end[FOOTER.size :])[0]:
-        return None
-    pages = count_pages(length)
-    needed = 4 * pages + count * (8 + PAGE)
-    start = size - FOOTER_SIZE - needed
-    if start < length:
-        return None
-    body = _read_fully(disk, needed, start)
-    if len(body) < needed or zlib.crc32(body) != body_sum:
-        return None
-    sums = np.frombuffer(body, "<u4", pages).astype(np.uint32)
-    numbers = np.frombuffer(body, "<u8", count, offset=4 * pages)
-    first = 4 * pages + 8 * count
-    journal = {
-        int(number): body[first + PAGE * i : first + PAGE * (i + 1)][: length - PAGE * int(number)]
-        for i, number in enumerate(numbers)
-    }
-    return Tail(length, sums, journal)
-
-
-def sum_pages(disk: int, length: int, instead: Mapping[int, bytes] | None = None) -> NDArray[np.uint32]:
-    """Checksums of the pages of the first `length` bytes of a file; `instead`: pages that take the place of its own."""
-    sums = np.zeros(count_pages(length), dtype=np.uint32)
-    for start in range(0, length, BLOCK):
-        block = memoryview(_read_fully(disk, min(BLOCK, length - start), start))
-        for at in range(0, len(block), PAGE):
-            sums[(start + at) // PAGE] = zlib.crc32(block[at : at + PAGE])
-    for number, page in (instead or {}).items():
-        sums[number] = zlib.crc32(page)
-    return sums
-
-
-def find_length(disk: int) -> int:
-    """The length (bytes) of the HDF5 file by its own superblock, at most that of the file."""
-    size = os.fstat(disk).st_size
-    head = os.pread(disk, 48, 0)
-    if len(head) < 48 or not head.startswith(SIGNATURE) or head[8] not in (2, 3) or head[9] != 8:
-        return size
-    return int(min(size, struct.unpack("<Q", head[28:36])[0]))
-
-
-def check_pages(disk: int) -> Tail | None:
-    """The tail, if all pages are what was written, in their places or in the journal; None of a file without a tail.
-
-    Raises DamageError, with the place of the first that is not.
-    """
-    tail = read_tail(disk)
-    if tail is not None:
-        wrong = np.flatnonzero(sum_pages(disk, tail.length, tail.pages) != tail.sums)
-        if len(wrong):
-            raise DamageError(errno.EIO, f"it was damaged: the checksum of bytes {wrong[0] * PAGE} to "
-                                         f"{min((wrong[0] + 1) * PAGE, tail.length) - 1} is wrong")
-    return tail
-
-
-def find_unapplied(disk: int) -> Tail | None:
-    """The tail if pages of its journal differ from those in their places: the process was killed in between."""
-    tail = read_tail(disk)
-    if tail is None:
-        return None
-    for number, page in tail.pages.items():
-        if os.pread(disk, len(page), number * PAGE) != page:
-            return tail
-    return None
+# Pages that are kept beyond a file, if nothing else is, for the reason that its run ended.
+ROOM = 16
 
 
 def lock(disk: int, wait: bool = False) -> bool:
@@ -187,8 +90,8 @@ class OverlaidFile:
     def readinto(self, buffer: memoryview) -> int:
         """As of any file."""
         view = memoryview(buffer).cast("B")
-        data = bytearray(_read_fully(self._disk.fileno(), max(0, min(len(view), self._tail.length - self._at)),
-                                     self._at))
+        wanted = max(0, min(len(view), self._tail.length - self._at))
+        data = bytearray(read_fully(self._disk.fileno(), wanted, self._at))
         for number in range(self._at // PAGE, count_pages(self._at + len(data))):
             if number in self._tail.pages:
                 _lay_over(data, self._at, self._tail.pages[number], number * PAGE)
@@ -210,10 +113,12 @@ class OverlaidFile:
 
 
 class JournaledFile:
-    """A file for h5py to go on writing, as one process; it holds the lock until it is closed.
+    """A file, perhaps still empty, for h5py to go on writing, as one process; it holds the lock until it is closed.
 
-    dirty: whether there are writes that were not committed. Raises BlockingIOError if another process is writing it,
-    DamageError if it is damaged, OSError if it cannot be read or written.
+    dirty: whether there are writes that were not committed. checked: whether it had checksums, which are right.
+
+    Raises BlockingIOError if another process is writing it, DamageError if it is damaged, OSError if it cannot be read
+    or written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -228,14 +133,18 @@ class JournaledFile:
 
     def _restore(self) -> None:
         """Go to the committed state on the disk; what has not been committed is forgotten."""
-        tail = check_pages(self._disk)
-        self._room = os.fstat(self._disk).st_size
-        if tail is not None:
-            for number, page in tail.pages.items():
-                _write_fully(self._disk, page, number * PAGE)
-            os.fsync(self._disk)
-        self._committed = find_length(self._disk) if tail is None else tail.length
-        self._sums = sum_pages(self._disk, self._committed) if tail is None else tail.sums
+        empty = not os.fstat(self._disk).st_size
+        tail = Tail(0, np.zeros(0, dtype=np.uint32), {}) if empty else check_pages(self._disk)
+        self.checked = not empty and tail is not None
+        if empty or tail is None:
+            length = find_length(self._disk)
+            tail = Tail(length, sum_pages(self._disk, length), {})
+            self._tail_size = 0
+        else:
+            self._tail_size = measure_tail(tail.length)
+            if tail.pages:
+                self._bring_home(tail)
+        self._committed, self._sums = tail.length, tail.sums
         self._length, self._at = self._committed, 0
         self._pages: dict[int, bytearray] = {}
 
@@ -261,7 +170,7 @@ class JournaledFile:
         view = memoryview(buffer).cast("B")
         wanted = max(0, min(len(view), self._length - self._at))
         there = max(0, min(wanted, self._committed - self._at))
-        data = bytearray(_read_fully(self._disk, there, self._at)).ljust(wanted, b"\0")
+        data = bytearray(read_fully(self._disk, there, self._at)).ljust(wanted, b"\0")
         for number in range(self._at // PAGE, count_pages(self._at + wanted)):
             if number in self._pages:
                 _lay_over(data, self._at, self._pages[number], number * PAGE)
@@ -289,7 +198,7 @@ class JournaledFile:
     def _open_page(self, number: int) -> bytearray:
         if number not in self._pages:
             there = max(0, min(PAGE, self._committed - number * PAGE))
-            self._pages[number] = bytearray(_read_fully(self._disk, there, number * PAGE)).ljust(PAGE, b"\0")
+            self._pages[number] = bytearray(read_fully(self._disk, there, number * PAGE)).ljust(PAGE, b"\0")
         return self._pages[number]
 
     def truncate(self, size: int | None = None) -> int:
@@ -301,44 +210,62 @@ class JournaledFile:
         """Nothing: see `commit`."""
 
     def commit(self, last: bool = False) -> None:
-        """Bring all writes to the disk as one change. last: no further one follows, so that no journal stays behind.
+        """Bring all writes to the disk as one change. last: no further one follows, so that only a compact tail stays.
 
         Raises OSError; unless it happened after the change was complete, the file is as before.
         """
-        length, before = self._length, self._committed
-        pages = {number: page for number, page in sorted(self._pages.items()) if number * PAGE < length}
-        sums = np.resize(self._sums, count_pages(length)).astype(np.uint32)
-        if length != before:  # the pages at the old and at the new end may have become longer or shorter
-            for number in {(min(length, before) - 1) // PAGE, (length - 1) // PAGE}:
-                pages[number] = self._open_page(number)
-        for number in range(count_pages(before), count_pages(length)):
-            pages.setdefault(number, bytearray(PAGE))  # holes that were never written
-        for number, page in pages.items():
-            sums[number] = zlib.crc32(memoryview(page)[: length - number * PAGE])
-        inside = {number: bytes(page[: length - number * PAGE]) for number, page in sorted(pages.items())
-                  if number * PAGE < before and (sums[number] != self._sums[number] or length != before)}
+        tail = self._collect_changes()
+        compact = measure_tail(tail.length)
+        size = os.fstat(self._disk).st_size
+        start = max(self._committed + self._tail_size, tail.length + compact)
         try:
-            _write_pages(self._disk, {n: page for n, page in pages.items() if n * PAGE >= before}, length)
-            self._write_tail(Tail(length, sums, inside), max(length, before))
+            end = _write_tail(self._disk, tail, start)
+            if end < size:
+                os.fsync(self._disk)
+                os.ftruncate(self._disk, end)
+            os.fsync(self._disk)
         except OSError:
-            # The blocks of the former tail are kept: the status, at least, will have room.
-            os.ftruncate(self._disk, max(before, min(self._room, os.fstat(self._disk).st_size)))
+            # What the file had already it keeps: there, at least, will be room for the status.
+            os.ftruncate(self._disk, size)
             raise
         # The change is complete. If its pages cannot be written to their places, they stay in the journal.
-        self._committed, self._sums = length, sums
-        # The superblock, on the first page, goes first: with it all that the others refer to is inside of the file.
-        _write_pages(self._disk, inside, length)
-        os.fsync(self._disk)
+        self._committed, self._sums, self._tail_size = tail.length, tail.sums, compact
+        self._bring_home(tail)
         self._pages = {}
         if last:
-            self._write_tail(Tail(length, sums, {}), length)
+            os.ftruncate(self._disk, tail.length + compact)
+            return
+        if size < start:  # none is left of the last journal
+            with suppress(OSError):
+                write_fully(self._disk, bytes(ROOM * PAGE), end)
+        _write_tail(self._disk, Tail(tail.length, tail.sums, {}), os.fstat(self._disk).st_size - compact)
 
-    def _write_tail(self, tail: Tail, start: int) -> None:
-        packed = pack_tail(tail)
-        _write_fully(self._disk, packed, start)
-        os.ftruncate(self._disk, start + len(packed))
+    def _collect_changes(self) -> Tail:
+        """The tail of the state to come, with all pages that change."""
+        length, before = self._length, self._committed
+        if length != before:  # the pages at the old and at the new end may have become longer or shorter
+            for number in {max(min(length, before) - 1, 0) // PAGE, (length - 1) // PAGE}:
+                self._open_page(number)
+        for number in range(count_pages(before), count_pages(length)):
+            self._pages.setdefault(number, bytearray(PAGE))  # holes that were never written
+        sums = np.resize(self._sums, count_pages(length)).astype(np.uint32)
+        changed = {}
+        for number, page in sorted(self._pages.items()):
+            part = memoryview(page)[: max(0, length - number * PAGE)]
+            if not part:
+                continue
+            own = zlib.crc32(part)
+            if length != before or number >= len(self._sums) or own != self._sums[number]:
+                changed[number] = part
+            sums[number] = own
+        return Tail(length, sums, changed)
+
+    def _bring_home(self, tail: Tail) -> None:
+        """Write the pages of a journal to their places, and the compact tail behind them."""
+        # The superblock, on the first page, goes first: with it all that the others refer to is inside of the file.
+        _write_pages(self._disk, tail.pages)
+        _write_tail(self._disk, Tail(tail.length, tail.sums, {}), tail.length)
         os.fsync(self._disk)
-        self._room = start + len(packed)
 
     def close(self) -> None:
         """Give the lock back; what was not committed is lost."""
@@ -347,40 +274,39 @@ class JournaledFile:
             self._disk = -1
 
 
-def _lay_over(data: bytearray, start: int, page: bytes | bytearray, at: int) -> None:
-    """Put the part of a page at `at` over that of the data at `start` which lies in it."""
-    first, last = max(start, at), min(start + len(data), at + len(page))
-    if first < last:
-        data[first - start : last - start] = page[first - at : last - at]
+def _write_tail(disk: int, tail: Tail, start: int) -> int:
+    """Write it from there on, in few pieces; its end."""
+    waiting: list[bytes] = []
+    for part in pack_tail(tail):
+        waiting.append(part)
+        if sum(map(len, waiting)) > BLOCK:
+            start = _write_parts(disk, waiting, start)
+    return _write_parts(disk, waiting, start)
 
 
-def _write_pages(disk: int, pages: Mapping[int, bytes | bytearray], length: int) -> None:
-    """Write pages to their places, neighbours at once, nothing beyond the length."""
-    run: list[bytes | bytearray] = []
+def _write_parts(disk: int, parts: list[bytes], start: int) -> int:
+    """Write them one after the other, and forget them; where they end."""
+    data = b"".join(parts)
+    parts.clear()
+    write_fully(disk, data, start)
+    return start + len(data)
+
+
+def _write_pages(disk: int, pages: Mapping[int, memoryview | bytes]) -> None:
+    """Write pages to their places, neighbours at once."""
+    run: list[memoryview | bytes] = []
     first = 0
     for number in [*sorted(pages), -1]:
-        if run and number != first + len(run):
-            _write_fully(disk, b"".join(run)[: length - first * PAGE], first * PAGE)
+        if run and (number != first + len(run) or len(run) == 256):
+            write_fully(disk, b"".join(run), first * PAGE)
             run = []
         if number >= 0:
             first = number if not run else first
             run.append(pages[number])
 
 
-def _write_fully(disk: int, data: bytes, at: int) -> None:
-    view = memoryview(data)
-    while view:
-        done = os.pwrite(disk, view, at)
-        view, at = view[done:], at + done
-
-
-def _read_fully(disk: int, count: int, at: int) -> bytes:
-    """So many bytes from a place on, or those until the end of the file."""
-    parts = []
-    while count > 0:
-        part = os.pread(disk, count, at)
-        if not part:
-            break
-        parts.append(part)
-        count, at = count - len(part), at + len(part)
-    return b"".join(parts)
+def _lay_over(data: bytearray, start: int, page: bytes | bytearray | memoryview, at: int) -> None:
+    """Put the part of a page at `at` over that of the data at `start` which lies in it."""
+    first, last = max(start, at), min(start + len(data), at + len(page))
+    if first < last:
+        data[first - start : last - start] = page[first - at : last - at]

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError
-from pbem.results.journal import DamageError, OverlaidFile, find_unapplied
+from pbem.results.journal import OverlaidFile
+from pbem.results.tail import DamageError, find_unapplied
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pbem.errors import ResultFileError
-from pbem.results.journal import SIGNATURE
-from pbem.results.lazy import open_quietly
+from pbem.results.lazy import open_quietly, refuse_damage
+from pbem.results.tail import SIGNATURE
+from pbem.results.trial import check_contents
 
 PICTURE_FORMATS = (".png", ".pdf", ".svg")
 
@@ -71,6 +72,8 @@ def _check_folder(path: str | os.PathLike[str]) -> Path:
 def _refuse_to_replace(target: Path, force: bool, source: str | None) -> None:
     """Raise ResultFileError unless the file that is there may be replaced: it is a result file, and force is set."""
     try:
+        with refuse_damage(target):
+            check_contents(target)
         with open_quietly(target) as file:
             known = "pbem_version" in file.attrs
             other = known and source is not None and file.attrs.get("case") != source

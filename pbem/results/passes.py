@@ -16,6 +16,7 @@ from pbem.results.journal import lock
 from pbem.results.layout import read_fractions
 from pbem.results.lazy import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
+from pbem.results.trial import check_contents
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,8 @@ def read_refinement(path: Path) -> Refinement | None:
     Raises ResultFileError if it cannot be read.
     """
     try:
+        with refuse_damage(path):
+            check_contents(path)
         with open_quietly(path) as file:
             fractions = read_fractions(file)
             if fractions is None:

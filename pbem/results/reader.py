@@ -20,7 +20,7 @@ from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
 from pbem.results.contents import Balances, Elements, Energies, Errors, Linearities, Nodes, Steps, Tips, Units
-from pbem.results.journal import check_pages, is_being_written
+from pbem.results.journal import is_being_written
 from pbem.results.layout import ENERGIES, TIP_DATASETS, count_steps, read_fractions
 from pbem.results.lazy import (
     AllPairs,
@@ -33,6 +33,7 @@ from pbem.results.lazy import (
     refuse_damage,
 )
 from pbem.results.linearity import read_linearity
+from pbem.results.trial import check_contents
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -143,11 +144,7 @@ def open_results(path: str | os.PathLike[str]) -> Results:
 
 
 def _open(path: Path) -> Results:
-    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        check_pages(disk)
-    finally:
-        os.close(disk)
+    check_contents(path)
     with open_quietly(path) as file:
         if "pbem_version" not in file.attrs:
             raise ResultFileError(str(path), "is an HDF5 file, but not a result file of pbem")

@@ -11,6 +11,7 @@ import h5py
 
 from pbem.errors import ResultFileError
 from pbem.results.journal import JournaledFile, lock
+from pbem.results.trial import try_reading
 
 # The 1.8 format stores long lists of names. Only views need more; a file that is all of the 1.10 format could not be
 # opened after its run was killed.
@@ -21,8 +22,11 @@ TAKEN = "is being written by another run; wait for its end, or name another outp
 class Store:
     """An open result file. file: the h5py file; its changes are on the disk after `commit`, all of them or none."""
 
-    def __init__(self, path: Path) -> None:
-        """Open an existing file. Raises ResultFileError if another run has it, or it cannot be read or written."""
+    def __init__(self, path: Path, fill: Callable[[h5py.File], None] | None = None) -> None:
+        """Open an existing file; an empty one with what `fill` writes, which then is on the disk.
+
+        Raises ResultFileError if another run has it, or it cannot be read or written; OSError if there is no room.
+        """
         self.path = path
         try:
             self._journal = JournaledFile(path)
@@ -31,6 +35,12 @@ class Store:
         except OSError as error:
             raise ResultFileError(str(path), f"cannot be used ({error.strerror or error})") from error
         try:
+            if fill is not None:
+                with h5py.File(self._journal, "w", libver=VERSIONS) as file:
+                    fill(file)
+                self._journal.commit()
+            elif not self._journal.checked:
+                try_reading(path)
             self.file = self._open()
         except BaseException:
             self._journal.close()
@@ -87,20 +97,10 @@ def create_store(target: Path, replace: bool, fill: Callable[[h5py.File], None])
     """
     remove_stale_parts(target)
     part = name_part(target)
-    disk = os.open(part, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
+    os.close(os.open(part, os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666))
     try:
-        lock(disk)  # who finds it locked knows that it is not stale
-        with h5py.File(part, "w", libver=VERSIONS, locking=False) as file:
-            fill(file)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
-    finally:
-        os.close(disk)
-    try:
-        store = Store(part)
+        store = Store(part, fill)
         try:
-            store.commit()
             _move(part, target, replace)
         except BaseException:
             store.drop()

@@ -16,6 +16,7 @@ from pbem.solve.krylov import make_tangent
 from pbem.solve.limit_load import can_balance, find_balanced_fraction
 from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_linearity
 from pbem.solve.newton import Solution, solve_step
+from pbem.solve.passing import describe_passing, find_passing
 from pbem.solve.problem import Problem
 from pbem.solve.proportional import is_proportional
 from pbem.solve.step import ContactState, Reporter, Step
@@ -113,7 +114,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
     """
     begin = start or start_from_rest(problem)
     tangent = make_tangent(problem)
-    number, memory, noted, told = begin.number, begin.memory, 0.0, 0.0
+    number, memory, noted, told, depth = begin.number, begin.memory, 0.0, 0.0, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
@@ -129,6 +130,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
                 step = describe_step(problem, solution, memory, number, stage, reached)
                 noted = _note_imbalance(problem, step, noted, reporter)
                 told = _note_nonlinearity(problem, step, told, reporter)
+                depth = _note_passing(problem, step, depth, reporter)
                 reporter.accept(step)
                 yield step
     except (ConvergenceError, GeneratorExit):
@@ -168,6 +170,16 @@ def _note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Rep
             reporter.note(f"Step {step.number}: {text}.")
         return amount if notes else noted
     return noted
+
+
+def _note_passing(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
+    """Note bodies that have moved into each other, if twice as deep as was noted before; returns what is noted now."""
+    moved = step.displacement[: problem.mesh.nodes]
+    found = do_on_first(problem.comm, ConvergenceError, lambda: find_passing(problem.model, problem.mesh, moved))
+    if found is None or found.depth <= 2 * noted:
+        return noted
+    reporter.note(f"Step {step.number}: {describe_passing(found)}.")
+    return found.depth
 
 
 def _advance(

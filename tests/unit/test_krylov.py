@@ -235,3 +235,16 @@ def test_slender_bodies_are_solved_to_the_true_residual() -> None:
     exact = direct.solve(dense.constrain(law, load), load, law).unknowns.reshape(-1, 2)
     direct.destroy()
     assert tip == pytest.approx(exact[np.argmax(mesh.position.real), 1], rel=1e-6)
+
+
+def test_groups_take_in_more_around_them_where_gmres_is_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a slender body divided into many groups; the same system then takes far fewer iterations."""
+    monkeypatch.setattr(groups, "ONE_GROUP", 0)
+    monkeypatch.setattr(groups, "GROUP_ELEMENTS", 12)
+    tangent = solve_once(SLENDER.replace("40", "80").replace("steps = 1", "steps = 1\norder = 1"))
+    slow, so_far, problem = tangent.iterations[0], len(tangent.iterations), tangent.problem
+    assert slow > 60
+    load, tangent.solution = problem.evaluate_load(0, 1.0), None
+    tangent.solve(problem.constrain(linearise_pairs(problem), load), load)
+    assert tangent.iterations[so_far] < 0.6 * slow
+    tangent.destroy()

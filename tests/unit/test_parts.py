@@ -63,6 +63,18 @@ def test_parts_are_the_faces_of_the_plane_graph(cracks: dict[str, str], count: i
     assert set(parts.first) | set(parts.second) == set(range(count))
 
 
+@pytest.mark.parametrize("size", [1e-1, 1e-3, 1e-5, 1e-7])
+def test_a_part_may_be_small_in_its_region(size: float) -> None:
+    """A corner that a crack cuts off; and a crack in that corner of which one end does not reach the surface."""
+    mesh, parts = divide(write_plate({"c": f"points = [[0, {size!r}], [{size!r}, 0]]"}))
+    small = np.flatnonzero(parts.second != parts.first)
+    assert len(parts.region) == 2 and len(small) == np.count_nonzero(mesh.crack)
+    own = np.flatnonzero((parts.first == parts.first[0]) & ~mesh.crack)
+    assert sorted([len(own), mesh.elements - len(small) - len(own)])[0] >= 2
+    _, parts = divide(write_plate({"c": f"points = [[0, {size!r}], [{0.9 * size!r}, {0.1 * size / 3!r}]]"}))
+    assert len(parts.region) == 1
+
+
 def test_both_faces_of_a_crack_lie_in_the_parts_beside_it() -> None:
     mesh, parts = divide(write_plate(ACROSS))
     # The crack runs to the right: its first face belongs to what is above.

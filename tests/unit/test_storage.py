@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pbem.errors import ResultFileError, StorageError
-from pbem.results import journal
+from pbem.results import journal, tail
 from pbem.results.output import check_output_path
 from pbem.results.reader import open_results
 from pbem.results.store import Store, create_store
@@ -38,7 +38,7 @@ class Fault:
         self.calls = 0
         self._error, self._lasting = error, lasting
         self._write = os.pwrite
-        patch.setattr(journal.os, "pwrite", self._pwrite)
+        patch.setattr(journal.os, "pwrite", self._pwrite)  # one module for all
         for name in ("ftruncate", "fsync"):
             patch.setattr(journal.os, name, self._wrap(getattr(os, name)))
 
@@ -248,7 +248,7 @@ def test_damage_is_told_in_one_message(what: str, tmp_path: Path) -> None:
                 continue
             expect_steps(path, 3)  # only the checksums were hit
             with path.open("rb") as file:
-                assert what == "the tail" or place + 64 > journal.find_length(file.fileno())
+                assert what == "the tail" or place + 64 > tail.find_length(file.fileno())
             break
 
 
@@ -267,7 +267,7 @@ def test_a_torn_file_is_read_as_committed_and_left_alone(tmp_path: Path, monkeyp
         fault.allow(-1)
         torn = path.read_bytes()
         with path.open("rb") as file:
-            found += journal.find_unapplied(file.fileno()) is not None
+            found += tail.find_unapplied(file.fileno()) is not None
         expect_steps(path, len(open_results(path).steps))
         assert path.read_bytes() == torn
         path.unlink()
@@ -280,12 +280,12 @@ def test_files_that_others_have_changed_are_read_without_checksums(tmp_path: Pat
     with h5py.File(path, "r+") as file:
         file.attrs["remark"] = "mine"
     with path.open("rb") as disk:
-        assert journal.read_tail(disk.fileno()) is None
+        assert tail.read_tail(disk.fileno()) is None
     expect_steps(path, 3)
     store = Store(path)
     store.close()
     with path.open("rb") as disk:
-        assert journal.check_pages(disk.fileno()) is not None
+        assert tail.check_pages(disk.fileno()) is not None
     expect_steps(path, 3)
 
 

@@ -1,0 +1,199 @@
+#!/usr/bin/env python3
+"""Run models on two ranks, once with equal kernels and once with one rank's built for another processor, and compare.
+
+    .venv/bin/python -m scripts.compare_kernels --count 200 [--first 0] [--records FILE]
+
+A cluster's nodes need not be alike: what one rank computes may differ in the last bits from what the other one does.
+The kernels are compiled once more, without AVX and hardly optimised; one rank (in turn) takes them in the second run of
+each pair. Statuses, iterations, steps and the reason of an end must be the same; the largest difference of
+displacements and tractions is told. Models are those of scripts/torture.py of up to --nodes nodes. Exit code 1 if any
+pair differs or does not end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.machinery
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+KINDS = ("edge", "cut", "plate", "pin", "wedge", "loose", "stack", "field")
+# Other instructions, another order of sums, no vector functions: the last bits differ in most entries.
+OTHER_FLAGS = "-O1 -mno-avx -mno-avx2 -mno-fma"
+Found = dict[str, Any]
+
+
+def main() -> int:
+    """The script; returns its exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=200, help="pairs of runs")
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--nodes", type=int, default=400, help="of the largest model")
+    parser.add_argument("--records", type=Path, help="a line for each pair is added; pairs that are there are not run")
+    parser.add_argument("--timeout", type=float, default=600.0, help="seconds for a pair")
+    parser.add_argument("--worker", nargs=2, metavar=("KERNELS", "RECORDS"), help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.worker:
+        work(Path(options.worker[0]), Path(options.worker[1]), options.first, options.count, options.nodes)
+        return 0
+    with tempfile.TemporaryDirectory() as name:
+        records = (options.records or Path(name) / "records").absolute()
+        records.touch()
+        return launch_all(build_others(Path(name)), records, options)
+
+
+def launch_all(kernels: Path, records: Path, options: argparse.Namespace) -> int:
+    """Workers until all pairs are there; one that hangs is ended, and the next goes on after its pair."""
+    from tests.parallel.launch import kill_session, make_environment
+
+    done = read_records(records)
+    first = max([options.first, *(each["seed"] + 1 for each in done)])
+    while sum("equal" in each for each in done) < options.count:
+        missing = options.count - sum("equal" in each for each in done)
+        command = ["mpirun", "-n", "2", sys.executable, "-m", "scripts.compare_kernels", "--first", str(first),
+                   "--count", str(missing), "--nodes", str(options.nodes), "--worker", str(kernels), str(records)]
+        process = subprocess.Popen(command, cwd=ROOT, env=make_environment(), start_new_session=True,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        size, since = -1, time.monotonic()
+        while process.poll() is None and time.monotonic() - since < options.timeout:
+            time.sleep(0.2)
+            if records.stat().st_size != size:
+                size, since = records.stat().st_size, time.monotonic()
+        hangs = process.poll() is None
+        error = kill_session(process)[1] if hangs else process.communicate()[1]
+        done = read_records(records)
+        first = max([first, *(each["seed"] + 1 for each in done)])
+        if hangs or process.returncode:
+            text = "no end" if hangs else f"exit code {process.returncode}: {error[-500:]}"
+            with records.open("a") as file:
+                file.write(json.dumps({"seed": first, "equal": False, "differs": [text]}) + "\n")
+            done, first = read_records(records), first + 1
+    pairs = [each for each in done if "equal" in each]
+    for each in pairs:
+        if not each["equal"]:
+            print(each)
+    largest = max((each.get("largest", 0.0) for each in pairs), default=0.0)
+    settled = sum(each.get("end") == "finished" for each in pairs)
+    unlike = sum(each.get("largest", 0.0) > 0 for each in pairs)
+    wrong = sum(not each["equal"] for each in pairs)
+    print(f"{len(pairs)} pairs, {settled} finished: {wrong} differ in statuses, iterations or ends; values differ in "
+          f"{unlike}, by {largest:.1e} of the largest at most")
+    return 1 if wrong else 0
+
+
+def read_records(path: Path) -> list[Found]:
+    """What was found so far; a model that is too large or wrong has a record without the key "equal"."""
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def build_others(folder: Path) -> Path:
+    """The kernels built with other instructions; the path of the library."""
+    environment = os.environ | {"PBEM_MARCH": "x86-64", "CFLAGS": f"{os.environ.get('CFLAGS', '')} {OTHER_FLAGS}"}
+    command = [sys.executable, "setup.py", "-q", "build_ext", "--build-lib", str(folder), "--build-temp", str(folder)]
+    subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
+    return next(folder.rglob("_kernels*.so"))
+
+
+def load_kernels(path: Path) -> ModuleType:
+    """The library as a module beside the one in use."""
+    loader = importlib.machinery.ExtensionFileLoader("pbem.bem._kernels", str(path))
+    spec = importlib.util.spec_from_file_location("pbem.bem._kernels", path, loader=loader)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module
+
+
+def work(kernels: Path, records: Path, first: int, count: int, most_nodes: int) -> None:
+    """On all ranks: so many pairs from a seed on; the first rank adds a line for each."""
+    from pbem.bem import rows
+    from pbem.mesh.generate import generate_mesh
+    from pbem.model.build import read_model
+    from pbem.parallel import world
+    from scripts.torture.kinds import draw_sample
+
+    own, other = rows._kernels, load_kernels(kernels)
+    assert Path(str(other.__file__)) == kernels and own.__file__ != other.__file__
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(world.bcast(name))
+        case, pairs, seed = folder / "case.toml", 0, first
+        while pairs < count:
+            found: Found = {"seed": seed}
+            if world.rank == 0:
+                case.write_text(draw_sample(seed, KINDS).text())
+            world.Barrier()
+            nodes = generate_mesh(read_model(case)[1]).nodes
+            if nodes <= most_nodes:
+                ends = []
+                for turn, mixed in enumerate((False, True)):
+                    rows._kernels = other if mixed and world.rank == seed % 2 else own
+                    ends.append(compute(case, folder / f"{turn}.h5"))
+                rows._kernels = own
+                found |= {"nodes": nodes, "kind": KINDS[seed % len(KINDS)], **compare(*ends)}
+                pairs += 1
+            # All ranks must have found the same.
+            alike = world.allgather({name: value for name, value in found.items() if name != "largest"})
+            if any(each != alike[0] for each in alike):
+                found = {**found, "equal": False, "differs": ["the ranks"]}
+            if world.rank == 0:
+                with records.open("a") as file:
+                    file.write(json.dumps(found) + "\n")
+            seed += 1
+        world.Barrier()
+
+
+def compute(case: Path, target: Path) -> tuple[str, Any]:
+    """How a run ended, and its results, loaded; None if there are none."""
+    import pbem
+    from pbem.parallel import world
+
+    try:
+        pbem.run(case, target, force=True)
+        end = "finished"
+    except pbem.ConvergenceError as error:
+        end = error.reason
+    world.Barrier()
+    results = pbem.open_results(target) if target.exists() else None
+    if results is not None:
+        for name in ("displacement", "traction"):
+            assert getattr(results, name) is not None
+        for contact in results.contact.values():
+            assert contact.mode is not None
+    world.Barrier()
+    return end, results
+
+
+def compare(one: tuple[str, Any], other: tuple[str, Any]) -> Found:
+    """What differs between two runs: ends, steps, iterations and statuses by name; the largest difference of values."""
+    import numpy as np
+
+    (end, mine), (other_end, yours) = one, other
+    if end != other_end or (mine is None) != (yours is None):
+        return {"end": end, "equal": False, "differs": [f"end: {end}, {other_end}"]}
+    if mine is None:
+        return {"end": end, "equal": True, "largest": 0.0, "steps": 0}
+    pairs = {f"steps {name}": (getattr(mine.steps, name), getattr(yours.steps, name))
+             for name in ("number", "stage", "iterations")}
+    pairs |= {f"convergence {name}": (mine.convergence[name], yours.convergence[name])
+              for name in ("step", "iteration", "changed", "stick", "slip", "open")}
+    pairs |= {f"statuses of {name}": (each.mode, yours.contact[name].mode) for name, each in mine.contact.items()}
+    differs = [name for name, (first, second) in pairs.items() if not np.array_equal(first, second)]
+    largest = 0.0
+    for name in ("displacement", "traction"):
+        first, second = getattr(mine, name), getattr(yours, name)
+        if first.shape == second.shape and first.size:
+            largest = max(largest, float(np.abs(first - second).max() / max(np.abs(first).max(), 1e-300)))
+    return {"end": end, "equal": not differs, "differs": differs, "largest": largest, "steps": len(mine.steps)}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

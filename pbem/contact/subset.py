@@ -18,13 +18,13 @@ method, with states from its modes by a linear system.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.detached import choose_detached, choose_next, count_most_tried
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -44,12 +44,10 @@ Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
 
-# Choices of detached pairs that are followed from one to the next, and beyond that tried one by one. Those of more
-# pairs than are pivoted quickly are the fewer, as pivoting costs the cube of their number.
-MOST_FOLLOWED, LEAST_FOLLOWED, QUICK = 60, 3, 60
-MOST_ENUMERATED = 6
 # The most pairs that are pivoted; Newton's steps among them cost a hundredth of it.
 MOST_PIVOTED = 300
+# In larger groups cohesion is not taken from pairs one after the other: each time is a problem of its own.
+MOST_RELEASED = 150
 # Newton's steps among the pairs of a group, each far cheaper than a solution with all.
 MOST_STEPS = 100
 # Where modes come back, only violations of this share of the largest change; at last one pair at a time.
@@ -153,11 +151,14 @@ def settle_subset(
         return Settled(stepped, False, 0, wrong)
     if len(loses) > MOST_PIVOTED:
         return Settled(None, False, 0, wrong)
+    kept = _release(subset, response, compliance, loses, judge)
+    if kept is not None:
+        return Settled(kept, False, 1, wrong)
     tried: set[bytes] = set()
     complete = True
-    for detached in _choose_detached(subset.modes.mode == OPEN, loses):
+    for detached in choose_detached(subset.modes.mode == OPEN, loses):
         follow: Bool | None = detached
-        while follow is not None and follow.tobytes() not in tried and len(tried) < _most_tried(loses):
+        while follow is not None and follow.tobytes() not in tried and len(tried) < count_most_tried(loses):
             tried.add(follow.tobytes())
             modes = _pivot(problem, compliance, follow)
             if modes is None:
@@ -169,7 +170,7 @@ def settle_subset(
             proposal = judge(modes, response.evaluate(d))
             if not proposal.changed.any():
                 return Settled(modes, False, len(tried), wrong)
-            follow = _follow(proposal, loses, follow, tried)
+            follow = choose_next(proposal, loses, follow, tried)
     # Friction alone always has admissible modes: what pivoting finds of it and the judge refuses is ill-conditioned.
     return Settled(None, complete and bool(loses.any()) and len(tried) >= 2 ** int(loses.sum()), len(tried), wrong)
 
@@ -198,35 +199,41 @@ def _step(
     return None
 
 
-def _follow(proposal: Proposal, loses: Bool, detached: Bool, tried: set[bytes]) -> Bool | None:
-    """The next choice of detached pairs: what the judge says of all of them, or, where that was tried, of the worst."""
-    wanted = loses & (proposal.modes.mode == OPEN)
-    if wanted.tobytes() not in tried:
-        return wanted
-    for pair in np.argsort(-proposal.violation, kind="stable"):
-        if wanted[pair] != detached[pair]:
-            one = detached.copy()
-            one[pair] = wanted[pair]
-            if one.tobytes() not in tried:
-                return one
+def _release(
+    subset: Subset, response: Response, compliance: Real, loses: Bool,
+    judge: Callable[[ModeState, PairState], Proposal],
+) -> ModeState | None:
+    """Modes where pairs lose what they can lose as they part, one after the other; None where they slip without it.
+
+    Whatever parts in the solution of a problem has no cohesion in the next one, but still touches where it has to. Each
+    problem is one of friction alone. Pairs that slip on less than they would have are given back what they lost, once.
+    """
+    if not loses.any() or len(loses) > MOST_RELEASED:
+        return None
+    whole, nothing = _pose(subset, response), np.zeros(len(loses), dtype=bool)
+    for lost in (nothing, loses & (subset.modes.mode == OPEN)):
+        back = nothing
+        while True:
+            broken = subset.memory.broken | lost
+            modes = _pivot(
+                _pose(replace(subset, memory=replace(subset.memory, broken=broken)), response), compliance, nothing
+            )
+            if modes is None:
+                break
+            parted = loses & (modes.mode == OPEN) & ~lost
+            if parted.any():
+                lost = lost | parted
+                continue
+            weak = lost & (modes.mode == SLIP)
+            if not weak.any():
+                d = _solve_in_modes(whole, modes)
+                if d is not None and not judge(modes, response.evaluate(d)).changed.any():
+                    return modes
+                break
+            if (weak & back).any():
+                break
+            lost, back = lost & ~weak, back | weak
     return None
-
-
-def _most_tried(loses: Bool) -> int:
-    few = int(loses.sum())
-    followed = int(MOST_FOLLOWED * min(1.0, QUICK / len(loses)) ** 3)
-    return max(followed, LEAST_FOLLOWED) + (2**few if few <= MOST_ENUMERATED else 0)
-
-
-def _choose_detached(is_open: Bool, loses: Bool) -> Iterator[Bool]:
-    """First the pairs that are open now; then, if they are few, every choice."""
-    yield is_open & loses
-    own = np.flatnonzero(loses)
-    if len(own) <= MOST_ENUMERATED:
-        for choice in product((False, True), repeat=len(own)):
-            detached = np.zeros(len(loses), dtype=bool)
-            detached[own] = choice
-            yield detached
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, propose_modes
-from pbem.contact.subset import Response, Subset, settle_subset, take_subset
+from pbem.contact.subset import settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.problem import Problem

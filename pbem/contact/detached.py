@@ -34,6 +34,7 @@ def choose_next(proposal: Proposal, loses: Bool, detached: Bool, tried: set[byte
 
 
 def count_most_tried(loses: Bool) -> int:
+    """How many choices are tried at most for pairs (s,) of which some lose cohesion."""
     few = int(loses.sum())
     followed = int(MOST_FOLLOWED * min(1.0, QUICK / len(loses)) ** 3)
     return max(followed, LEAST_FOLLOWED) + (2**few if few <= MOST_ENUMERATED else 0)

@@ -20,6 +20,9 @@ Tables = Mapping[str, Any]
 
 STICK, SLIP, OPEN = 0, 1, 2
 
+# A body that carries less than this part of all forces is as good as without loads.
+LIGHT = 1e-3
+
 
 @dataclass(frozen=True)
 class Scales:
@@ -111,7 +114,10 @@ def _measure_pairs(
 
 
 def measure_balance(results: Results, tables: Tables) -> float:
-    """The largest force or moment left over on a body, relative to the sum of the forces on its elements."""
+    """The largest force or moment left over on a body, relative to the sum of the forces on its elements.
+
+    Of bodies that hardly carry anything it is relative to a part of the forces on the whole model.
+    """
     worst = 0.0
     elements, order = results.elements, results.nodes.order
     position = results.nodes.position[:, 0] + 1j * results.nodes.position[:, 1]
@@ -135,7 +141,7 @@ def measure_balance(results: Results, tables: Tables) -> float:
             forces = weight[nodes] * traction[step, nodes]
             left = abs(forces.sum() + pull * area)
             moment = abs((np.conj(arm) * forces).imag.sum() + (np.conj(lever) * pull).imag)
-            scale = np.abs(forces).sum() + abs(pull * area) + 1e-6 * whole
+            scale = np.abs(forces).sum() + abs(pull * area) + LIGHT * whole
             if scale > 0:
                 worst = max(worst, left / scale, moment / scale / np.abs(arm).max())
     return float(worst)

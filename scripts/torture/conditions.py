@@ -34,8 +34,7 @@ class Scales:
 
 def measure_scales(results: Results, tables: Tables) -> Scales:
     """The scales of a run, by which violations are divided."""
-    far = [abs(value) for table in (tables, *tables.get("stages", ())) for value in table.get("remote", {}).values()]
-    stress = max(float(np.abs(results.traction).max(initial=0.0)), *far, 0.0)
+    stress = max(float(np.abs(results.traction).max(initial=0.0)), find_stress_far_away(tables))
     jumps = [
         np.abs(values).max(initial=0.0) for each in results.contact.values() for values in (each.opening, each.slip)
     ]
@@ -43,6 +42,12 @@ def measure_scales(results: Results, tables: Tables) -> Scales:
     size = float(np.ptp(vertices, axis=0).max())
     hardest = max(material["young"] for material in tables["materials"].values())
     return Scales(stress, max(*map(float, jumps), stress / hardest * size))
+
+
+def find_stress_far_away(tables: Tables) -> float:
+    """The largest component of the stress far away in any stage; 0 if there is none."""
+    everywhere = (tables, *tables.get("stages", ()))
+    return max((abs(value) for table in everywhere for value in table.get("remote", {}).values()), default=0.0)
 
 
 def measure_contact(
@@ -123,7 +128,7 @@ def measure_balance(results: Results, tables: Tables) -> float:
     position = results.nodes.position[:, 0] + 1j * results.nodes.position[:, 1]
     traction = results.traction[..., 0] + 1j * results.traction[..., 1]
     weight = _weigh_nodes(results, position)
-    whole = np.abs(weight * traction).sum(axis=1).max()
+    whole = max(np.abs(weight * traction).sum(axis=1).max(), find_stress_far_away(tables) * weight.sum())
     for number, name in enumerate(results.nodes.region_names):
         table = tables["regions"][name]
         own = np.flatnonzero((elements.region == number) & ~elements.crack)

@@ -17,6 +17,7 @@ from scipy import sparse
 from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestors, prepare_shifts
 from pbem.bem.leaf import Medium, source_matrix, target_matrix
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.bem.rigid import RigidMotions, find_rigid_motions, take_off_rigid_motions
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.bem.tree import Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
@@ -58,18 +59,6 @@ class Anchoring:
     pattern: Real
     columns: Integer
     functional: Real
-
-
-@dataclass(frozen=True)
-class RigidMotions:
-    """Of a finite region: basis (2 or 3, 2 k), orthonormal, of rigid motions in the displacements v[columns].
-
-    B of a rigid motion is zero. The expansions of its parts cancel only up to their error, which would be felt where a
-    body moves by much more than it is strained: what fits best is taken off before.
-    """
-
-    columns: Integer
-    basis: Real
 
 
 @dataclass(frozen=True)
@@ -189,36 +178,6 @@ def anchor_rows(
     return replace(operator, anchorings=(*operator.anchorings, added))
 
 
-def take_off_rigid_motions(v: Real, rigid: Sequence[RigidMotions]) -> Real:
-    """v less the rigid motions of bodies that fit its displacements best."""
-    strained = v.copy()
-    for motions in rigid:
-        strained[motions.columns] -= (motions.basis @ v[motions.columns]) @ motions.basis
-    return strained
-
-
-def find_rigid_motions(mesh: Mesh, finite: Sequence[int], needed: Bool) -> tuple[RigidMotions, ...]:
-    """Rigid motions of the finite regions (numbers) that have expansions and all of whose displacements are needed."""
-    bounds = np.searchsorted(mesh.region, np.arange(mesh.region.max() + 2)) * (mesh.order + 1)
-    node_crack = mesh.node_crack
-    made = []
-    for region in finite:
-        first, last = bounds[region], bounds[region + 1]
-        if last - first <= SMALL_REGION * (mesh.order + 1):
-            continue
-        nodes = first + np.flatnonzero(~node_crack[first:last])
-        columns = number_components(nodes)
-        if needed[columns].all():
-            place = mesh.position[nodes] - mesh.position[nodes].mean()
-            motions = [split_components(np.ones_like(place)), split_components(1j * np.ones_like(place))]
-            elements = slice(first // (mesh.order + 1), last // (mesh.order + 1))
-            if mesh.order > 0 and not mesh.sweep[elements].any():
-                # On arcs, and by constants, a rotation is interpolated only: B of it is not zero.
-                motions.append(split_components(1j * place))
-            made.append(RigidMotions(columns, np.ascontiguousarray(np.linalg.qr(np.stack(motions, axis=1))[0].T)))
-    return tuple(made)
-
-
 def assemble_hierarchical(
     parts: Sorted, sources: SourceTree, nodes: Integer, needed: Bool, length: float, finite: Sequence[int] = ()
 ) -> HierarchicalOperator:
@@ -249,7 +208,12 @@ def assemble_hierarchical(
         rows = number_components(row_of_node[at])
         leaves.append(LeafRows(int(leaf), rows, columns, near, far))
     free = collect_free_terms(mesh, nodes, scale)
-    rigid = find_rigid_motions(mesh, finite, needed)
+    # Expansions of the parts of a rigid motion cancel only up to their error, which would be felt where a body moves by
+    # much more than it is strained: what fits best is taken off before. Small regions have no expansions.
+    rigid = tuple(
+        motions for motions in find_rigid_motions(mesh, finite, needed)
+        if motions.interpolated or len(motions.columns) > 2 * SMALL_REGION * (mesh.order + 1)
+    )
     return HierarchicalOperator(parts, nodes, sources, targets, tuple(leaves), free, needed, rigid=rigid)
 
 

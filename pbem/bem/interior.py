@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from pbem.bem.location import Location
 from pbem.bem.operator import collect_sources
+from pbem.bem.rigid import RigidMotions, take_off_rotations
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes, split_faces
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import split_components
 from pbem.model.material import Material
 
 Complex = NDArray[np.complex128]
@@ -42,10 +44,16 @@ class _Chunk:
 
 
 class InteriorRows:
-    """The rows of points inside regions, kept from step to step as far as they fit into the memory allowed."""
+    """The rows of points inside regions, kept from step to step as far as they fit into the memory allowed.
 
-    def __init__(self, mesh: Mesh, materials: Sequence[Material], points: Complex, location: Location) -> None:
-        self._mesh = mesh
+    rigid: motions of bodies whose rotations, as the elements interpolate them, would count as strain.
+    """
+
+    def __init__(
+        self, mesh: Mesh, materials: Sequence[Material], points: Complex, location: Location,
+        rigid: Sequence[RigidMotions] = (),
+    ) -> None:
+        self._mesh, self._rigid = mesh, rigid
         self._points = points
         self._location = location
         self._sources = collect_sources(mesh, materials)
@@ -71,15 +79,17 @@ class InteriorRows:
         moved = np.where(outside, np.nan, 0.0) + 0j
         stress = np.where(outside, np.nan, 0.0)[:, None] * np.ones(3)
         traction = np.where(mesh.node_crack, 0.0, traction)  # on a crack those of both faces cancel
+        v = split_components(np.concatenate([displacement, traction]))
+        strained = take_off_rotations(v, self._rigid)
         for chunk in self._chunks:
             matrix = chunk.matrix
             if matrix is None:
                 matrix = self._evaluate_matrix(chunk.region, chunk.points)
-            own = mesh.node_region == chunk.region
-            field = np.concatenate([displacement[own], traction[own]])
-            values = (matrix @ np.stack([field.real, field.imag], axis=1).ravel()).reshape(5, -1)
+            own = np.tile(np.repeat(mesh.node_region == chunk.region, 2), 2)
+            count = 2 * len(chunk.points)
+            values = (matrix[:count] @ v[own]).reshape(2, -1)
             moved[chunk.points] = values[0] + 1j * values[1]
-            stress[chunk.points] = values[2:].T
+            stress[chunk.points] = (matrix[count:] @ strained[own]).reshape(3, -1).T
         return Values(moved, stress)
 
     def _evaluate_matrix(self, region: int, chosen: Integer) -> Real:

@@ -8,17 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
-from pbem.bem.hierarchical import (
-    RATIO,
-    HierarchicalOperator,
-    Sorted,
-    list_columns,
-    log_lengths,
-    take_off_rigid_motions,
-)
+from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_columns, log_lengths
 from pbem.bem.interior import Values
 from pbem.bem.leaf import Medium, target_matrix
 from pbem.bem.location import Location
+from pbem.bem.rigid import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.tree import Interactions, build_forest, find_interactions
 from pbem.mesh.numbering import list_nodes, split_components

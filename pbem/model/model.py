@@ -207,3 +207,8 @@ class Model:
     def middle(self) -> complex:
         """The mean place of all curves, which the strain of stress far away does not move."""
         return find_middle(self.curves)
+
+    @property
+    def finite_regions(self) -> list[int]:
+        """Numbers of the regions that have an outer boundary."""
+        return [number for number, region in enumerate(self.regions) if not region.infinite]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.operator import scale_equations
+from pbem.bem.rigid import take_off_rotations
 from pbem.bem.rows import evaluate_rows
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.parallel import add_up
@@ -39,10 +40,11 @@ def measure_equations(
     own = np.flatnonzero(np.isin(operator.nodes, sample))
     product = operator.apply(v)
     exact = np.zeros(2 * len(own))
+    strained = take_off_rotations(v, operator.rigid)
     for k, number in enumerate(own):
-        exact[2 * k : 2 * k + 2] = _evaluate_exactly(operator, int(operator.nodes[number]), v, length)
+        exact[2 * k : 2 * k + 2] = _evaluate_exactly(operator, int(operator.nodes[number]), strained, length)
     rows = number_components(own)
-    exact += operator.free[rows] @ v
+    exact += operator.free[rows] @ strained
     for anchoring in operator.anchorings:
         added = np.zeros(operator.rows)
         added[anchoring.rows] = anchoring.pattern * (anchoring.functional @ v[anchoring.columns])

@@ -17,6 +17,7 @@ from pbem.bem.hierarchical import (
 )
 from pbem.bem.operator import add_anchor, assemble_displacement_rows, assemble_rows, scale_equations
 from pbem.bem.pointwise import PointRows, place_points
+from pbem.bem.rigid import find_rigid_motions, free_rotations, need_rotations
 from pbem.contact.anchor import anchor_motions
 from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import collect_laws
@@ -57,7 +58,10 @@ def _assemble_dense(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     first, last = int(offsets[comm.rank]), int(offsets[comm.rank + 1])
     anchored = find_free_motions(model)
     anchors = anchor_motions(mesh, anchored)
+    finite = model.finite_regions
+    needed = need_rotations(mesh, finite, needed)
     operator = assemble_rows(mesh, materials, first, last, needed, model.size)
+    free_rotations(operator, find_rigid_motions(mesh, finite, needed), 4 * mesh.nodes)
     for anchor in anchors:
         add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
     own_cracks = _share_equally(np.flatnonzero(mesh.node_crack), comm)
@@ -146,7 +150,7 @@ def _reach_tolerance(
     """
     tolerance = model.solver.tolerance
     materials = [region.material for region in model.regions]
-    finite = [number for number, region in enumerate(model.regions) if not region.infinite]
+    finite = model.finite_regions
     # Rigid motions are taken off from all displacements, also from those that are zero.
     needed = needed.copy()
     needed[: 2 * mesh.nodes] |= np.repeat(np.isin(mesh.node_region, finite), 2)

@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, propose_modes
-from pbem.contact.subset import Response, Subset, settle_subset, take_subset
+from pbem.contact.subset import settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import do_on_first
 from pbem.solve.problem import Problem
@@ -29,9 +31,12 @@ from pbem.solve.tangent import AnyTangent, Solved
 Real = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
+Complex = NDArray[np.complex128]
 
 # Newton's steps among the broken pairs alone before they are settled by pivoting.
 MOST_STEPS = 15
+# So few pairs at a time are not worth the solutions that their response takes.
+LEAST_FOLLOWED = 100
 
 
 @dataclass(frozen=True)
@@ -49,13 +54,16 @@ def run_cascade(
     """Let bonds fail, the worst first, until no other fails; all ranks together.
 
     modes, solved: a settled state, in which the bonds `failing` (m,) are overloaded. floor: a stress that counts as
-    rounding does (see pbem.contact.modes). most: the largest number of brittle pairs that are followed at once.
+    rounding does (see pbem.contact.modes). most: the largest number of brittle pairs that are followed at once; of more
+    those that are nearest to the failing ones, to which their load goes. What fails beyond them fails next.
     """
     broken = memory.broken | failing
     leader = problem.laws.leader
     pairs = np.flatnonzero(problem.laws.brittle & ~problem.laws.follows)
     if len(pairs) > most:
-        return Cascade(broken, None)
+        if most < LEAST_FOLLOWED:
+            return Cascade(broken, None)
+        pairs = _find_nearest(problem.mesh.pairs.position, pairs, np.flatnonzero(failing), most)
     response = find_response(problem, tangent, constraints, load, law, solved, pairs)
     scale = problem.traction_scale
     start = replace(memory, broken=broken)
@@ -70,6 +78,13 @@ def run_cascade(
     return Cascade(broken, ModeState(mode[leader], sign[leader]))
 
 
+def _find_nearest(position: Complex, pairs: Integer, failing: Integer, most: int) -> Integer:
+    """Of pairs (s,), rising, the given number that are nearest to failing ones."""
+    places = np.stack([position.real, position.imag], axis=1)
+    distance, _ = cKDTree(places[failing]).query(places[pairs])
+    return np.sort(pairs[np.argsort(distance, kind="stable")[:most]])
+
+
 def _follow(subset: Subset, response: Response, scale: float, floor: float) -> tuple[Bool, ModeState | None]:
     """The bonds of s pairs that are lost in the end, and their modes; None if some round could not be settled."""
     broken = subset.memory.broken.copy()
@@ -79,6 +94,7 @@ def _follow(subset: Subset, response: Response, scale: float, floor: float) -> t
         if found is None:
             return broken, None
         modes, state = found
+        subset = replace(subset, modes=modes)
         failing = find_failures(subset.laws, state, memory, subset.pressure, floor)
         if not failing.any():
             return broken, modes

@@ -12,6 +12,7 @@ from pbem.bem.interior import InteriorRows, Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
 from pbem.bem.operator import RowOperator
 from pbem.bem.pointwise import TreeRows
+from pbem.bem.rigid import find_rigid_motions
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -76,7 +77,9 @@ class InteriorField:
                     stress[inside] += background.stress(self._points[inside])
         if self._rows is None:
             materials = [region.material for region in self._model.regions]
-            self._rows = InteriorRows(mesh, materials, self._points, self._location)
+            everywhere = np.ones(4 * mesh.nodes, dtype=bool)
+            rigid = find_rigid_motions(mesh, self._model.finite_regions, everywhere)
+            self._rows = InteriorRows(mesh, materials, self._points, self._location, rigid)
         elastic = self._rows.evaluate(displacement, traction)
         hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
         limit = evaluate_limits(

@@ -233,7 +233,8 @@ def make_tangent(problem: Problem) -> AnyTangent:
         return make_dense_tangent(problem)
     materials = [region.material for region in problem.model.regions]
     preconditioner = SchwarzPreconditioner(
-        problem.mesh, materials, problem.model.size, problem.anchors, problem.groups, problem.operator.nodes
+        problem.mesh, materials, problem.model.size, problem.anchors, problem.groups, problem.operator.nodes,
+        problem.operator.rigid,
     )
     return KrylovTangent(problem, preconditioner)
 

@@ -16,11 +16,12 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
-from pbem.contact.subset import Response, Settled, Subset, settle_subset, take_subset
+from pbem.contact.subset import Settled, settle_subset
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
+from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
@@ -23,7 +24,7 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset, take_subset
+from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast, do_on_first
 from pbem.solve.cascade import run_cascade

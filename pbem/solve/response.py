@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.complementarity import Response
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
-from pbem.contact.subset import Response
 from pbem.solve.problem import Problem
 from pbem.solve.tangent import AnyTangent, Solved
 

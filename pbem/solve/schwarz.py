@@ -16,6 +16,7 @@ from scipy import sparse
 from scipy.linalg import lapack
 
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.bem.rigid import RigidMotions
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap
@@ -58,9 +59,10 @@ class SchwarzPreconditioner:
 
     def __init__(
         self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
-        groups: Sequence[Group], nodes: Integer,
+        groups: Sequence[Group], nodes: Integer, rigid: Sequence[RigidMotions] = (),
     ) -> None:
         self._mesh, self._anchors = mesh, tuple(anchors)
+        self._rigid = [motions for motions in rigid if motions.interpolated]
         self._sources = collect_sources(mesh, materials)
         self._scale = scale_equations(mesh, materials, length)
         self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
@@ -256,6 +258,13 @@ class SchwarzPreconditioner:
             for other in own_anchors:
                 if self._acting[one, other]:
                     self._anchor(values, nodes, seen, one, other)
+        for motions in self._rigid:
+            place, there = _find_places(columns, motions.columns)
+            if motions.region == region and there.all():
+                rotation = np.zeros(4 * mesh.nodes)
+                rotation[motions.columns] = motions.basis[-1]
+                left = (self._free[number_components(nodes)] @ rotation) + values @ rotation[columns]
+                values[:, place] -= np.outer(left, motions.basis[-1])
         return values, columns
 
     def _find_anchored(self, constraints: ConstraintMap) -> Bool:

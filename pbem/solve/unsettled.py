@@ -30,8 +30,8 @@ def describe_unsettled(
         return ConvergenceError(
             "unsound mesh",
             f"single pairs part when they are pressed, or move against a shear: {_name(problem, group[failed.wrong])}; "
-            "contact on such elements has no solution, or more than one; they are longer than the distance to the next "
-            "face: use shorter ones there",
+            "with the others in their present modes contact there has none or several solutions; where elements are "
+            "longer than the distance to the next face, use shorter ones",
         )
     if reason == "no admissible modes" and failed is not None:
         loses = bool((problem.laws.tensile_strength[group] > 0).any())

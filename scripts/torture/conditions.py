@@ -20,6 +20,9 @@ Tables = Mapping[str, Any]
 
 STICK, SLIP, OPEN = 0, 1, 2
 
+# A body that carries less than this part of all forces is as good as without loads.
+LIGHT = 1e-3
+
 
 @dataclass(frozen=True)
 class Scales:
@@ -31,8 +34,7 @@ class Scales:
 
 def measure_scales(results: Results, tables: Tables) -> Scales:
     """The scales of a run, by which violations are divided."""
-    far = [abs(value) for table in (tables, *tables.get("stages", ())) for value in table.get("remote", {}).values()]
-    stress = max(float(np.abs(results.traction).max(initial=0.0)), *far, 0.0)
+    stress = max(float(np.abs(results.traction).max(initial=0.0)), find_stress_far_away(tables))
     jumps = [
         np.abs(values).max(initial=0.0) for each in results.contact.values() for values in (each.opening, each.slip)
     ]
@@ -40,6 +42,12 @@ def measure_scales(results: Results, tables: Tables) -> Scales:
     size = float(np.ptp(vertices, axis=0).max())
     hardest = max(material["young"] for material in tables["materials"].values())
     return Scales(stress, max(*map(float, jumps), stress / hardest * size))
+
+
+def find_stress_far_away(tables: Tables) -> float:
+    """The largest component of the stress far away in any stage; 0 if there is none."""
+    everywhere = (tables, *tables.get("stages", ()))
+    return max((abs(value) for table in everywhere for value in table.get("remote", {}).values()), default=0.0)
 
 
 def measure_contact(
@@ -111,13 +119,16 @@ def _measure_pairs(
 
 
 def measure_balance(results: Results, tables: Tables) -> float:
-    """The largest force or moment left over on a body, relative to the sum of the forces on its elements."""
+    """The largest force or moment left over on a body, relative to the sum of the forces on its elements.
+
+    Of bodies that hardly carry anything it is relative to a part of the forces on the whole model.
+    """
     worst = 0.0
     elements, order = results.elements, results.nodes.order
     position = results.nodes.position[:, 0] + 1j * results.nodes.position[:, 1]
     traction = results.traction[..., 0] + 1j * results.traction[..., 1]
     weight = _weigh_nodes(results, position)
-    whole = np.abs(weight * traction).sum(axis=1).max()
+    whole = max(np.abs(weight * traction).sum(axis=1).max(), find_stress_far_away(tables) * weight.sum())
     for number, name in enumerate(results.nodes.region_names):
         table = tables["regions"][name]
         own = np.flatnonzero((elements.region == number) & ~elements.crack)
@@ -135,7 +146,7 @@ def measure_balance(results: Results, tables: Tables) -> float:
             forces = weight[nodes] * traction[step, nodes]
             left = abs(forces.sum() + pull * area)
             moment = abs((np.conj(arm) * forces).imag.sum() + (np.conj(lever) * pull).imag)
-            scale = np.abs(forces).sum() + abs(pull * area) + 1e-6 * whole
+            scale = np.abs(forces).sum() + abs(pull * area) + LIGHT * whole
             if scale > 0:
                 worst = max(worst, left / scale, moment / scale / np.abs(arm).max())
     return float(worst)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbem.contact import subset as subset_module
+from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, resists_slip
 from pbem.contact.modes import Proposal, linearise, propose_modes
-from pbem.contact.subset import Response, Settled, Subset, settle_subset, take_subset
+from pbem.contact.subset import Settled, settle_subset
 from tests.unit.test_laws import make_laws, remember
 
 Real = NDArray[np.float64]
@@ -158,3 +160,19 @@ def test_a_part_of_the_pairs_keeps_its_own_laws() -> None:
     (group,) = part.laws.strengths
     assert group.pairs.tolist() == [0, 1] and group.parameters["friction"].tolist() == [0.1, 0.4]
     assert part.pressure.tolist() == [1.0, 4.0] and part.memory.slip.tolist() == [0.2, 0.2]
+
+
+def test_cohesion_that_is_lost_pair_by_pair_finds_modes_that_single_choices_miss(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of forty groups of twenty pairs with cohesion; each found state passes the judge."""
+    found: dict[bool, list[bool]] = {}
+    for released in (True, False):
+        if not released:
+            monkeypatch.setattr(subset_module, "MOST_RELEASED", 0)
+        found[released] = []
+        for seed in range(40):
+            subset = pose(np.full(20, 0.4), np.full(20, 0.5))
+            modes = settle(subset, make_response(np.random.default_rng(seed), 20)).modes
+            found[released].append(modes is not None)
+    assert sum(found[True]) >= sum(found[False]) + 3

@@ -28,6 +28,7 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast, do_on_first
 from pbem.solve.cascade import run_cascade
 from pbem.solve.hold import Hold
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.nearby import MOST_ASKED, is_nearby, settle_parts
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
@@ -92,7 +93,8 @@ def solve_step(
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     search = Search(
-        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~find_linear(laws)
+        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~find_linear(laws),
+        is_nearby(tangent) and bool(find_linear(laws).all()),
     )
     iterations: list[Iteration] = []
     while True:
@@ -171,17 +173,22 @@ def _pivot(
     hold: Hold, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
     law: Linearisation, solved: Solved, search: Search,
 ) -> ModeState | None:
-    """The modes with those of the search's group solved by pivoting; None if it has none or they have no solution.
+    """The modes that all groups of a crack network settle on by themselves, or else with those of the search's group
+    solved by pivoting; None if it has none or they have no solution.
 
     Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
     """
+    problem = hold.problem
+    judge = _make_judge(problem, solved, search.caution)
+    if isinstance(tangent, KrylovTangent) and search.may_sweep():
+        swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
+        if swept.fingerprint() != modes.fingerprint():
+            return swept
     group = search.choose_group()
     if not len(group):
         return None
-    problem = hold.problem
     response = find_response(problem, tangent, constraints, load, law, solved, group)
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
-    judge = _make_judge(problem, solved, search.caution)
 
     # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
     alone = search.excluded

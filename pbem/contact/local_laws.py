@@ -12,16 +12,16 @@ Real = NDArray[np.float64]
 Single = NDArray[np.float32]
 Integer = NDArray[np.int64]
 
-# Pairs whose tractions are off their laws by less than this part of the largest traction are left as they are.
-SMALL = 1e-3
 
-
-def solve_laws(tangent: Real, offset: Real, stiffness: Single, start: Real, scale: float) -> Real | None:
+def solve_laws(
+    tangent: Real, offset: Real, stiffness: Single, start: Real, scale: float, least: float = 0.0
+) -> Real | None:
     """Values (k, 4) that fulfil linear laws and p = p_0 + stiffness (g - g_0); None if there are none.
 
     tangent (k, 4, 2), offset (k, 4): of the laws (see pbem.contact.modes.Linearisation), with tractions `scale` times
     those of the values. stiffness (2 k, 2 k): n and s of pair after pair. start (k, 4): p_0 and g_0. What changes is
-    solved for in single precision; where nothing but rounding does, the pairs' tractions stay off their laws by SMALL.
+    solved for in single precision. Where the jumps fulfil the laws, and tractions but for `least` times the largest one,
+    the jumps stay as they are.
     """
     units = np.array([scale, scale, 1.0, 1.0])
     law = _Laws(tangent / units[:, None], offset / units)
@@ -31,7 +31,7 @@ def solve_laws(tangent: Real, offset: Real, stiffness: Single, start: Real, scal
     wanted = start[:, :2] + _respond(stiffness, jumps - start[:, 2:]) - law.offset[:, :2]
     wanted -= _multiply(law.tangent[:, :2], x)
     right = np.concatenate([_dot(law.across, wanted[one]), wanted[both, 0], wanted[both, 1]])
-    if len(right) and np.abs(right).max() > SMALL * np.abs(start[:, :2]).max():
+    if len(right) and np.abs(right).max() > least * np.abs(start[:, :2]).max():
         _, _, change, zero_pivot = lapack.sgesv(law.form_matrix(stiffness), right.astype(np.float32), overwrite_a=True)
         if zero_pivot or not np.isfinite(change).all():
             return None

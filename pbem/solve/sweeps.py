@@ -10,11 +10,12 @@ solution of the whole model, which begins from the states that go with them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import Memory, ModeState, PairLaws, PairState, follow_leaders, plastic_slip
@@ -26,7 +27,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
 from pbem.parallel import add_up
 from pbem.solve.elimination import take_blocks
-from pbem.solve.groups import Group
+from pbem.solve.groups import Group, find_nearest
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
 from pbem.solve.tangent import Solved
@@ -36,11 +37,17 @@ Integer = NDArray[np.int64]
 # The modes that states of some pairs ask for: of their laws, modes, states, memory and pressure.
 Judge = Callable[[PairLaws, ModeState, PairState, Memory, Real], Proposal]
 
-# Elements around a group that take part, as a multiple of its own.
+# The groups of a network are divided into parts of so many elements at most, which settle with the elements nearest to
+# them, so many times as many: what they take grows with the square of these numbers.
+PART_ELEMENTS = 48
 AROUND = 1.0
 # All groups settle so often in turn between two solutions of the whole, each by so many of Newton's steps at most.
 MOST_SWEEPS = 3
 MOST_STEPS = 8
+
+
+# A group whose tractions the others have moved off its laws by less than this part of the largest is left as it is.
+SMALL = 1e-3
 
 
 class Sweeps:
@@ -64,12 +71,11 @@ class Sweeps:
         pair_of_node[mesh.pairs.slot] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
         pairs, owned = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=bool)]
         self._stiffness = []
-        for group in problem.groups:
-            elements = _surround(group)
-            near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (elements, group.elements))
+        for own, around in _divide(mesh, problem.groups):
+            near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (around, own))
             if not len(inside):
                 continue
-            formed = preconditioner.form_block(constraints.matrix, elements, mesh.pairs.slot[near])
+            formed = preconditioner.form_block(constraints.matrix, around, mesh.pairs.slot[near])
             formed = self._softness[near] @ formed.reshape(len(near), 2, -1)
             self._stiffness.append(-formed.reshape(2 * len(near), -1).astype(np.float32))
             pairs.append(near)
@@ -119,7 +125,7 @@ class Sweeps:
             first = np.concatenate([[0], np.cumsum(self._first[groups + 1] - self._first[groups])])
             part = take_subset(subset.laws, subset.memory, subset.pressure, ModeState(mode, sign), at)
             if taken or moved:
-                values[at] = self._solve_groups(part, groups, first, values[at])
+                values[at] = self._solve_groups(part, groups, first, values[at], 0.0 if taken else SMALL)
             if taken == MOST_STEPS:
                 break
             proposal = judge(part.laws, part.modes, _name_state(values[at], scale), part.memory, part.pressure)
@@ -127,15 +133,16 @@ class Sweeps:
             groups = groups[np.logical_or.reduceat(proposal.changed, first[:-1])]
         return ModeState(mode, sign), values
 
-    def _solve_groups(self, part: Subset, groups: Integer, first: Integer, values: Real) -> Real:
-        """The values of the pairs of some groups in their modes; as they were where there are none."""
+    def _solve_groups(self, part: Subset, groups: Integer, first: Integer, values: Real, least: float) -> Real:
+        """The values of the pairs of some groups in their modes; as they were where there are none. least: what counts.
+        """
         scale, result = self._problem.traction_scale, values.copy()
         state = _name_state(values, scale)
         slip = plastic_slip(part.laws, state)
         law = linearise(part.laws, part.modes, state.p_n, slip, part.memory, part.pressure, scale)
         for k, group in enumerate(groups):
             own = slice(first[k], first[k + 1])
-            found = solve_laws(law.tangent[own], law.offset[own], self._stiffness[group], values[own], scale)
+            found = solve_laws(law.tangent[own], law.offset[own], self._stiffness[group], values[own], scale, least)
             if found is not None:
                 result[own] = found
         return result
@@ -156,11 +163,28 @@ class Sweeps:
         return add_up(problem.comm, result)
 
 
-def _surround(group: Group) -> Integer:
-    """The elements of a group and some of those around it."""
-    if not len(group.nearest):
-        return group.around
-    return np.union1d(group.elements, group.nearest[: int(AROUND * len(group.elements))])
+def _divide(mesh: Mesh, groups: Iterable[Group]) -> Iterator[tuple[Integer, Integer]]:
+    """The elements of parts of the groups, and those with the elements around them, each rising."""
+    middle = 0.5 * (mesh.start + mesh.end)
+    tree = cKDTree(np.column_stack([middle.real, middle.imag]))
+    for group in groups:
+        if not len(group.nearest):
+            yield group.elements, group.around
+            continue
+        for part in _halve(middle, group.elements):
+            yield part, np.union1d(part, find_nearest(mesh, part, tree, int(AROUND * len(part))))
+
+
+def _halve(middle: NDArray[np.complex128], elements: Integer) -> Iterator[Integer]:
+    """Elements by place in parts of at most PART_ELEMENTS, each rising."""
+    if len(elements) <= PART_ELEMENTS:
+        yield elements
+        return
+    at = middle[elements]
+    along = at.real if np.ptp(at.real) >= np.ptp(at.imag) else at.imag
+    order = np.argsort(along, kind="stable")
+    for half in (order[: len(order) // 2], order[len(order) // 2 :]):
+        yield from _halve(middle, np.sort(elements[half]))
 
 
 def _find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:

@@ -20,8 +20,8 @@ def solve_laws(
 
     tangent (k, 4, 2), offset (k, 4): of the laws (see pbem.contact.modes.Linearisation), with tractions `scale` times
     those of the values. stiffness (2 k, 2 k): n and s of pair after pair. start (k, 4): p_0 and g_0. What changes is
-    solved for in single precision. Where the jumps fulfil the laws, and tractions but for `least` times the largest one,
-    the jumps stay as they are.
+    solved for in single precision. Where the jumps fulfil the laws, and the tractions but for `least` times the largest
+    one, the jumps stay as they are.
     """
     units = np.array([scale, scale, 1.0, 1.0])
     law = _Laws(tangent / units[:, None], offset / units)

@@ -78,7 +78,7 @@ class Search:
     ) -> None:
         self.most_pivoted, self.interface = most_pivoted, interface
         self.excluded: NDArray[np.bool_] = np.zeros(1, dtype=bool) if excluded is None else excluded
-        self.sweeps = sweeps
+        self.sweeps, self.swept = sweeps, False
         self.restart()
 
     def restart(self) -> None:
@@ -171,11 +171,17 @@ class Search:
         return back
 
     def descend(self) -> bool:
-        """Move to more caution; False at the end of all. At first groups no longer settle by themselves."""
+        """Move to more caution; False at the end of all.
+
+        At first groups no longer settle by themselves. Where modes still come back what they found was the wrong way
+        (swept): another search begins anew, without.
+        """
         if self.sweeping:
             self.sweeping = False
             self.seen.clear()
             return True
+        if self.swept:
+            return False
         if self.level == len(CAUTIONS) - 1:
             return False
         self.level += 1

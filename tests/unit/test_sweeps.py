@@ -27,6 +27,7 @@ from tests.identities.solving import linearise_pairs
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_nearby import draw_modes, write_comb
 from tests.unit.test_search import propose
+from tests.verification.test_settling import make_junction, write_plane
 
 Real = NDArray[np.float64]
 
@@ -183,6 +184,21 @@ def test_networks_settle_in_few_iterations_and_in_the_same_modes(
     assert len(quick.iterations) <= 4 < 7 <= len(usual.iterations)
 
 
+def test_where_groups_lead_to_modes_that_come_back_the_search_begins_anew(
+    many_groups: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Two pairs of this junction change each other for ever once its groups have settled, and pivoting finds no modes.
+    text = write_plane(make_junction(0, 30, 60, elements=8), {"friction": 0.8}, (0.2, -1.0, 0.6))
+    monkeypatch.setattr(groups, "CONNECTED_ELEMENTS", 64)
+    text = text.replace('"dense"', '"hierarchical"')
+    found = march_over(text)
+    monkeypatch.setattr(Search, "may_sweep", lambda search: False)
+    usual = march_over(text)
+    np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
+    assert len(found.iterations) > len(usual.iterations)
+    assert [each.number for each in found.iterations] == list(range(1, len(found.iterations) + 1))
+
+
 def test_groups_settle_by_themselves_as_long_as_that_helps() -> None:
     search = Search(50, sweeps=True)
     said = []
@@ -201,6 +217,12 @@ def test_modes_that_come_back_end_that_first() -> None:
     assert search.descend() and search.level == 0 and not search.may_sweep()
     assert not search.returns(b"modes")
     assert search.descend() and search.level == 1
+
+
+def test_what_groups_led_to_in_vain_is_given_up() -> None:
+    search = Search(50, sweeps=True)
+    search.swept = True
+    assert search.descend() and not search.descend()
 
 
 def test_models_of_single_cracks_do_without() -> None:

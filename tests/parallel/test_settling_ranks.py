@@ -11,8 +11,6 @@ import pytest
 
 from pbem.results.reader import open_results
 from pbem.solve.search import Search
-from tests.parallel.launch import launch_snippet
-from tests.unit.test_sweeps import grow_branches
 from tests.verification.test_settling import make_junction, run, write_plane
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]
@@ -47,27 +45,3 @@ def test_modes_and_iterations_are_the_same_on_all_ranks(
         assert results.steps.iterations.tolist() == [len(alone.iterations)]
         modes = np.concatenate([results.contact[name].mode[-1] for name in ("b0", "b1", "b2")])
         np.testing.assert_array_equal(modes, alone.contact.mode)
-
-
-NETWORK = """
-import sys
-import pbem
-from pbem.solve import groups
-groups.ONE_GROUP, groups.CONNECTED_ELEMENTS = 0, 16
-pbem.run(sys.argv[1], sys.argv[2])
-"""
-
-
-def test_groups_of_a_network_settle_alike_on_all_ranks(tmp_path: Path) -> None:
-    case = tmp_path / "network.toml"
-    case.write_text(grow_branches(0, 4))
-    found = []
-    for ranks in (1, 2, 3):
-        done = launch_snippet(ranks, NETWORK, case, tmp_path / f"{ranks}.h5", timeout=300)
-        assert done.returncode == 0, done.stderr
-        results = open_results(tmp_path / f"{ranks}.h5")
-        (count,) = results.steps.iterations.tolist()
-        found.append((count, np.concatenate([results.contact[name].mode[-1] for name in sorted(results.contact)])))
-    for count, mode in found:
-        assert count == found[0][0] <= 4
-        np.testing.assert_array_equal(mode, found[0][1])

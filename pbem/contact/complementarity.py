@@ -80,12 +80,17 @@ class Subset:
 
 
 def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState, pairs: Integer) -> Subset:
-    """What concerns some pairs (s,), in rising order, each of which takes a mode of its own."""
+    """What concerns some pairs (s,), some of them more than once, each of which takes a mode of its own."""
     groups = []
     for group in laws.strengths:
-        inside = np.isin(group.pairs, pairs)
-        parameters = {name: values[inside] for name, values in group.parameters.items()}
-        groups.append(replace(group, pairs=np.searchsorted(pairs, group.pairs[inside]), parameters=parameters))
+        place = np.full(laws.count, -1)
+        place[group.pairs] = np.arange(len(group.pairs))
+        inside = np.flatnonzero(place[pairs] >= 0)
+        if not len(inside):  # laws of one's own are not asked about no pairs
+            continue
+        taken = place[pairs[inside]]
+        parameters = {name: values[taken] for name, values in group.parameters.items()}
+        groups.append(replace(group, pairs=inside, parameters=parameters))
     arrays = {name: getattr(laws, name)[pairs] for name in vars(laws) if name not in ("strengths", "leader")}
     arrays["leader"] = np.arange(len(pairs))
     return Subset(

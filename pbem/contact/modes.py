@@ -98,12 +98,11 @@ def linearise(
     return Linearisation(tangent, offset, laws.leader)
 
 
-def carry_over(unknowns: Real, before: Linearisation, after: Linearisation, traction_scale: float) -> Real:
-    """Unknowns (m, 2) of pairs in other modes with the tractions and jumps that they had.
+def carry_over(state: Real, after: Linearisation, traction_scale: float) -> Real:
+    """Unknowns (m, 2) of pairs with given tractions and jumps (m, 4).
 
     Of a pair's normal and of its tangential values it keeps the one that its mode after leaves free.
     """
-    state = np.einsum("mij,mj->mi", before.tangent, unknowns) + before.offset
     size = np.abs(after.tangent) / np.array([traction_scale, traction_scale, 1.0, 1.0])[:, None]
     normal = np.where(size[:, P_N, 0] >= size[:, G_N, 0], P_N, G_N)
     along = np.where(size[:, P_S, 1] >= size[:, G_S, 1], P_S, G_S)

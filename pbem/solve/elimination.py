@@ -46,7 +46,7 @@ def eliminate_tractions(matrix: sparse.csr_matrix, free: sparse.csr_matrix, on_c
     """
     count = len(on_crack)
     local = _find_local(matrix, count) & on_crack[:, None]
-    blocks = _take_blocks(free, count)
+    blocks = take_blocks(free, count)
     largest = float(np.abs(blocks).max(initial=0.0))
     length = np.linalg.norm(blocks, axis=1)
     local &= length > NOTHING * largest
@@ -73,7 +73,7 @@ def _find_local(matrix: sparse.csr_matrix, count: int) -> Bool:
     return np.asarray(outside.reshape(-1, 2) == 0)
 
 
-def _take_blocks(free: sparse.csr_matrix, count: int) -> Real:
+def take_blocks(free: sparse.csr_matrix, count: int) -> Real:
     """The blocks (count, 2, 2) of every node's own unknowns in its own equations."""
     entries = free.tocoo()
     own = entries.row // 2 == entries.col // 2

@@ -53,9 +53,14 @@ class Group:
     nearest: Integer = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
+def is_one_group(mesh: Mesh) -> bool:
+    """Whether a model is too small to be divided."""
+    return 2 * mesh.nodes <= ONE_GROUP
+
+
 def divide_model(mesh: Mesh) -> list[Integer]:
     """The groups' elements, each sorted, in an order in which neighbours are near to each other."""
-    if 2 * mesh.nodes <= ONE_GROUP:
+    if is_one_group(mesh):
         return [np.arange(mesh.elements)]
     bulge = np.zeros(mesh.elements)
     sets, connected = connect_cracks(mesh)

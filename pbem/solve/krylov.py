@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
@@ -17,6 +18,7 @@ from pbem.solve.linear import PREFIX, PETSc, petsc_options
 from pbem.solve.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
+from pbem.solve.sweeps import Judge, Sweeps
 from pbem.solve.tangent import AnyTangent, Solved, select_states, size_residual
 
 Real = NDArray[np.float64]
@@ -45,11 +47,14 @@ class KrylovTangent:
         self.constraints: ConstraintMap | None = None
         self.solution: Real | None = None
         self.law: Linearisation | None = None
+        # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
+        self.expected: Real | None = None
         self.iterations: list[int] = []
         self.nearby = answers_nearby(problem)
         self.widening = 1
         rows = problem.operator.rows
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
+        self._sweeps: Sweeps | None = None
         self._order = _find_order(problem)
         self._matrix = PETSc.Mat().createPython(sizes, _Product(self), comm=problem.comm)
         self._matrix.setUp()
@@ -175,13 +180,27 @@ class KrylovTangent:
         self._solver.setTolerances(rtol=usual[0])
         return result
 
+    def sweep(
+        self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
+        solved: Solved, judge: Judge,
+    ) -> ModeState:
+        """Modes (m,) on which groups of elements settle by themselves; the next solution begins from their states."""
+        if self._sweeps is None:
+            self._sweeps = Sweeps(self.problem, self.preconditioner, load)
+        settled, self.expected = self._sweeps.settle(constraints, modes, memory, load, law, solved, judge)
+        return settled
+
     def _carry_over(self, law: Linearisation | None) -> Real | None:
-        """The last solution in the present unknowns; None if there is none."""
+        """The last solution, or the states expected of the pairs, in the present unknowns; None if there is none."""
         if self.solution is None or law is None or self.law is None:
             return self.solution
         slot = self.problem.mesh.pairs.slot
         carried = self.solution.reshape(-1, 2).copy()
-        carried[slot] = carry_over(carried[slot], self.law, law, self.problem.traction_scale)
+        state = np.einsum("mij,mj->mi", self.law.tangent, carried[slot]) + self.law.offset
+        if self.expected is not None:
+            state = np.where(self.problem.laws.follows[:, None], state, self.expected)
+            self.expected = None
+        carried[slot] = carry_over(state, law, self.problem.traction_scale)
         return carried.ravel()
 
     def _guess(self, right: Real, begin: Real | None) -> Real:

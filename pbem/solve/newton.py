@@ -28,7 +28,9 @@ from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast, do_on_first
 from pbem.solve.cascade import run_cascade
+from pbem.solve.groups import is_one_group
 from pbem.solve.hold import Hold
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.nearby import MOST_ASKED, is_nearby, settle_parts
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
@@ -77,27 +79,46 @@ def solve_step(
     Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
     mode (but for friction that depends on slip), so that a step in which no mode changes takes one iteration. How the
     modes are searched for is said in pbem.solve.search. Brittle bonds fail, those with the largest overload first, only
-    when the modes of all other pairs have settled. All decisions are taken by the first rank.
+    when the modes of all other pairs have settled. Where groups of a crack network that settle by themselves lead to
+    modes that do not, the search begins anew without that. All decisions are taken by the first rank.
     Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
     "singular tangent", "linear solver".
     """
+    iterations: list[Iteration] = []
+    if is_nearby(tangent) and not is_one_group(problem.mesh) and find_linear(problem.laws).all():
+        search = _make_search(problem, tangent, True)
+        try:
+            return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+        except ConvergenceError:
+            if not search.swept:
+                raise
+    search = _make_search(problem, tangent, False)
+    return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+
+
+def _make_search(problem: Problem, tangent: AnyTangent, sweeps: bool) -> Search:
+    hierarchical = isinstance(problem.operator, HierarchicalOperator)
+    few = hierarchical and not is_nearby(tangent)
+    # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
+    # is followed by Newton's steps with the bound of the last iteration.
+    linear = find_linear(problem.laws)
+    return Search(
+        MOST_SETTLED_BY_GMRES if few else MOST_SETTLED, None if hierarchical else problem.mesh.pairs.interface,
+        problem.laws.follows | ~linear, varying=not bool(linear.all()), sweeps=sweeps,
+    )
+
+
+def _search_modes(
+    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, search: Search, iterations: list[Iteration],
+) -> Solution:
+    """See solve_step; by one search, whose iterations join those before."""
     laws = problem.laws
     hold = Hold(problem)
     comm = problem.comm
     modes = do_on_first(comm, ConvergenceError, lambda: follow_leaders(
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, memory.slip
-    hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    few = hierarchical and not is_nearby(tangent)
-    most_settled = MOST_SETTLED_BY_GMRES if few else MOST_SETTLED
-    # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
-    # is followed by Newton's steps with the bound of the last iteration.
-    linear = find_linear(laws)
-    search = Search(
-        most_settled, None if hierarchical else problem.mesh.pairs.interface, laws.follows | ~linear,
-        varying=not bool(linear.all()),
-    )
-    iterations: list[Iteration] = []
     while True:
         begin = time.perf_counter()
         law = linearise(
@@ -119,7 +140,7 @@ def solve_step(
             floor = _find_floor(problem, solved)
             cascade = run_cascade(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
-                min(most_settled, MOST_PIVOTED),
+                min(search.most_pivoted, MOST_PIVOTED),
             )
             memory = replace(memory, broken=cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
@@ -174,17 +195,23 @@ def _pivot(
     hold: Hold, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
     law: Linearisation, solved: Solved, search: Search,
 ) -> ModeState | None:
-    """The modes with those of the search's group solved by pivoting; None if it has none or they have no solution.
+    """The modes that all groups of a crack network settle on by themselves, or else with those of the search's group
+    solved by pivoting; None if it has none or they have no solution.
 
     Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
     """
+    problem = hold.problem
+    judge = _make_judge(problem, solved, search.caution)
+    if isinstance(tangent, KrylovTangent) and search.may_sweep():
+        swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
+        if swept.fingerprint() != modes.fingerprint():
+            search.swept = True
+            return swept
     group = search.choose_group()
     if not len(group):
         return None
-    problem = hold.problem
     response = find_response(problem, tangent, constraints, load, law, solved, group)
     subset = take_subset(problem.laws, memory, load.pressure, modes, group)
-    judge = _make_judge(problem, solved, search.caution)
 
     # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
     alone = search.excluded

@@ -66,7 +66,7 @@ class SchwarzPreconditioner:
         self._sources = collect_sources(mesh, materials)
         self._scale = scale_equations(mesh, materials, length)
         self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
-        self._free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
+        self.free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
         self._nodes = nodes
         # The mesh makes these anew at every call, for all nodes.
         self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
@@ -95,7 +95,7 @@ class SchwarzPreconditioner:
         self._formed = matrix
         changed |= self._find_anchored(constraints)
         by_column = matrix.tocsc()
-        free = (self._free @ matrix).tocsr()
+        free = (self.free @ matrix).tocsr()
         less = self._less = eliminate_tractions(matrix, free, self._node_crack)
         count, self.singular = 0, 0
         for inverse in self.inverses:
@@ -178,7 +178,7 @@ class SchwarzPreconditioner:
         wanted[at] = True
         rows, left = np.flatnonzero(~first | wanted), np.flatnonzero(~local)
         whole, forces = (
-            self._form(elements, around, rows, columns, matrix.tocsc(), (self._free @ matrix).tocsr(), less)
+            self._form(elements, around, rows, columns, matrix.tocsc(), (self.free @ matrix).tocsr(), less)
             for columns, matrix in ((left, constraints), (at, offsets))
         )
         rest = ~first[rows]
@@ -189,6 +189,13 @@ class SchwarzPreconditioner:
         back = less.inverse[around[::2] // 2]
         result += (back @ turned.reshape(len(back), 2, -1)).reshape(result.shape)
         return np.asarray(result[at])
+
+    def form_block(self, constraints: sparse.csr_matrix, elements: Integer, nodes: Integer) -> Real:
+        """Rows of the tangent operator of a constraint map and its columns, of some nodes of elements: (2 k, 2 k)."""
+        around = list_nodes(self._mesh, elements)
+        at = number_components(np.searchsorted(around, nodes))
+        free = (self.free @ constraints).tocsr()
+        return self._form(elements, number_components(around), at, at, constraints.tocsc(), free, None)
 
     def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
         """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""
@@ -205,7 +212,7 @@ class SchwarzPreconditioner:
 
     def _form(
         self, elements: Integer, around: Integer, rows: Integer, left: Integer, constraints: sparse.csc_matrix,
-        free: sparse.csr_matrix, less: Elimination,
+        free: sparse.csr_matrix, less: Elimination | None,
     ) -> Real:
         """Turned rows of the tangent operator, and its columns that are left, of the nodes of elements, dense.
 
@@ -230,7 +237,7 @@ class SchwarzPreconditioner:
             entries = (value[known], (place[known], column[known]))
             chosen = sparse.csr_matrix(entries, shape=(len(places), len(left)))
             formed[number_components(own)] += (chosen.T @ values.T).T
-        turned = less.turn[nodes] @ formed.reshape(len(nodes), 2, -1)
+        turned = formed if less is None else less.turn[nodes] @ formed.reshape(len(nodes), 2, -1)
         return np.asarray(turned.reshape(2 * len(nodes), -1)[np.searchsorted(number_components(nodes), around[rows])])
 
     def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:

@@ -6,7 +6,8 @@ step looks at each pair as if the others stood still. The search sees that when 
 falls, not only when a state comes back, and then solves the contact of the pairs that changed lately exactly, with all
 others kept in their modes (pbem.contact.subset): a non-linear Gauss-Seidel method of two blocks, whose second block is
 the Newton step of all. Pairs that change next join those that are solved for, so that a group that holds all that
-disturb each other is found in a few rounds.
+disturb each other is found in a few rounds. Of crack networks, where thousands of pairs change, every group of
+neighbouring elements settles by itself before each Newton step (pbem.solve.sweeps), as long as that helps.
 
 What is left for models whose law is not linear in a mode (friction that weakens with slip) or whose group is too large:
 the friction bound is kept in each iteration at what it was after the last (a fixed point of Tresca's law; J. Haslinger
@@ -61,6 +62,8 @@ PLAIN = 3
 COSTLY = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
 FUTILE = 6
+# The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
+SWEPT = 4
 
 
 class Search:
@@ -69,15 +72,17 @@ class Search:
     most_pivoted: the largest group of pairs that is solved by pivoting. interface (m,): of each pair, in order along
     it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
     has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
-    is not linear. varying: whether any law is not linear, so that its friction changes with slip.
+    is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
+    groups of neighbouring elements may settle by themselves (pbem.solve.sweeps).
     """
 
     def __init__(
         self, most_pivoted: int, interface: Integer | None = None, excluded: NDArray[np.bool_] | None = None,
-        varying: bool = False,
+        varying: bool = False, sweeps: bool = False,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.excluded: NDArray[np.bool_] = np.zeros(1, dtype=bool) if excluded is None else excluded
+        self.sweeps, self.swept = sweeps, False
         self.restart()
 
     def restart(self) -> None:
@@ -90,6 +95,7 @@ class Search:
         self.futile = self.solved = 0
         self.pause = self.paused = 0
         self.level = 0
+        self.sweeping = self.sweeps
         self.returned = False
         self.seen: set[bytes] = set()
 
@@ -110,6 +116,13 @@ class Search:
         """Whether in the last LONG iterations no fewer pairs changed than at best in as many or more before."""
         before, lately = self.counts[:-LONG], self.counts[-LONG:]
         return len(before) >= LONG and min(lately) >= max(1, min(before))
+
+    def may_sweep(self) -> bool:
+        """Whether groups may settle by themselves next: as long as that lets fewer and fewer pairs change."""
+        before, lately = self.counts[:-SWEPT], self.counts[-SWEPT:]
+        if before and min(lately) >= min(before):
+            self.sweeping = False
+        return self.sweeping and not self.level
 
     def choose_group(self) -> Integer:
         """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
@@ -163,7 +176,17 @@ class Search:
         return back
 
     def descend(self) -> bool:
-        """Move to more caution; False at the end of all."""
+        """Move to more caution; False at the end of all.
+
+        At first groups no longer settle by themselves. Where modes still come back what they found was the wrong way
+        (swept): another search begins anew, without.
+        """
+        if self.sweeping:
+            self.sweeping = False
+            self.seen.clear()
+            return True
+        if self.swept:
+            return False
         if self.level == len(CAUTIONS) - 1:
             return False
         self.level += 1

@@ -135,22 +135,23 @@ def measure_law_error(
 ) -> float:
     """Largest distance of a slipping pair's p_s from its bound, relative to the largest traction or the floor.
 
-    Where it creeps, from its bounds at slips that differ by their rounding.
+    Where it creeps the bound has the sense of the slip, and slips that differ by their rounding are alike.
     """
     slips = (modes.mode == SLIP) & ~laws.follows
     admissible = np.minimum(state.p_n, tensile_limit(laws, memory) - pressure)
-    ahead, creeps = slip_ahead(modes, memory, plastic_slip(laws, state)), find_creeping(laws)
+    scale, slip = max(_largest_traction(state), floor), plastic_slip(laws, state)
+    creeps = find_creeping(laws) & slips
 
-    def find_bound(slip: Real) -> Real:
-        return evaluate_strength(laws, admissible, memory.look_ahead(slip), pressure).bound
+    def find_bound(ahead: Real) -> Real:
+        return evaluate_strength(laws, admissible, memory.look_ahead(ahead), pressure).bound
 
-    error = np.abs(state.p_s - modes.sign * find_bound(ahead))
-    if (creeps & slips).any():
-        spread = SLIP_ROUNDING * float(np.abs(state.g_s).max())
-        at, own = modes.sign * state.p_s, [find_bound(np.maximum(ahead + part * spread, 0.0)) for part in (-1, 1)]
-        inside = (np.minimum(*own) <= at) & (at <= np.maximum(*own))
-        error = np.where(creeps & inside, 0.0, error)
-    scale = max(_largest_traction(state), floor)
+    error = np.abs(state.p_s - modes.sign * find_bound(slip_ahead(modes, memory, slip)))
+    if creeps.any():
+        spread = SLIP_ROUNDING * np.maximum(np.abs(state.g_s).max(), scale / laws.stiffness)
+        moved = slip - memory.slip + spread * np.array([[-1.0], [0.0], [1.0]])
+        low, middle, high = (np.sign(each) * find_bound(np.abs(each)) for each in moved)
+        inside = (np.minimum(low, high) <= state.p_s) & (state.p_s <= np.maximum(low, high))
+        error = np.where(creeps, np.where(inside, 0.0, np.abs(state.p_s - middle)), error)
     return float(error[slips].max(initial=0.0) / scale) if scale > 0 else 0.0
 
 
@@ -158,7 +159,7 @@ def _largest_traction(state: PairState) -> float:
     return float(max(np.abs(state.p_n).max(initial=0.0), np.abs(state.p_s).max(initial=0.0)))
 
 
-# Part of the largest slip within which slips are alike.
+# Part within which slips are alike: of the largest one, and of one that would change the tractions by all of them.
 SLIP_ROUNDING = 1e-12
 # The slip of a creeping pair, in which its friction is as a logarithm, falls to no less than this part in an iteration,
 # and to no less than this part of the slip so far.

@@ -212,8 +212,9 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
         for quantity, values in fixed.items():
             create_array(interface, quantity, values[first:last])
         # The common variables are for going on with a run.
-        own = LAWS[kind].variables if (kind := find_joint(model, name).law.kind) in LAWS else ()
-        for quantity in (*SHOWN, *(variable.name for variable in own)):
+        kind = find_joint(model, name).law.kind
+        own = [variable.name for variable in LAWS[kind].variables] if kind in LAWS else []
+        for quantity in (*SHOWN, *own):
             sources[quantity].create_view(interface, quantity, first, len(pairs))
         _describe_interface(interface, model, mesh, name, bool(mesh.pairs.crack[pairs].any()))
         first = last
@@ -225,11 +226,10 @@ def _describe_interface(group: h5py.h5g.GroupID, model: Model, mesh: Mesh, name:
     set_attribute(group, "second", joint.second or "")
     set_attribute(group, "crack", crack)
     set_attribute(group, "law", joint.law.kind)
-    for key, value in vars(joint.law).items():
+    own = joint.law.parameters if joint.law.kind in LAWS else {}
+    for key, value in {**vars(joint.law), **own}.items():
         if key != "kind" and isinstance(value, str | bool | int | float):
             set_attribute(group, key, value)
-    for key, value in joint.law.parameters.items() if joint.law.kind in LAWS else ():
-        set_attribute(group, key, value)
 
 
 def _create_growing(group: h5py.Group, name: str, shape: tuple[int, ...], kind: str) -> h5py.Dataset:

@@ -55,6 +55,9 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
         raw.pop("gravity", None)  # what weighs on what is unknown
         for stage in raw.get("stages", ()):
             stage.pop("gravity", None)
+    if table == "stages" and key == "duration":
+        raw["stages"][loc[1]][key] = _LAW_STAND_IN
+        return True
     if table in ("interfaces", "contacts") and key == "law":
         own = next((kind for kind, keys in OWN_KEYS.items() if set(keys) & set(raw[table][loc[1]])), None)
         raw[table][loc[1]][key] = own or "coulomb"  # the law that all other keys go with
@@ -63,6 +66,9 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
         return True
     if table in ("interfaces", "contacts") and raw[table][loc[1]].get("law") in NEEDED:
         law, key = raw[table][loc[1]], key.replace("friction_angle", "friction")
+        if key not in known:  # it may be one of them
+            for needed in NEEDED[law["law"]]:
+                law.setdefault(needed, _LAW_STAND_IN)
         if key in NEEDED[law["law"]]:
             if key == "friction":
                 law.pop("friction_angle", None)

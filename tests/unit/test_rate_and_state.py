@@ -19,7 +19,7 @@ from pbem.contact.modes import (
     measure_law_error,
     propose_modes,
 )
-from pbem.contact.rate_and_state import RateAndState, age_state
+from pbem.contact.rate_and_state import RateAndState, _age_by_slip, age_state
 from pbem.contact.strength import LAWS, coulomb
 from pbem.contact.subset import take_subset
 from pbem.results.dissipation import PairRecord, measure_work
@@ -111,6 +111,14 @@ def test_the_state_follows_the_ageing_law(ahead: float) -> None:
     found = age_state(np.array([state]), np.array([ahead]), duration, np.array([L]))
     assert found[0] == pytest.approx(exact, rel=1e-9)
     assert parts[0] == pytest.approx(found[0], rel=1e-12)
+
+
+def test_the_derivative_of_the_state_is_that_of_small_and_large_slips() -> None:
+    x, state, duration = np.array([3e-4, 9e-4, 1.1e-3, 0.3, 5.0]), 0.0, 7.0
+    # By a complex step, which loses nothing to cancellation.
+    shifted = x + 1e-40j
+    exact = (state * np.exp(-shifted) + duration * -np.expm1(-shifted) / shifted).imag / 1e-40 / L
+    np.testing.assert_allclose(_age_by_slip(np.full(5, state), x * L, duration, np.full(5, L)), exact, rtol=1e-10)
 
 
 def test_without_time_friction_is_as_it_was_at_the_end_of_the_step() -> None:

@@ -73,7 +73,7 @@ def make_step(mesh, laws, number: int):
     values = np.cos(pairs + number)
     contact = ContactState(
         mode=(pairs % 3).astype(np.int8), opening=np.abs(values), slip=values, traction_n=-np.abs(values),
-        traction_s=values, slip_path=np.abs(values), broken=np.zeros(len(pairs), dtype=bool),
+        traction_s=values, internal={"slip_path": np.abs(values), "broken": np.zeros(len(pairs), dtype=bool)},
     )  # fmt: skip
     iteration = Iteration(1, 1e-12, 3, *np.bincount(contact.mode, minlength=3).tolist(), seconds=1.0)
     return Step(number, 0, number / STEPS, (iteration,), 1e-12, wave * (1 + 1j), wave * (1 - 1j), contact)

@@ -61,7 +61,7 @@ def project(problem: Problem, trial: Real, stiffness: Real, slip_before: Real, l
     limit = np.where(laws.bonded, np.inf, laws.tensile_strength - load.pressure)
     p_n = np.where(normal > limit, -load.pressure, normal)
     none = np.zeros(laws.count)
-    strength = evaluate_strength(laws, p_n, none, load.pressure, none > 0)
+    strength = evaluate_strength(laws, p_n, start_memory(laws).look_ahead(none), load.pressure)
     bound = np.where(normal > limit, 0.0, np.where(laws.bonded, np.inf, strength.bound))
     p_s = np.clip(tangential, -bound, bound)
     return PairState(p_n, p_s, (normal - p_n) / stiffness, slip_before + (tangential - p_s) / stiffness)

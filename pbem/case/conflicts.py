@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from pbem.case.effects import NEEDED, OWN_KEYS
 from pbem.case.finding import Finding, show
 from pbem.case.generated_conflicts import check_generated
 from pbem.case.places import Loc
@@ -170,7 +171,9 @@ def _check_law(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     if "friction" in table and "friction_angle" in table:
         findings.append(Finding((*loc, "friction_angle"), "both friction and friction_angle", "only one of them"))
-    if table.get("law") != "frictionless" and ("friction_dynamic" in table) != ("slip_distance" in table):
+    further = table.get("law") in NEEDED or any(key in table for keys in OWN_KEYS.values() for key in keys)
+    weakens = table.get("law") != "frictionless" and not further
+    if weakens and ("friction_dynamic" in table) != ("slip_distance" in table):
         given = "friction_dynamic" if "friction_dynamic" in table else "slip_distance"
         findings.append(Finding((*loc, given), f"only {given}", "friction_dynamic and slip_distance together"))
     if table.get("law") == "frictionless":

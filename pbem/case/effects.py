@@ -6,18 +6,33 @@ from typing import Any, Literal
 
 from pbem.case.schema import LawTable
 
-Kind = Literal["bonded", "coulomb", "open", "frictionless", "custom"]
+Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "custom"]
 
 _FRICTION = ("friction", "friction_angle", "cohesion")
 _WEAKENING = ("friction_dynamic", "slip_distance")
 _JOINT = ("normal_stiffness", "tangential_stiffness")
+_FILE = ("file", "parameters")
+# Keys of further laws that all have to be there, friction as `friction` or `friction_angle`; and those that need not.
+NEEDED: dict[Kind, tuple[str, ...]] = {
+    "rate_and_state": ("friction", "rate_effect", "state_effect", "reference_rate", "slip_distance"),
+}
+OPTIONAL: dict[Kind, tuple[str, ...]] = {"rate_and_state": ("initial_state",)}
+# The laws that depend on time.
+TIMED: tuple[Kind, ...] = ("rate_and_state",)
+# Of these the keys that no other law has.
+OWN_KEYS: dict[Kind, tuple[str, ...]] = {
+    kind: tuple(key for key in (*NEEDED[kind], *OPTIONAL[kind]) if key not in (*_FRICTION, *_WEAKENING))
+    for kind in NEEDED
+}
+_FURTHER = tuple(key for keys in OWN_KEYS.values() for key in keys)
 # Keys of a law's table that would change nothing, by the kind of law.
 WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
-    "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", "file", "parameters"),
-    "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, "file", "parameters"),
-    "coulomb": ("file", "parameters"),
-    "frictionless": ("file", "parameters"),
-    "custom": (*_FRICTION, *_WEAKENING),
+    "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", *_FILE, *_FURTHER),
+    "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, *_FILE, *_FURTHER),
+    "coulomb": (*_FILE, *_FURTHER),
+    "frictionless": (*_FILE, *_FURTHER),
+    "rate_and_state": ("cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_FILE),
+    "custom": (*_FRICTION, *_WEAKENING, *_FURTHER),
 }
 # Keys that say the same.
 _EITHER = {"friction": "friction_angle", "friction_angle": "friction"}
@@ -35,6 +50,8 @@ def combine_laws(family: LawTable, own: LawTable) -> LawTable:
         smooth = (*_FRICTION, *_WEAKENING) if own.law == "frictionless" else ()
         for key in (*WITHOUT_EFFECT[own.law], *smooth):
             keys.pop(key, None)
+        if own.law != family.law and (own.law in NEEDED or family.law in NEEDED):
+            keys.pop("slip_distance", None)  # of another law it is another one
     for key in named:
         keys.pop(_EITHER.get(key, key), None)
     return LawTable.model_construct(**{**keys, **named})

@@ -6,12 +6,15 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
+from pbem.case.effects import NEEDED, OWN_KEYS
 from pbem.case.finding import Finding
 from pbem.case.places import Loc
 from pbem.case.translation import known_keys
 
 # Values that stand in for wrong ones in a draft.
 _STAND_INS: Mapping[str, float] = {"young": 1.0, "poisson": 0.25}
+# Those of laws with keys of their own; without one of these they cannot be.
+_LAW_STAND_IN = 1.0
 # Keys of a law, and those that say how it weakens.
 _WEAKENED: Mapping[str, tuple[str, ...]] = {
     "friction": ("friction_dynamic", "slip_distance"), "friction_angle": ("friction_dynamic", "slip_distance"),
@@ -52,9 +55,25 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
         raw.pop("gravity", None)  # what weighs on what is unknown
         for stage in raw.get("stages", ()):
             stage.pop("gravity", None)
-    if table in ("interfaces", "contacts") and key == "law":
-        raw[table][loc[1]][key] = "coulomb"  # the law that all other keys go with
+    if table == "stages" and key == "duration":
+        raw["stages"][loc[1]][key] = _LAW_STAND_IN
         return True
+    if table in ("interfaces", "contacts") and key == "law":
+        own = next((kind for kind, keys in OWN_KEYS.items() if set(keys) & set(raw[table][loc[1]])), None)
+        raw[table][loc[1]][key] = own or "coulomb"  # the law that all other keys go with
+        for needed in NEEDED[own] if own else ():
+            raw[table][loc[1]].setdefault(needed, _LAW_STAND_IN)
+        return True
+    if table in ("interfaces", "contacts") and raw[table][loc[1]].get("law") in NEEDED:
+        law, key = raw[table][loc[1]], key.replace("friction_angle", "friction")
+        if key not in known:  # it may be one of them
+            for needed in NEEDED[law["law"]]:
+                law.setdefault(needed, _LAW_STAND_IN)
+        if key in NEEDED[law["law"]]:
+            if key == "friction":
+                law.pop("friction_angle", None)
+            law[key] = _LAW_STAND_IN
+            return True
     if table in ("interfaces", "contacts") and key in ("file", "parameters"):
         raw[table][loc[1]]["law"] = "coulomb"
         _delete(raw, (*loc[:2], "file"))

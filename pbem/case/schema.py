@@ -167,14 +167,28 @@ class ExpressionTable(Table):
 class LawTable(Table):
     """What the two faces of an interface, crack or contact do. Strengths and pressure are stresses."""
 
-    law: Literal["bonded", "coulomb", "open", "frictionless", "custom"] | None = None
-    friction: NotNegative | None = Field(None, description="friction coefficient")
+    law: Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "custom"] | None = Field(
+        None, description="if not given, \"bonded\" on shared curves and \"coulomb\" on cracks and contacts; "
+        "\"rate_and_state\": friction coefficient f0 + a ln(V/V0) + b ln(V0 theta/L) at the slip rate V, the state "
+        "theta by the ageing law d theta/dt = 1 - V theta/L; every stage then needs its duration"
+    )
+    friction: NotNegative | None = Field(
+        None, description="friction coefficient; of rate_and_state f0, that of steady slip at the reference rate"
+    )
     friction_angle: FrictionAngle | None = Field(None, description="degrees")
     cohesion: NotNegative = 0.0
     tensile_strength: NotNegative = Field(0.0, description="normal tension carried before the faces part")
     cohesion_lost: Flag = Field(False, description="cohesion and tensile strength end with the first slip or parting")
     friction_dynamic: NotNegative | None = Field(None, description="friction coefficient after slip_distance")
-    slip_distance: Positive | None = Field(None, description="slip, length, over which friction falls")
+    slip_distance: Positive | None = Field(
+        None, description="slip, length, over which friction falls; L of rate_and_state, over which the state changes"
+    )
+    rate_effect: Positive | None = Field(None, description="a of rate_and_state: how friction rises with ln V")
+    state_effect: NotNegative | None = Field(None, description="b of rate_and_state: how friction rises with ln theta")
+    reference_rate: Positive | None = Field(None, description="V0 of rate_and_state, length/time")
+    initial_state: Positive | None = Field(
+        None, description="theta of rate_and_state at the beginning, time; slip_distance/reference_rate if not given"
+    )
     normal_stiffness: Positive | None = Field(None, description="elastic joint in front of the law, stress/length")
     tangential_stiffness: Positive | None = Field(None, description="the same along the faces")
     gap: Annotated[float | ExpressionTable, BeforeValidator(_check_gap)] = Field(0.0, description="initial opening")
@@ -260,6 +274,9 @@ class StageTable(Table):
 
     name: Text | None = None
     steps: Count = 10
+    duration: Positive | None = Field(
+        None, description="time that the stage takes, shared by its steps; for laws that depend on time"
+    )
     boundary: Mapping[str, StageConditionTable] = {}
     interfaces: Mapping[str, StageInterfaceTable] = {}
     contacts: Mapping[str, StageInterfaceTable] = {}

@@ -96,8 +96,9 @@ def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState
     return Subset(
         PairLaws(strengths=tuple(groups), **arrays),
         Memory(
-            _take_modes(memory.modes, pairs), memory.slip[pairs], memory.path[pairs], memory.broken[pairs],
-            memory.normal_traction[pairs],
+            _take_modes(memory.modes, pairs), memory.slip[pairs],
+            {name: values[pairs] for name, values in memory.internal.items()}, memory.normal_traction[pairs],
+            memory.duration,
         ),
         pressure[pairs],
         _take_modes(modes, pairs),
@@ -141,7 +142,7 @@ def pose(subset: Subset, response: Response) -> PairProblem:
     state = response.evaluate(np.zeros(2 * laws.count))
     admissible = np.minimum(state.p_n, limit)
     ahead = np.where(subset.modes.mode == SLIP, np.abs(plastic_slip(laws, state) - memory.slip), 0.0)
-    strength = evaluate_strength(laws, admissible, memory.path + ahead, subset.pressure, memory.broken)
+    strength = evaluate_strength(laws, admissible, memory.look_ahead(ahead), subset.pressure)
     friction = -strength.by_traction
     adhesion = (strength.bound - friction * (limit - admissible)) / unit
     adhesion = np.where(adhesion > ROUNDING * np.abs(constant[0]).max(initial=0.0), adhesion, 0.0)

@@ -7,7 +7,7 @@ keeps what went wrong and answers with no strength, until all ranks ask together
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.declaration import FrictionLaw, Slide
 from pbem.contact.strength_type import Strength
 
 Real = NDArray[np.float64]
@@ -23,8 +24,8 @@ PARTS = ("bound", "by_traction", "by_slip")
 EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays of the shape of p_n"
 
 
-class CustomLaw:
-    """The function `strength` of a file, called as any law.
+class CustomLaw(FrictionLaw):
+    """The function `strength` of a file, asked as any law.
 
     file: its path; text: its contents, which are run once. fault: what went wrong at the first call that failed, a
     sentence that names the file, "" if none did. sums (6,): weighted sums of the parts of all answers since they were
@@ -40,8 +41,12 @@ class CustomLaw:
         if not callable(self._function):
             raise ValueError(f"{file} defines no function named strength")
 
+    def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:
+        """As of any law, at the slip path so far; of one that fails, zeros (see `fault`)."""
+        return self(p_n, slide.path, **parameters)
+
     def __call__(self, p_n: Real, slip: Real, **parameters: Real) -> Strength:
-        """As of any law; of one that fails, zeros (see `fault`)."""
+        """At a slip path (k,)."""
         answer = None if self.fault else self._ask(p_n, slip, parameters)
         if answer is None:
             nothing = np.zeros_like(p_n)
@@ -106,7 +111,7 @@ def read_law_texts(files: Iterable[str | None]) -> dict[str, str]:
 
 
 @contextmanager
-def asked_by_one_rank(laws: Iterable[Callable[..., Strength]]) -> Iterator[None]:
+def asked_by_one_rank(laws: Iterable[FrictionLaw]) -> Iterator[None]:
     """Within it what laws answer is not compared with other ranks, which do not ask."""
     custom = [law for law in laws if isinstance(law, CustomLaw)]
     before = [law.sums.copy() for law in custom]
@@ -117,6 +122,6 @@ def asked_by_one_rank(laws: Iterable[Callable[..., Strength]]) -> Iterator[None]
             law.sums[:] = sums
 
 
-def find_fault(laws: Iterable[Callable[..., Strength]]) -> str:
+def find_fault(laws: Iterable[FrictionLaw]) -> str:
     """What went wrong in a custom law, if it did; else ""."""
     return next((law.fault for law in laws if isinstance(law, CustomLaw) and law.fault), "")

@@ -6,14 +6,16 @@ adds an elastic jump, compliance times traction, in front of its law; what is le
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.strength import choose_strength, coulomb
-from pbem.contact.strength_type import Strength, StrengthLaw
+from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
+from pbem.contact.strength import choose_strength
+from pbem.contact.strength_type import Strength
 from pbem.mesh.mesh import Mesh
 from pbem.model.expression import evaluate_expression
 from pbem.model.model import Contact, Interface, Law, Model
@@ -30,7 +32,7 @@ STICK, SLIP, OPEN = np.int8(0), np.int8(1), np.int8(2)
 class StrengthGroup:
     """Pairs (k,) with the same friction law; every parameter is an array (k,)."""
 
-    law: StrengthLaw
+    law: FrictionLaw
     pairs: Integer
     parameters: Mapping[str, Real]
 
@@ -92,16 +94,35 @@ class PairState:
 
 @dataclass(frozen=True)
 class Memory:
-    """What the pairs remember of the last converged step, (m,) each.
+    """What the pairs bring into a step, (m,) each: of the last converged one, and how long this one takes.
 
-    slip: plastic slip; path: its accumulated length; broken: brittle bonds that are lost; normal_traction: stress.
+    slip: plastic slip; internal: values of the internal variables that the laws declare, by their names;
+    normal_traction: stress. duration: of the step that is being solved, 0 where there is no time.
     """
 
     modes: ModeState
     slip: Real
-    path: Real
-    broken: Bool
+    internal: Mapping[str, NDArray[Any]]
     normal_traction: Real
+    duration: float = 0.0
+
+    @property
+    def path(self) -> Real:
+        """Accumulated length of the plastic slip."""
+        return self.internal[SLIP_PATH.name]
+
+    @property
+    def broken(self) -> Bool:
+        """Brittle bonds that are lost."""
+        return self.internal[BROKEN.name]
+
+    def lose(self, broken: Bool) -> Memory:
+        """With these brittle bonds (m,) lost, and no others."""
+        return replace(self, internal={**self.internal, BROKEN.name: broken})
+
+    def look_ahead(self, ahead: Real) -> Slide:
+        """The step, so much slip (m,) >= 0 after its beginning."""
+        return Slide(ahead, self.internal, self.duration)
 
 
 # A tenth of a modulus per half-length: a stiff trial (8 moduli per half-length) cycles in fields of many cracks.
@@ -163,7 +184,7 @@ def _find_leaders(model: Model, mesh: Mesh) -> Integer:
 
 
 def _group_strengths(laws: list[Law], interface: Integer, texts: Mapping[str, str]) -> tuple[StrengthGroup, ...]:
-    functions: dict[str | None, StrengthLaw] = {}  # of each file, which is run once
+    functions: dict[str | None, FrictionLaw] = {}  # of each file, which is run once
     chosen = []
     for law in laws:
         if law.kind == "custom" and law.file in functions:
@@ -194,29 +215,27 @@ def _evaluate_gaps(laws: list[Law], mesh: Mesh, origin: complex) -> Real:
     return gap
 
 
-def evaluate_strength(laws: PairLaws, p_n: Real, path: Real, pressure: Real, broken: Bool) -> Strength:
+def evaluate_strength(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -> Strength:
     """Friction bound of all pairs and its derivatives; brittle pairs that are broken have no cohesion."""
     effective = p_n + np.where(laws.fluid_inside, pressure, 0.0)
     result = Strength(np.zeros(laws.count), np.zeros(laws.count), np.zeros(laws.count))
     for group in laws.strengths:
-        at = group.pairs
+        at, own = group.pairs, slide.take(group.pairs)
+        if not len(at):  # of a contact without pairs; laws of one's own are not asked about none
+            continue
         parameters = dict(group.parameters)
         if "cohesion" in parameters:
-            parameters["cohesion"] = np.where(broken[at], 0.0, parameters["cohesion"])
-        part = group.law(effective[at], path[at], **parameters)
+            parameters["cohesion"] = np.where(own.broken, 0.0, parameters["cohesion"])
+        part = group.law.strength(effective[at], own, **parameters)
         result.bound[at], result.by_traction[at], result.by_slip[at] = part.bound, part.by_traction, part.by_slip
     return result
 
 
 def resists_slip(laws: PairLaws) -> Bool:
-    """Whether a pair's law has any friction or cohesion, (m,); pairs without slip freely in both directions.
-
-    Only Coulomb's law tells by its parameters; others are taken to resist.
-    """
+    """Whether a pair's law has any friction or cohesion, (m,); pairs without slip freely in both directions."""
     resists = np.ones(laws.count, dtype=bool)
     for group in laws.strengths:
-        if group.law is coulomb:
-            resists[group.pairs] = (group.parameters["friction"] > 0) | (group.parameters["cohesion"] > 0)
+        resists[group.pairs] = group.law.resists(group.parameters)
     return resists
 
 
@@ -224,17 +243,53 @@ def find_linear(laws: PairLaws) -> Bool:
     """The pairs (m,) whose friction bound is linear in the normal traction alone, as Coulomb's."""
     linear = np.zeros(laws.count, dtype=bool)
     for group in laws.strengths:
-        linear[group.pairs] = group.law is coulomb
+        linear[group.pairs] = group.law.linear
     return linear
 
 
+def find_creeping(laws: PairLaws) -> Bool:
+    """The pairs (m,) whose friction rises with the rate of slip from nothing: they never stick, and hold as they creep.
+
+    Not those that never slip nor touch.
+    """
+    creeping = np.zeros(laws.count, dtype=bool)
+    for group in laws.strengths:
+        creeping[group.pairs] = group.law.creeps
+    return creeping & ~laws.bonded & ~laws.parted
+
+
+def stick_creeping(laws: PairLaws, modes: ModeState) -> ModeState:
+    """The modes, with creeping pairs sticking: as far as rigid motions go, they hold as much."""
+    creeping = find_creeping(laws) & (modes.mode == SLIP)
+    return ModeState(np.where(creeping, STICK, modes.mode).astype(np.int8), modes.sign) if creeping.any() else modes
+
+
 def start_memory(laws: PairLaws) -> Memory:
-    """Before any load closed pairs stick, or slip if nothing resists; pairs with a gap are open."""
+    """Before any load closed pairs stick, or slip if nothing resists or they creep; pairs with a gap are open."""
     is_open = laws.parted | (laws.gap > 0) & ~laws.bonded
-    closed = np.where(resists_slip(laws) | laws.bonded, STICK, SLIP)
+    sticks = resists_slip(laws) & ~find_creeping(laws)
+    closed = np.where(sticks | laws.bonded, STICK, SLIP)
     modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8)[laws.leader], np.ones(laws.count))
+    internal = lay_out(laws)
+    for variable, at, parameters in _list_parts(laws):
+        internal[variable.name][at] = variable.start(parameters)
     zeros = np.zeros(laws.count)
-    return Memory(modes, zeros, zeros, laws.brittle & is_open, zeros)
+    return Memory(modes, zeros, internal, zeros).lose(laws.brittle & is_open)
+
+
+def lay_out(laws: PairLaws) -> dict[str, NDArray[Any]]:
+    """Arrays (m,) for all internal variables, by their names; missing everywhere."""
+    variables = list_variables(group.law for group in laws.strengths)
+    return {each.name: np.full(laws.count, each.missing, dtype=each.kind) for each in variables}
+
+
+def _list_parts(laws: PairLaws) -> Iterator[tuple[InternalVariable, Integer, Mapping[str, Real]]]:
+    """Every internal variable with the pairs that have it, and the parameters of their law."""
+    for variable in COMMON:
+        yield variable, np.arange(laws.count), {}
+    for group in laws.strengths:
+        for variable in group.law.variables:
+            yield variable, group.pairs, group.parameters
 
 
 def follow_leaders(laws: PairLaws, modes: ModeState) -> ModeState:
@@ -251,4 +306,8 @@ def commit(laws: PairLaws, memory: Memory, modes: ModeState, state: PairState) -
     """What is remembered of a converged step."""
     slip = plastic_slip(laws, state)
     slipped = np.where(modes.mode == SLIP, np.abs(slip - memory.slip), 0.0)
-    return replace(memory, modes=modes, slip=slip, path=memory.path + slipped, normal_traction=state.p_n)
+    internal = {name: values.copy() for name, values in memory.internal.items()}
+    for variable, at, parameters in _list_parts(laws):
+        old = memory.internal[variable.name][at]
+        internal[variable.name][at] = variable.advance(old, slipped[at], memory.duration, parameters)
+    return Memory(modes, slip, internal, state.p_n)

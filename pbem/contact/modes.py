@@ -21,6 +21,7 @@ from pbem.contact.laws import (
     PairLaws,
     PairState,
     evaluate_strength,
+    find_creeping,
     plastic_slip,
     resists_slip,
 )
@@ -80,16 +81,22 @@ def linearise(
     offset[stick, G_S] = memory.slip[stick]
     # Rounding must not put a pair without cohesion beyond the apex of its cone, where friction has no slope.
     admissible = np.minimum(p_n, tensile_limit(laws, memory) - pressure)
-    strength = evaluate_strength(laws, admissible, slip_path(modes, memory, slip), pressure, memory.broken)
+    strength = evaluate_strength(laws, admissible, memory.look_ahead(slip_ahead(modes, memory, slip)), pressure)
+    creeps = find_creeping(laws)
     by_n = modes.sign * (np.zeros(laws.count) if frozen == "strength" else strength.by_traction)
-    by_s = strength.by_slip if frozen == "nothing" else np.zeros(laws.count)
+    by_s = strength.by_slip if frozen == "nothing" else np.where(creeps, strength.by_slip, 0.0)
     p_s = modes.sign * strength.bound
-    along = np.stack([by_n * traction_scale, by_s], axis=1)
-    constant = p_s - by_n * admissible - by_s * slip
+    # Of creeping pairs the unknown begins at the point of linearisation, as rates far below the slip so far would be
+    # lost in its rounding, and is a traction where the bound is steep.
+    begin = np.where(creeps, slip, 0.0)
+    unit = np.where(creeps, 1 / (1 + np.abs(by_s) / traction_scale), 1.0)
+    along = np.stack([by_n * traction_scale, by_s * unit], axis=1)
+    constant = p_s - by_n * admissible - by_s * (slip - begin)
     tangent[slips, P_S] = along[slips]
     offset[slips, P_S] = constant[slips]
-    tangent[slips, G_S] = (laws.compliance_s[:, None] * along + [0.0, 1.0])[slips]
-    offset[slips, G_S] = (laws.compliance_s * constant)[slips]
+    tangent[slips, G_S] = (laws.compliance_s[:, None] * along)[slips]
+    tangent[slips, G_S, 1] += unit[slips]
+    offset[slips, G_S] = (begin + laws.compliance_s * constant)[slips]
     tangent[is_open, G_N, 0] = 1.0
     tangent[is_open, G_S, 1] = 1.0
     offset[is_open, P_N] = -pressure[is_open]
@@ -116,27 +123,74 @@ def tensile_limit(laws: PairLaws, memory: Memory) -> Real:
     return np.where(memory.broken, 0.0, laws.tensile_strength)
 
 
-def slip_path(modes: ModeState, memory: Memory, slip: Real) -> Real:
-    """Length of the plastic slip so far (m,), with the present step's in the sense of the friction traction."""
+def slip_ahead(modes: ModeState, memory: Memory, slip: Real) -> Real:
+    """Length of the present step's slip (m,) in the sense of the friction traction, 0 against it."""
     ahead = np.where(modes.mode == SLIP, modes.sign * (slip - memory.slip), 0.0)
-    return memory.path + np.maximum(ahead, 0.0)
+    return np.maximum(ahead, 0.0)
 
 
 def measure_law_error(
     laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0
 ) -> float:
-    """Largest distance of a slipping pair's p_s from its bound, relative to the largest traction or the floor."""
+    """Largest distance of a slipping pair's p_s from its bound, relative to the largest traction or the floor.
+
+    Where it creeps the bound has the sense of the slip, and slips that differ by their rounding are alike.
+    """
     slips = (modes.mode == SLIP) & ~laws.follows
     admissible = np.minimum(state.p_n, tensile_limit(laws, memory) - pressure)
-    path = slip_path(modes, memory, plastic_slip(laws, state))
-    bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
-    error = np.abs(state.p_s - modes.sign * bound)[slips]
-    scale = max(_largest_traction(state), floor)
-    return float(error.max(initial=0.0) / scale) if scale > 0 else 0.0
+    scale, slip = max(_largest_traction(state), floor), plastic_slip(laws, state)
+    creeps = find_creeping(laws) & slips
+
+    def find_bound(ahead: Real) -> Real:
+        return evaluate_strength(laws, admissible, memory.look_ahead(ahead), pressure).bound
+
+    error = np.abs(state.p_s - modes.sign * find_bound(slip_ahead(modes, memory, slip)))
+    if creeps.any():
+        spread = SLIP_ROUNDING * np.maximum(np.abs(state.g_s).max(), scale / laws.stiffness)
+        moved = slip - memory.slip + spread * np.array([[-1.0], [0.0], [1.0]])
+        low, middle, high = (np.sign(each) * find_bound(np.abs(each)) for each in moved)
+        inside = (np.minimum(low, high) <= state.p_s) & (state.p_s <= np.maximum(low, high))
+        error = np.where(creeps, np.where(inside, 0.0, np.abs(state.p_s - middle)), error)
+    return float(error[slips].max(initial=0.0) / scale) if scale > 0 else 0.0
 
 
 def _largest_traction(state: PairState) -> float:
     return float(max(np.abs(state.p_n).max(initial=0.0), np.abs(state.p_s).max(initial=0.0)))
+
+
+# Part within which slips are alike: of the largest one, and of one that would change the tractions by all of them.
+SLIP_ROUNDING = 1e-12
+# The slip of a creeping pair, in which its friction is as a logarithm, falls to no less than this part in an iteration,
+# and to no less than this part of the slip so far.
+LEAST_PART, LEAST_SLIP = 0.02, 4 * np.finfo(float).eps
+
+
+def begin_slip(laws: PairLaws, modes: ModeState, memory: Memory) -> Real:
+    """Plastic slips (m,) at which the laws of a step are first taken: those before, or further where pairs creep."""
+    slip = memory.slip.copy()
+    slides = memory.look_ahead(np.zeros(laws.count))
+    creeps = find_creeping(laws) & (modes.mode == SLIP)
+    for group in laws.strengths if memory.duration > 0 else ():
+        at = group.pairs[creeps[group.pairs]]
+        if len(at):
+            ahead = group.law.guess_slip(slides.take(group.pairs), group.parameters)[creeps[group.pairs]]
+            slip[at] += modes.sign[at] * np.maximum(ahead, LEAST_SLIP * np.abs(slip[at]))
+    return slip
+
+
+def choose_slip(laws: PairLaws, modes: ModeState, memory: Memory, before: Real, slip: Real, former: ModeState) -> Real:
+    """Plastic slips (m,) at which the laws in these modes are taken next: those of the last solution.
+
+    Of creeping pairs not so far down from `before`, where they were taken in the modes `former`, that the tangent of a
+    logarithm overshoots: from below it does not.
+    """
+    creeps = find_creeping(laws) & (modes.mode == SLIP)
+    if not creeps.any():
+        return slip
+    least = np.maximum(LEAST_PART * np.abs(before - memory.slip), LEAST_SLIP * np.abs(memory.slip))
+    own = memory.slip + modes.sign * np.maximum(modes.sign * (slip - memory.slip), least)
+    own = np.where(former.mode == SLIP, own, begin_slip(laws, modes, memory))
+    return np.where(creeps, own, slip)
 
 
 @dataclass(frozen=True)
@@ -167,15 +221,18 @@ def propose_modes(
     """Choose modes from trial values (semi-smooth Newton); a mode is kept while rounding could decide.
 
     Open if p_n + pressure exceeds the tensile strength, or if r g_n > 0 in a pair that is open already; else slip if
-    |p_s + r (slip - slip before)| exceeds the friction bound, with the sign of that trial; else stick. softening
-    multiplies r; floor: a stress of the size of modulus times strain, where tractions are all but gone. Brittle bonds
-    that are not lost stick: `find_failures` tells when they fail.
+    |p_s + r (slip - slip before)| exceeds the friction bound, with the sign of that trial; else stick. Pairs that creep
+    slip in the sense of their traction, however small. softening multiplies r; floor: a stress of the size of modulus
+    times strain, where tractions are all but gone. Brittle bonds that are not lost stick: `find_failures` tells when
+    they fail.
     """
     stiffness = softening * laws.stiffness
     is_open = modes.mode == OPEN
     slip = plastic_slip(laws, state)
+    creeps = find_creeping(laws)
     normal = state.p_n + stiffness * np.where(is_open, state.g_n - laws.compliance_n * state.p_n, 0.0)
-    tangential = state.p_s + stiffness * np.where(modes.mode == STICK, 0.0, slip - memory.slip)
+    still = (modes.mode == STICK) | (creeps & ~is_open)
+    tangential = state.p_s + stiffness * np.where(still, 0.0, slip - memory.slip)
     trials = (np.abs(a).max(initial=0.0) for a in (normal, tangential))
     margin = ROUNDING * max(_largest_traction(state), floor, *trials)
     # The strength is that of faces in touch: a pair that is open comes back only when its faces meet again.
@@ -183,16 +240,17 @@ def propose_modes(
     parting = normal + pressure - np.where(is_open, 0.0, limit)
     opens = np.where(is_open, parting > -margin, parting > margin)
     admissible = np.minimum(normal, limit - pressure)
-    path = slip_path(modes, memory, slip)
-    bound = evaluate_strength(laws, admissible, path, pressure, memory.broken).bound
+    slide = memory.look_ahead(slip_ahead(modes, memory, slip))
+    bound = evaluate_strength(laws, admissible, slide, pressure).bound
     # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to the last stick.
-    adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), path, pressure, memory.broken).bound
+    adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), slide, pressure).bound
     excess = np.abs(tangential) - np.where(is_open, np.maximum(bound - adhesion, 0.0), bound)
     free = ~resists_slip(laws)
     # A pair that goes on slipping is held against the traction that it has, whatever its bound was taken at.
     ahead = modes.sign * tangential - np.abs(state.p_s)
-    same_sign = (modes.mode == SLIP) & ((np.sign(tangential) * modes.sign >= 0) | free)
-    slips = np.where(same_sign, ahead > -margin, excess > margin) | free
+    kept = np.where(creeps, tangential * modes.sign >= -margin, np.sign(tangential) * modes.sign >= 0)
+    same_sign = (modes.mode == SLIP) & (kept | free)
+    slips = np.where(same_sign, ahead > -margin, excess > margin) | free | creeps
     intact = laws.brittle & ~memory.broken
     opens = (opens | laws.parted) & ~laws.bonded & ~intact
     slips &= ~laws.bonded & ~opens & ~intact
@@ -223,7 +281,9 @@ FAIL_TOGETHER = 0.7
 def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0) -> Bool:
     """The intact brittle bonds (m,) that fail next: those overloaded most, and the pairs that they lead."""
     limit = tensile_limit(laws, memory) - pressure
-    strength = evaluate_strength(laws, np.minimum(state.p_n, limit), memory.path, pressure, memory.broken)
+    strength = evaluate_strength(
+        laws, np.minimum(state.p_n, limit), memory.look_ahead(np.zeros(laws.count)), pressure
+    )
     overload = np.maximum(state.p_n + pressure - laws.tensile_strength, np.abs(state.p_s) - strength.bound)
     overload = np.where(laws.brittle & ~memory.broken, overload, 0.0)[laws.leader]
     worst = overload.max(initial=0.0)

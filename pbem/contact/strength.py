@@ -1,12 +1,16 @@
-"""Friction laws: the largest tangential traction of a closed pair, one small function each, with its derivatives.
+"""Friction laws: the largest tangential traction of a closed pair, one small class each, with its derivatives.
 
-A law is a function  law(p_n, slip, **parameters) -> Strength  of the normal traction (compression negative; less the
-fluid pressure where the fluid is inside) and the slip path so far (>= 0), both arrays. A law of one's own is such a
-function, named `strength`, in a Python file that the case names: law = "custom", file = "my_law.py".
+What a law declares is said in `pbem.contact.declaration`. A law of one's own is a function
+
+    strength(p_n, slip, **parameters) -> Strength
+
+of the normal traction (compression negative; less the fluid pressure where the fluid is inside) and the slip path so
+far (>= 0), both arrays, in a Python file that the case names: law = "custom", file = "my_law.py".
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.custom import CustomLaw, read_law_texts
-from pbem.contact.strength_type import Strength, StrengthLaw
+from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
+from pbem.contact.rate_and_state import RateAndState
+from pbem.contact.strength_type import Strength
 from pbem.errors import CaseError, Fault
 from pbem.model.build import read_model
 from pbem.model.model import Law, Model
@@ -22,25 +28,67 @@ from pbem.model.model import Law, Model
 Real = NDArray[np.float64]
 
 
-def coulomb(p_n: Real, slip: Real, friction: Real, cohesion: Real) -> Strength:
+class Coulomb(FrictionLaw):
     """|p_s| <= cohesion - friction p_n, and no friction beyond the apex of the cone."""
+
+    linear = True
+
+    def strength(self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real) -> Strength:  # type: ignore[override]
+        """See FrictionLaw."""
+        return _evaluate_cone(p_n, friction, cohesion)
+
+    def resists(self, parameters: Parameters) -> NDArray[np.bool_]:
+        """Whether there is any friction or cohesion."""
+        return (parameters["friction"] > 0) | (parameters["cohesion"] > 0)
+
+    def find_strongest(self, parameters: Parameters) -> tuple[Real, Real]:
+        """They do not change."""
+        return parameters["friction"], parameters["cohesion"]
+
+
+class SlipWeakening(FrictionLaw):
+    """Coulomb's law with friction falling linearly to friction_dynamic over the slip distance."""
+
+    def strength(  # type: ignore[override]
+        self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, friction_dynamic: Real, slip_distance: Real
+    ) -> Strength:
+        """See FrictionLaw."""
+        slip = slide.path
+        weaker = np.clip(slip / slip_distance, 0.0, 1.0)
+        static = _evaluate_cone(p_n, friction + (friction_dynamic - friction) * weaker, cohesion)
+        falling = (slip < slip_distance) & (static.bound > 0)
+        by_slip = np.where(falling, (friction - friction_dynamic) / slip_distance * p_n, 0.0)
+        return Strength(static.bound, static.by_traction, by_slip)
+
+    def find_strongest(self, parameters: Parameters) -> tuple[Real, Real]:
+        """The larger of what they are before and after slip."""
+        return np.maximum(parameters["friction"], parameters["friction_dynamic"]), parameters["cohesion"]
+
+    def find_kink(self, path: Real, slip: Real, parameters: Parameters) -> Real:
+        """Where friction has fallen to its dynamic value."""
+        left = parameters["slip_distance"] - path
+        return np.clip(left / np.where(slip > 0, slip, 1.0), 0.0, 1.0)
+
+
+def _evaluate_cone(p_n: Real, friction: Real, cohesion: Real) -> Strength:
     bound = cohesion - friction * p_n
     return Strength(np.maximum(bound, 0.0), np.where(bound >= 0, -friction, 0.0), np.zeros_like(p_n))
 
 
-def slip_weakening(
-    p_n: Real, slip: Real, friction: Real, cohesion: Real, friction_dynamic: Real, slip_distance: Real
-) -> Strength:
-    """Coulomb's law with friction falling linearly to friction_dynamic over the slip distance."""
-    weaker = np.clip(slip / slip_distance, 0.0, 1.0)
-    static = coulomb(p_n, slip, friction + (friction_dynamic - friction) * weaker, cohesion)
-    falling = (slip < slip_distance) & (static.bound > 0)
-    by_slip = np.where(falling, (friction - friction_dynamic) / slip_distance * p_n, 0.0)
-    return Strength(static.bound, static.by_traction, by_slip)
+coulomb, slip_weakening = Coulomb(), SlipWeakening()
+# Further laws by their names in a case; they are given the keys of their own.
+LAWS: Mapping[str, FrictionLaw] = {"rate_and_state": RateAndState()}
 
 
-def choose_strength(law: Law, text: str | None = None) -> tuple[StrengthLaw, dict[str, float]]:
-    """The function and the parameters of an interface's law; text: of its file, which is read if not given."""
+def list_model_variables(model: Model) -> tuple[InternalVariable, ...]:
+    """The internal variables of all pairs of a model."""
+    return list_variables(LAWS[law.kind] for law in list_laws(model).values() if law.kind in LAWS)
+
+
+def choose_strength(law: Law, text: str | None = None) -> tuple[FrictionLaw, dict[str, float]]:
+    """The law and the parameters of an interface; text: of a custom law's file, which is read if not given."""
+    if law.kind in LAWS:
+        return LAWS[law.kind], dict(law.parameters)
     if law.kind == "custom":
         assert law.file is not None
         return CustomLaw(law.file, read_law_texts([law.file])[law.file] if text is None else text), dict(law.parameters)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,3 @@ class Strength:
     bound: NDArray[np.float64]
     by_traction: NDArray[np.float64]
     by_slip: NDArray[np.float64]
-
-
-StrengthLaw = Callable[..., Strength]

@@ -148,7 +148,7 @@ def _release(
         while True:
             broken = subset.memory.broken | lost
             modes = pivot_pairs(
-                pose(replace(subset, memory=replace(subset.memory, broken=broken)), response), compliance, nothing
+                pose(replace(subset, memory=subset.memory.lose(broken)), response), compliance, nothing
             )
             if modes is None:
                 break

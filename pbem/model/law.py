@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.case import Case
-from pbem.case.effects import WITHOUT_EFFECT, Kind
+from pbem.case.effects import NEEDED, OPTIONAL, OWN_KEYS, WITHOUT_EFFECT, Kind
 from pbem.case.schema import LawTable
 from pbem.errors import Fault
 from pbem.model.curve import Curve
@@ -42,6 +42,13 @@ def read_law(case: Case, loc: Loc, table: LawTable, default: Literal["bonded", "
         return Law("bonded", normal_stiffness=joint[0], tangential_stiffness=joint[1]), faults
     if kind == "open":
         return Law("open", gap=gap), faults
+    if kind in NEEDED:
+        parameters, wrong = _read_parameters(case, loc, table, kind)
+        faults += wrong
+        return Law(
+            kind, gap=gap, pressurised=table.pressurised, normal_stiffness=joint[0],  # type: ignore[arg-type]
+            tangential_stiffness=joint[1], parameters=parameters,
+        ), faults  # fmt: skip
     path = None
     if kind == "custom":
         path, wrong = _find_file(case, loc, table)
@@ -63,6 +70,20 @@ def read_law(case: Case, loc: Loc, table: LawTable, default: Literal["bonded", "
         parameters=dict(table.parameters) if kind == "custom" else {},
     )
     return law, faults
+
+
+def _read_parameters(case: Case, loc: Loc, table: LawTable, kind: Kind) -> tuple[dict[str, float], list[Fault]]:
+    """The numbers of a law that has keys of its own, by their names; those that are missing are faults."""
+    angle = table.friction_angle is not None
+    given = {key: getattr(table, key) for key in (*NEEDED[kind], *OPTIONAL[kind])}
+    given["friction"] = _find_friction(table) if angle else table.friction
+    missing = [key for key in NEEDED[kind] if given[key] is None]
+    if missing:
+        found = f'law = "{kind}" on \'{loc[-1]}\' without {", ".join(missing)}'
+        return {}, [case.fault(loc, found, f"all of {', '.join(NEEDED[kind])}")]
+    if kind == "rate_and_state" and given["initial_state"] is None:
+        given["initial_state"] = table.slip_distance / table.reference_rate  # type: ignore[operator]
+    return given, []
 
 
 def check_gap(case: Case, loc: Loc, law: Law, curve: Curve) -> list[Fault]:
@@ -94,7 +115,8 @@ def _check_effect(case: Case, loc: Loc, table: LawTable, kind: Kind) -> Iterator
     for key in WITHOUT_EFFECT[kind]:
         value = getattr(table, key)
         if value:
-            other = "custom" if key in ("file", "parameters") else "coulomb"
+            further = next((law for law, keys in OWN_KEYS.items() if key in keys), "coulomb")
+            other = "custom" if key in ("file", "parameters") else further
             expected = f'law = "{other}" with it, or no such key: it has no effect with {chosen}'
             shown = f" = {value:g}" if isinstance(value, float) else ""
             yield case.fault((*loc, key), f"{key}{shown} on '{loc[-1]}'", expected)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from pbem.case import Case
+from pbem.case.effects import TIMED
 from pbem.case.schema import LawTable, StageConditionTable
 from pbem.errors import Fault
 from pbem.model.background import Backgrounds, read_backgrounds
@@ -63,6 +64,8 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         law, wrong = read_law(case, ("contacts", name), case.contacts[name], "coulomb")
         contacts[name] = Contact(name, first, second, law)
         faults += wrong
+    joints = {name: each.law for name, each in interfaces.items()} | {name: each.law for name, each in contacts.items()}
+    faults += _check_durations(case, joints)
     backgrounds = read_backgrounds(case)
     faults += backgrounds.faults
     stages = _find_stages(case, conditions, [*interfaces, *contacts], backgrounds)
@@ -188,8 +191,24 @@ def _find_stages(
             if name in changes:
                 pressure[name] = changes[name].pressure
         name = stage.name or f"stage {number + 1}"
-        stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number]))
+        duration = stage.duration or 0.0
+        stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number], duration=duration))
     return tuple(stages)
+
+
+def _check_durations(case: Case, laws: Mapping[str, Law]) -> Iterator[Fault]:
+    """Laws that depend on time need the duration of every stage; without one, durations have no effect."""
+    timed = next(((name, law.kind) for name, law in laws.items() if law.kind in TIMED), None)
+    if timed is not None and not case.stages:
+        found = f"no [[stages]], but the law of '{timed[0]}' is {timed[1]}, which depends on time"
+        yield case.fault(("analysis", "steps"), found, "[[stages]] with the duration of each")
+    for number, stage in enumerate(case.stages):
+        if timed is not None and stage.duration is None:
+            found = f"a stage without duration, but the law of '{timed[0]}' is {timed[1]}, which depends on time"
+            yield case.fault(("stages", number), found, "duration = the time that the stage takes")
+        elif timed is None and stage.duration is not None:
+            expected = f"a law that depends on time ({', '.join(TIMED)}) somewhere, or no such key: it has no effect"
+            yield case.fault(("stages", number, "duration"), f"duration = {stage.duration:g}", expected)
 
 
 def _update(values: list[float], table: StageConditionTable | None) -> None:

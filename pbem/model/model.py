@@ -47,7 +47,8 @@ class Law:
     """What an interface or crack does. All strengths are stresses >= 0; `friction` is the friction coefficient.
 
     kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches; "custom" is Coulomb-like
-    with the friction bound of the function that the Python file `file` registers, called with `parameters`.
+    with the friction bound of the function that the Python file `file` registers, called with `parameters`; others are
+    those of `pbem.contact.strength.LAWS`, with these parameters and none of the strengths.
     gap: initial normal opening (length, >= 0), a number or an expression of x, y (see model.expression).
     pressurised: "open": fluid pressure acts in open parts only; "all": in closed parts too.
     cohesion_lost: cohesion and tensile strength are gone after the first slip or parting.
@@ -55,7 +56,7 @@ class Law:
     normal_stiffness, tangential_stiffness: elastic joint in front of the law (stress/length); None is rigid.
     """
 
-    kind: Literal["bonded", "coulomb", "open", "custom"]
+    kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state"]
     friction: float = 0.0
     cohesion: float = 0.0
     tensile_strength: float = 0.0
@@ -119,7 +120,8 @@ class Stage:
 
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
-    infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities.
+    infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
+    shared by the steps; 0 where there is no time.
     """
 
     name: str
@@ -128,6 +130,7 @@ class Stage:
     pressure: Mapping[str, float]
     remote: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gravity: tuple[float, float] = (0.0, 0.0)
+    duration: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def default_tie(law: Law, touches: bool) -> Tie:
         return "both"
     if law.kind == "open" or not touches:
         return "none"
-    return "both" if law.friction > 0 or law.cohesion > 0 or law.kind == "custom" else "normal"
+    return "both" if law.friction > 0 or law.cohesion > 0 or law.kind != "coulomb" else "normal"
 
 
 def find_free_motions(model: Model, ties: Mapping[str, Tie | PairTie] | None = None) -> tuple[FreeMotion, ...]:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.laws import PairLaws, collect_laws, evaluate_strength
+from pbem.contact.declaration import SLIP_PATH, Slide
+from pbem.contact.laws import PairLaws, collect_laws, evaluate_strength, find_creeping
 from pbem.contact.loads import evaluate_pressure
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, sort_pairs
@@ -26,7 +27,8 @@ class Violations:
     """By how much interpolated fields break the conditions of contact between the nodes, largest per interface (i,).
 
     penetration: length by which faces overlap; tension: normal traction beyond the tensile strength; cone: friction
-    traction beyond its bound; stress. Zero where they hold, and on bonded interfaces and those that never touch.
+    traction beyond its bound; stress. Zero where they hold, and on bonded interfaces and those that never touch; cone
+    also where friction creeps, as it then gives way to any traction.
     """
 
     penetration: Real
@@ -47,7 +49,7 @@ class BetweenNodes:
         """Of a step of the run."""
         contact, pressure = step.contact, evaluate_pressure(self._model, self._mesh, step.stage, step.factor)
         laws = self._laws
-        checked = ~(laws.bonded | laws.parted)
+        checked, creeps = ~(laws.bonded | laws.parted), find_creeping(laws)
         limit = np.where(contact.broken, 0.0, laws.tensile_strength)
         count = laws.count
         penetration, tension, cone = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -59,8 +61,9 @@ class BetweenNodes:
             penetration = np.maximum(penetration, laws.compliance_n * p_n - opening)
             tension = np.maximum(tension, p_n + pressure - limit)
             admissible = np.minimum(p_n, limit - pressure)
-            bound = evaluate_strength(laws, admissible, np.maximum(path, 0.0), pressure, contact.broken).bound
-            cone = np.maximum(cone, np.abs(p_s) - bound)
+            slide = Slide(np.zeros(count), {**contact.internal, SLIP_PATH.name: np.maximum(path, 0.0)})
+            bound = evaluate_strength(laws, admissible, slide, pressure).bound
+            cone = np.maximum(cone, np.where(creeps, 0.0, np.abs(p_s) - bound))
         return Violations(*(self._gather(np.where(checked, each, 0.0)) for each in (penetration, tension, cone)))
 
     def _read(self, values: Real, weights: Real) -> Real:

@@ -193,7 +193,8 @@ def _interface_rows(model: Model, mesh: Mesh, made: Collection[str]) -> list[lis
 def describe_law(law: Law) -> str:
     """The kind of the law with every strength that is not zero."""
     if law.kind != "coulomb":
-        return law.kind
+        numbers = law.parameters if law.kind != "custom" else {}
+        return ", ".join([law.kind, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())])
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
     return ", ".join([*given, *([f"gap {_describe_gap(law.gap)}"] if law.gap else [])])
@@ -209,6 +210,8 @@ def _describe_loads(model: Model) -> list[str]:
     lines = []
     for stage in model.stages:
         parts = [f"{stage.name}: {_count(stage.steps, 'step')}"]
+        if stage.duration:
+            parts.append(f"duration {stage.duration:g}")
         if any(stage.remote):
             parts.append("remote stress sxx, syy, sxy = {:g}, {:g}, {:g}".format(*stage.remote))
         if any(stage.gravity):

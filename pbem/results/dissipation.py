@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.laws import OPEN, SLIP, PairLaws, evaluate_strength, start_memory
+from pbem.contact.declaration import BROKEN, SLIP_PATH, Slide
+from pbem.contact.laws import OPEN, SLIP, PairLaws, StrengthGroup, evaluate_strength, start_memory
 from pbem.mesh.mesh import Mesh
 from pbem.solve.step import ContactState
 
@@ -18,7 +21,7 @@ Real = NDArray[np.float64]
 @dataclass(frozen=True)
 class PairRecord:
     """The pairs (m,) at one time: mode; traction on the first side p_n, p_s; jump g_n, g_s, and what of it the elastic
-    joints do not take, rigid_n and rigid_s; fluid pressure; length of the slip so far; bonds that are lost."""
+    joints do not take, rigid_n and rigid_s; fluid pressure; the internal variables of the laws, by their names."""
 
     mode: NDArray[np.int8]
     p_n: Real
@@ -28,8 +31,12 @@ class PairRecord:
     rigid_n: Real
     rigid_s: Real
     pressure: Real
-    path: Real
-    broken: NDArray[np.bool_]
+    internal: Mapping[str, NDArray[Any]]
+
+    @property
+    def broken(self) -> NDArray[np.bool_]:
+        """Bonds that are lost."""
+        return self.internal[BROKEN.name]
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,7 @@ def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairR
     n, borne = mesh.pairs.normal, traction[mesh.pairs.first]
     p_n, p_s = (np.conj(n) * borne).real, (np.conj(1j * n) * borne).real
     zeros = np.zeros(laws.count)
-    return PairRecord(memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap, zeros, zeros, zeros, memory.broken)
+    return PairRecord(memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap, zeros, zeros, memory.internal)
 
 
 def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairRecord:
@@ -67,7 +74,7 @@ def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairR
     return PairRecord(
         contact.mode, p_n, p_s, contact.opening, contact.slip,
         contact.opening - laws.compliance_n * p_n, contact.slip - laws.compliance_s * p_s,
-        pressure, contact.slip_path, contact.broken,
+        pressure, contact.internal,
     )  # fmt: skip
 
 
@@ -88,7 +95,10 @@ def measure_work(laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord)
     torn = np.where(parted > 0, np.maximum(tension, 0.0), 0.0)
     slides = (new.mode == SLIP) & closed
     falling = np.maximum(0.5 * (np.where(closed, old.p_s, 0.0) + new.p_s) * slipped, 0.0)
-    by_law = _integrate_bound(laws, old, new, slipped) if slides.any() else falling
+    by_law = falling.copy()
+    for group in laws.strengths:
+        if group.law.integrates and slides[group.pairs].any():
+            by_law[group.pairs] = _integrate_bound(laws, group, old, new, slipped)
     dissipated = np.where(slides & ~lost, by_law, falling) + torn
     friction = np.where(slides, by_law, np.where(lost, 0.0, falling))
     return PairWork(
@@ -110,26 +120,26 @@ def _store(record: PairRecord) -> Real:
 POINTS, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(8)[0] + 1), 0.5 * np.polynomial.legendre.leggauss(8)[1])
 
 
-def _integrate_bound(laws: PairLaws, old: PairRecord, new: PairRecord, slipped: Real) -> Real:
-    """Integral (m,) of the friction bound over the slip of the step, with normal traction and fluid pressure linear in
-    the slip; pairs whose bonds are lost have lost them from the beginning.
+def _integrate_bound(
+    laws: PairLaws, group: StrengthGroup, old: PairRecord, new: PairRecord, slipped: Real
+) -> Real:
+    """Integral (k,) of the friction bound of a group's pairs over the slip of the step, with normal traction and fluid
+    pressure linear in the slip; pairs whose bonds are lost have lost them from the beginning.
 
-    By Gauss points on two pieces that meet where friction has fallen to its dynamic value: exact for linear weakening.
+    By Gauss points on two pieces that meet where the bound has a kink: exact for linear weakening.
     """
-    length = np.abs(slipped)
+    own, length = group.pairs, np.abs(slipped)
     cut = np.full(laws.count, 0.5)
-    for group in laws.strengths:
-        if "slip_distance" in group.parameters:
-            left = group.parameters["slip_distance"] - old.path[group.pairs]
-            whole = length[group.pairs]
-            cut[group.pairs] = np.clip(left / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
+    cut[own] = group.law.find_kink(old.internal[SLIP_PATH.name][own], length[own], group.parameters)
     strength = np.where(new.broken, 0.0, laws.tensile_strength)
+    start = {**old.internal, BROKEN.name: new.broken}
+    alone = replace(laws, strengths=(group,))
     total = np.zeros(laws.count)
     for begin, size in ((np.zeros(laws.count), cut), (cut, 1 - cut)):
         for point, weight in zip(POINTS, WEIGHTS, strict=True):
             at = begin + size * point
             pressure = old.pressure + at * (new.pressure - old.pressure)
             p_n = np.minimum(old.p_n + at * (new.p_n - old.p_n), strength - pressure)
-            bound = evaluate_strength(laws, p_n, old.path + at * length, pressure, new.broken).bound
+            bound = evaluate_strength(alone, p_n, Slide(at * length, start), pressure).bound
             total += weight * size * length * bound
-    return total
+    return total[own]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.laws import find_joint
+from pbem.contact.strength import LAWS, list_model_variables
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions
@@ -30,15 +31,16 @@ ITERATION = np.dtype(
     ]
 )
 STEP_DATASETS = {"stage": "i4", "factor": "f8", "iterations": "i4", "residual": "f8", "number": "i4"}
-PAIR_DATASETS = {
-    "mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8",
-    "slip_path": "f8", "broken": "?",
-}
-# What an interface shows of them; the rest is for going on with a run.
-SHOWN = ("mode", "opening", "slip", "traction_n", "traction_s")
+# Of the pairs, with what an interface shows; beside them the internal variables of the laws.
+SHOWN = {"mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8"}
 TIP_DATASETS = ("KI", "KII", "J", "T")
 ENERGIES = ("external", "elastic", "dissipated", "released")
 CHUNK_BYTES = 32768
+
+
+def list_pair_datasets(model: Model) -> dict[str, str]:
+    """The quantities of the pairs that grow with the steps, with the kind of their numbers."""
+    return SHOWN | {variable.name: variable.kind for variable in list_model_variables(model)}
 
 
 def join_pairs(interfaces: Mapping[str, NDArray[np.int64]]) -> NDArray[np.int64]:
@@ -200,14 +202,19 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
         return
     sources = {
         quantity: Columns(_create_growing(together, quantity, (len(order),), kind))
-        for quantity, kind in PAIR_DATASETS.items()
+        for quantity, kind in list_pair_datasets(model).items()
     }
+    for variable in list_model_variables(model):
+        together[variable.name].attrs["unit"] = variable.unit
     first = 0
     for name, pairs in interfaces.items():
         interface, last = create_group(group.id, name), first + len(pairs)
         for quantity, values in fixed.items():
             create_array(interface, quantity, values[first:last])
-        for quantity in SHOWN:
+        # The common variables are for going on with a run.
+        kind = find_joint(model, name).law.kind
+        own = [variable.name for variable in LAWS[kind].variables] if kind in LAWS else []
+        for quantity in (*SHOWN, *own):
             sources[quantity].create_view(interface, quantity, first, len(pairs))
         _describe_interface(interface, model, mesh, name, bool(mesh.pairs.crack[pairs].any()))
         first = last
@@ -219,7 +226,8 @@ def _describe_interface(group: h5py.h5g.GroupID, model: Model, mesh: Mesh, name:
     set_attribute(group, "second", joint.second or "")
     set_attribute(group, "crack", crack)
     set_attribute(group, "law", joint.law.kind)
-    for key, value in vars(joint.law).items():
+    own = joint.law.parameters if joint.law.kind in LAWS else {}
+    for key, value in {**vars(joint.law), **own}.items():
         if key != "kind" and isinstance(value, str | bool | int | float):
             set_attribute(group, key, value)
 

@@ -78,6 +78,12 @@ class Contact:
     def traction_s(self) -> Real:
         return self._arrays["traction_s"]
 
+    @property
+    def internal(self) -> Mapping[str, Real]:
+        """The internal variables (k, m) that the law declares for itself, by their names."""
+        known = ("position", "normal", "arc_length", "mode", "opening", "slip", "traction_n", "traction_s")
+        return {name: values for name, values in self._arrays.items() if name not in known}
+
 
 @dataclass(frozen=True)
 class Interior:

@@ -14,13 +14,14 @@ from pbem.model.model import Model
 from pbem.results.energy import Energy
 from pbem.results.layout import (
     ENERGIES,
-    PAIR_DATASETS,
+    SHOWN,
     TIP_DATASETS,
     count_steps,
     create_energy,
     extend,
     find_growing,
     join_pairs,
+    list_pair_datasets,
     to_columns,
 )
 from pbem.solve.step import ContactState, Step
@@ -45,6 +46,8 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     if model.crack_tips and not set(TIP_DATASETS) <= set(file["all/tips"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
+    if mesh.pairs.count and not set(list_pair_datasets(model)) <= set(file["all/contact"]):
+        raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     position = to_columns(list_faces(mesh).position + model.origin)
     stored = file["nodes/position"][...]
     same = SAME_PLACE * (model.size + abs(model.origin))
@@ -53,20 +56,23 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
                                     "run without resuming")
 
 
-def read_last_step(file: h5py.File, mesh: Mesh) -> Step | None:
+def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:
     """The last step that was stored completely, without its iterations; None if there is none."""
     steps = file["steps"]
     k = count_steps(file)
     if k == 0:
         return None
-    contact = {name: np.zeros(mesh.pairs.count, dtype=kind) for name, kind in PAIR_DATASETS.items()}
+    contact: dict[str, Any] = {
+        name: np.zeros(mesh.pairs.count, dtype=kind) for name, kind in list_pair_datasets(model).items()
+    }
     pairs = join_pairs(sort_pairs(mesh))
     for name, values in contact.items() if len(pairs) else ():
         values[pairs] = file["all/contact"][name][k - 1]
     fields = {name: file["fields"][name][k - 1] @ np.array([1, 1j]) for name in ("displacement", "traction")}
     return Step(
         number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
-        iterations=(), residual=float(steps["residual"][k - 1]), contact=ContactState(**contact), **fields,
+        iterations=(), residual=float(steps["residual"][k - 1]), **fields,
+        contact=ContactState(**{name: contact.pop(name) for name in SHOWN}, internal=contact),
     )
 
 

@@ -24,12 +24,13 @@ from pbem.results.energy import Energy, EnergyBalance, describe_runaway
 from pbem.results.layout import (
     ENERGIES,
     ITERATION,
-    PAIR_DATASETS,
+    SHOWN,
     STEP_DATASETS,
     append_row,
     count_steps,
     extend,
     join_pairs,
+    list_pair_datasets,
     to_columns,
     write_attributes,
     write_header,
@@ -108,7 +109,7 @@ class ResultWriter:
             with refuse_damage(target):
                 file = storage.file
                 check_same_case(str(path), file, model, mesh)
-                last_step = read_last_step(file, mesh)
+                last_step = read_last_step(file, model, mesh)
                 reached = None if last_step is None else read_last_energy(file)
                 truncate(file, 0 if last_step is None else last_step.number)
                 write_attributes(file, model, ranks, petsc_version, petsc_options)
@@ -199,8 +200,9 @@ class ResultWriter:
         together = file["all"]
         if self._model.conditions:
             append_row(together["reactions"], to_columns(self._sum_reactions(step.traction)))
-        for quantity in PAIR_DATASETS if len(self._pairs) else ():
-            append_row(together["contact"][quantity], getattr(step.contact, quantity)[self._pairs])
+        contact = {name: getattr(step.contact, name) for name in SHOWN} | dict(step.contact.internal)
+        for quantity in list_pair_datasets(self._model) if len(self._pairs) else ():
+            append_row(together["contact"][quantity], contact[quantity][self._pairs])
         if self._tip_rules.cracks:
             for kind, at_tips in self._tip_rules.evaluate_all(step).items():
                 append_row(together["tips"][kind], at_tips)

@@ -66,7 +66,7 @@ def run_cascade(
         pairs = _find_nearest(problem.mesh.pairs.position, pairs, np.flatnonzero(failing), most)
     response = find_response(problem, tangent, constraints, load, law, solved, pairs)
     scale = problem.traction_scale
-    start = replace(memory, broken=broken)
+    start = memory.lose(broken)
     subset = take_subset(problem.laws, start, load.pressure, modes, pairs)
     lost, own = do_on_first(problem.comm, ConvergenceError, lambda: _follow(subset, response, scale, floor))
     broken[pairs] = lost
@@ -89,7 +89,7 @@ def _follow(subset: Subset, response: Response, scale: float, floor: float) -> t
     """The bonds of s pairs that are lost in the end, and their modes; None if some round could not be settled."""
     broken = subset.memory.broken.copy()
     while True:
-        memory = replace(subset.memory, broken=broken)
+        memory = subset.memory.lose(broken)
         found = _settle(replace(subset, memory=memory), response, scale, floor)
         if found is None:
             return broken, None

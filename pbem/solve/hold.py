@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.cut_parts import describe_cut_motions
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, stick_creeping
 from pbem.contact.loads import Load
 from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
 from pbem.errors import ConvergenceError
@@ -138,6 +138,7 @@ class Hold:
         problem = self.problem
         if not problem.parts.cut.any():
             return None
+        modes = stick_creeping(problem.laws, modes)
         return describe_cut_motions(problem.model, problem.mesh, problem.outer, problem.parts, modes)
 
     def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:

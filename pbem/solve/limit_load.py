@@ -17,7 +17,6 @@ from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import Memory, PairLaws
 from pbem.contact.loads import Load
 from pbem.contact.modes import P_N, P_S, Linearisation, tensile_limit
-from pbem.contact.strength import coulomb, slip_weakening
 from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]
@@ -35,8 +34,8 @@ MOST_PAIRS = 20_000
 def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float | None:
     """The largest fraction of a stage in [reached, target] whose loads some tractions balance; None if unknown.
 
-    Without what pairs have lost for good, but as if none of them had slipped. Unknown for laws of one's own, models
-    without finite bodies, and where the programme finds no balance at `reached` itself.
+    Without what pairs have lost for good, but as if none of them had slipped. Unknown for laws that do not say how much
+    they bear, models without finite bodies, and where the programme finds no balance at `reached` itself.
     """
     solved = _solve(problem, memory, stage, reached, target)
     share = solved.share if solved else None
@@ -65,7 +64,7 @@ def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target:
     finite = np.array([not region.infinite for region in problem.model.regions])
     if laws.count > MOST_PAIRS or not finite.any() or not (~mesh.pairs.crack).any():
         return None
-    if any(group.law not in (coulomb, slip_weakening) for group in laws.strengths):
+    if any(group.law.find_strongest(group.parameters) is None for group in laws.strengths):
         return None
     loads = [problem.evaluate_load(stage, factor) for factor in (reached, target)]
     matrix, before, after = _sum_up(problem, loads, np.flatnonzero(finite))
@@ -166,10 +165,10 @@ def _maximise(
 
 
 def _find_strongest(laws: PairLaws, memory: Memory) -> tuple[Real, Real]:
-    """Friction and cohesion of all pairs, the larger of what they are before and after slip."""
+    """Friction and cohesion of all pairs, the largest that their laws know of; cohesion that is lost is none."""
     friction, cohesion = np.zeros(laws.count), np.zeros(laws.count)
     for group in laws.strengths:
-        at, parameters = group.pairs, group.parameters
-        friction[at] = np.maximum(parameters["friction"], parameters.get("friction_dynamic", 0.0))
-        cohesion[at] = np.where(memory.broken[at], 0.0, parameters["cohesion"])
-    return friction, cohesion
+        strongest = group.law.find_strongest(group.parameters)
+        assert strongest is not None
+        friction[group.pairs], cohesion[group.pairs] = strongest
+    return friction, np.where(memory.broken, 0.0, cohesion)

@@ -101,7 +101,7 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     """The state of a stored step."""
     modes = ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
     elastic = problem.laws.compliance_s * contact.traction_s
-    memory = Memory(modes, contact.slip - elastic, contact.slip_path, contact.broken, contact.traction_n)
+    memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n)
     return Start(number, stage, factor, memory)
 
 
@@ -200,7 +200,8 @@ def _advance(
         refuse = _never if proportional else partial(_refuse, problem, memory, stage, target)
         try:
             load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
-            solution = solve_step(problem, tangent, memory, load, reporter, refuse, hurried)
+            begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
+            solution = solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
             balanced = _find_balanced(problem, memory, stage, reached, target)
@@ -324,9 +325,9 @@ def describe_step(
             slip=pairs.g_s,
             traction_n=pairs.p_n,
             traction_s=pairs.p_s,
-            slip_path=memory.path,
-            broken=memory.broken,
+            internal=memory.internal,
         ),
         balance=measure_balance(problem, solution.v, load, problem.find_support(solution.modes)),
         linearity=measure_linearity(mesh, everywhere, pairs.g_s),
+        duration=solution.memory.duration,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
     Proposal,
+    begin_slip,
+    choose_slip,
     find_failures,
     limit_changes,
     linearise,
@@ -118,7 +120,7 @@ def _search_modes(
     comm = problem.comm
     modes = do_on_first(comm, ConvergenceError, lambda: follow_leaders(
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
-    normal_traction, slip = memory.normal_traction, memory.slip
+    normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
     while True:
         begin = time.perf_counter()
         law = linearise(
@@ -142,7 +144,7 @@ def _search_modes(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
                 min(search.most_pivoted, MOST_PIVOTED),
             )
-            memory = replace(memory, broken=cascade.broken)
+            memory = memory.lose(cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
@@ -175,13 +177,14 @@ def _search_modes(
             chosen = limit_changes(modes, proposal, share)
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
-        slipped = plastic_slip(laws, pairs) - memory.slip
+        slipped, former = plastic_slip(laws, pairs) - memory.slip, modes
         modes = do_on_first(
             comm, ConvergenceError,
             lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
-        normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
+        normal_traction = pairs.p_n
+        slip = choose_slip(laws, modes, memory, slip, plastic_slip(laws, pairs), former)
 
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:

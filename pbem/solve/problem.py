@@ -16,7 +16,7 @@ from pbem.bem.operator import Block, RowOperator
 from pbem.bem.pointwise import PointRows
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap, build_constraints
-from pbem.contact.laws import ModeState, PairLaws
+from pbem.contact.laws import ModeState, PairLaws, stick_creeping
 from pbem.contact.loads import Load, OuterNodes, evaluate_load
 from pbem.contact.modes import Linearisation
 from pbem.contact.support import Support, find_support, find_ties
@@ -90,7 +90,7 @@ class Problem:
 
     def find_support(self, modes: ModeState) -> Support:
         """What holds the bodies in given modes; remembered, as modes are asked of several times."""
-        return self._supports(modes.mode.tobytes())
+        return self._supports(stick_creeping(self.laws, modes).mode.tobytes())
 
     @cached_property
     def _supports(self) -> Callable[[bytes], Support]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.contact.laws import Memory, PairLaws, start_memory
-from pbem.contact.strength import coulomb
 from pbem.solve.problem import Problem
 
 
@@ -18,8 +17,10 @@ def is_proportional(problem: Problem, memory: Memory, stage: int, reached: float
     if stage > 0 or reached > 0 or not _has_no_scale(problem.laws):
         return False
     rest = start_memory(problem.laws)
-    untouched = not memory.slip.any() and not memory.path.any() and not memory.normal_traction.any()
-    same = np.array_equal(memory.modes.mode, rest.modes.mode) and np.array_equal(memory.broken, rest.broken)
+    untouched = not memory.slip.any() and not memory.normal_traction.any()
+    same = np.array_equal(memory.modes.mode, rest.modes.mode) and all(
+        np.array_equal(memory.internal[name], values) for name, values in rest.internal.items()
+    )
     first = problem.evaluate_load(0, 0.0)
     whole = problem.evaluate_load(0, 1.0)
     starts = (first.values, first.known, first.far, first.background)
@@ -32,7 +33,7 @@ def _has_no_scale(laws: PairLaws) -> bool:
     if laws.tensile_strength[may_touch].any() or laws.gap[may_touch].any():
         return False
     return all(
-        group.law is coulomb and not group.parameters["cohesion"][may_touch[group.pairs]].any()
+        group.law.linear and not group.parameters["cohesion"][may_touch[group.pairs]].any()
         for group in laws.strengths
         if may_touch[group.pairs].any()
     )

@@ -270,7 +270,7 @@ class SchwarzPreconditioner:
             if motions.region == region and there.all():
                 rotation = np.zeros(4 * mesh.nodes)
                 rotation[motions.columns] = motions.basis[-1]
-                left = (self._free[number_components(nodes)] @ rotation) + values @ rotation[columns]
+                left = (self.free[number_components(nodes)] @ rotation) + values @ rotation[columns]
                 values[:, place] -= np.outer(left, motions.basis[-1])
         return values, columns
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.declaration import BROKEN, list_variables
 from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, start_memory
 from pbem.contact.loads import Load
 from pbem.contact.modes import linearise
@@ -61,20 +63,20 @@ class SecondSolution:
         return describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
 
     def _solve(self, step: Step, load: Load) -> Solution:
-        begun = replace(self.memory, modes=self._guess_modes(step.contact))
+        begun = replace(self.memory, modes=self._guess_modes(step.contact), duration=step.duration)
         try:
             return solve_step(self.problem, self.tangent, begun, load, self._watch)
         except ConvergenceError:
             self._watch.check()
-            return self._solve_held(step.contact, load)
+            return self._solve_held(step, load)
 
-    def _solve_held(self, contact: ContactState, load: Load) -> Solution:
+    def _solve_held(self, step: Step, load: Load) -> Solution:
         """The solution with the statuses of the run's pairs, which need not be those that this mesh wants.
 
         In narrow wedges, or with cohesion that is lost as faces part, a coarser mesh may have none.
         """
-        problem, beside = self.problem, self.beside
-        memory = replace(self.memory, broken=self._carry_broken(contact))
+        problem, beside, contact = self.problem, self.beside, step.contact
+        memory = replace(self.memory, duration=step.duration).lose(self._carry_internal(contact)[BROKEN.name])
         hold = Hold(problem)
         modes = do_on_first(problem.comm, ConvergenceError, lambda: follow_leaders(
             problem.laws, hold.apply(self._guess_modes(contact), problem.laws.gap, np.zeros(problem.laws.count))))
@@ -89,9 +91,18 @@ class SecondSolution:
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
         return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, ())
 
-    def _carry_broken(self, contact: ContactState) -> NDArray[np.bool_]:
-        nearest = self.beside.nearest
-        return np.asarray(self.problem.laws.brittle & (nearest >= 0) & contact.broken[nearest])
+    def _carry_internal(self, contact: ContactState) -> dict[str, NDArray[Any]]:
+        """The internal variables of the run's pairs, carried over as they are declared to be."""
+        laws, nearest = self.problem.laws, self.beside.nearest
+        internal = dict(start_memory(laws).internal)
+        for variable in list_variables(group.law for group in laws.strengths):
+            values = contact.internal[variable.name]
+            if variable.carry == "as the jump":
+                internal[variable.name] = np.maximum(self.beside.carry_pairs(values, jumps=True), 0.0)
+            else:
+                internal[variable.name] = np.where(nearest >= 0, values[nearest], internal[variable.name])
+        internal[BROKEN.name] = laws.brittle & (nearest >= 0) & internal[BROKEN.name]
+        return internal
 
     def _guess_modes(self, contact: ContactState) -> ModeState:
         nearest, own = self.beside.nearest, self.memory.modes
@@ -106,8 +117,7 @@ class SecondSolution:
         slip = beside.carry_pairs(contact.slip, jumps=True)
         tangential = beside.carry_pairs(contact.traction_s, jumps=False)
         self.memory = Memory(
-            self._guess_modes(contact), slip - laws.compliance_s * tangential,
-            np.maximum(beside.carry_pairs(contact.slip_path, jumps=True), 0.0), self._carry_broken(contact),
+            self._guess_modes(contact), slip - laws.compliance_s * tangential, self._carry_internal(contact),
             beside.carry_pairs(contact.traction_n, jumps=False),
         )
 

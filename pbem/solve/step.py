@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.contact.declaration import BROKEN, SLIP_PATH
 from pbem.model.model import Model
 
 STICK, SLIP, OPEN = 0, 1, 2
@@ -35,8 +37,8 @@ class ContactState:
     """State of all m contact pairs, in the order of Mesh.pairs.
 
     mode (m,) int8: STICK, SLIP, OPEN; opening (initial gap included), slip: lengths; traction_n, traction_s:
-    traction on the first side along n and s (stress). What the pairs remember besides: slip_path, the accumulated
-    length of their plastic slip; broken, brittle bonds that are lost.
+    traction on the first side along n and s (stress). internal: values of the internal variables that the laws
+    declare, by their names (see pbem.contact.declaration).
     """
 
     mode: NDArray[np.int8]
@@ -44,8 +46,17 @@ class ContactState:
     slip: NDArray[np.float64]
     traction_n: NDArray[np.float64]
     traction_s: NDArray[np.float64]
-    slip_path: NDArray[np.float64]
-    broken: NDArray[np.bool_]
+    internal: Mapping[str, NDArray[Any]]
+
+    @property
+    def slip_path(self) -> NDArray[np.float64]:
+        """The accumulated length of the plastic slip."""
+        return self.internal[SLIP_PATH.name]
+
+    @property
+    def broken(self) -> NDArray[np.bool_]:
+        """Brittle bonds that are lost."""
+        return self.internal[BROKEN.name]
 
 
 @dataclass(frozen=True)
@@ -99,6 +110,7 @@ class Step:
 
     number: from 1 on, sub-steps counted; stage: index; factor: fraction of the stage reached, in (0, 1].
     displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
+    duration: of the step, 0 where there is no time.
     interior: at the interior points, once evaluated. balance, linearity: None where they are not told.
     last_of_stage: True at factor 1.
     """
@@ -114,6 +126,7 @@ class Step:
     interior: Interior | None = None
     balance: Balance | None = None
     linearity: Linearity | None = None
+    duration: float = 0.0
 
     @property
     def last_of_stage(self) -> bool:

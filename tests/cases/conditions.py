@@ -14,6 +14,9 @@ from pbem.solve.step import OPEN, SLIP, STICK
 
 # Of the largest length or traction of the interface: rounding, times the condition of the equations.
 ROUNDING = 1e-9
+# Friction that depends on the rate is known to the tolerance of Newton's method times the change of ln V, where pairs
+# move at all: at this part of the largest rate and more.
+CREEP, SLOW = 1e-7, 1e-6
 # Of the largest reaction: the error of the discretisation, largest with traction equations only.
 BALANCE = 1.5e-3
 
@@ -82,8 +85,18 @@ def _check_balance(file: h5py.File) -> Iterator[str]:
 
 def _check_contacts(file: h5py.File) -> Iterator[str]:
     for name, group in file["contact"].items():
-        fields = {field: group[field][...] for field in (*PER_PAIR, "arc_length", "normal")}
+        fields = {field: values[...] for field, values in group.items()}
         yield from (f"{name}: {fault}" for fault in _check_contact(fields, group.attrs))
+
+
+def _find_friction(fields: dict[str, Array], law: Mapping[str, Any]) -> Array:
+    """The friction coefficient at the rate and state of each pair; of those all but at rest, what they have."""
+    rate, state = fields["slip_rate"], fields["state"]
+    moves = rate > SLOW * rate.max()
+    logarithms = [np.log(np.where(moves, rate, law["reference_rate"]) / law["reference_rate"]),
+                  np.log(law["reference_rate"] * state / law["slip_distance"])]
+    friction = law["friction"] + law["rate_effect"] * logarithms[0] + law["state_effect"] * logarithms[1]
+    return np.where(moves, friction, abs(fields["traction_s"]) / np.maximum(-fields["traction_n"], 1e-300))
 
 
 def _check_contact(fields: dict[str, Array], law: Mapping[str, Any]) -> Iterator[str]:
@@ -94,6 +107,9 @@ def _check_contact(fields: dict[str, Array], law: Mapping[str, Any]) -> Iterator
     jump, traction = max(abs(opening).max(), abs(slip).max()), max(abs(normal).max(), abs(tangential).max())
     length, stress = ROUNDING * max(np.ptp(arc_length), jump), ROUNDING * traction
     stick, slips, is_open = (mode == kind for kind in (STICK, SLIP, OPEN))
+    if law["law"] == "rate_and_state":
+        friction = _find_friction(fields, law)
+        stress = max(stress, CREEP * traction)
     bound = np.maximum(cohesion - friction * normal, 0.0)
     increment = np.diff(slip, axis=0, prepend=0.0)
     rules = {

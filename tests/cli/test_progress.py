@@ -22,7 +22,8 @@ class Terminal(io.StringIO):
 
 def make_step(number: int, stage: int, factor: float) -> Step:
     zeros = np.zeros(3)
-    contact = ContactState(np.array([STICK, SLIP, OPEN], dtype=np.int8), zeros, zeros, zeros, zeros, zeros, zeros > 0)
+    mode = np.array([STICK, SLIP, OPEN], dtype=np.int8)
+    contact = ContactState(mode, zeros, zeros, zeros, zeros, {"slip_path": zeros, "broken": zeros > 0})
     return Step(number, stage, factor, (Iteration(1, 1e-3, 5, 1, 1, 1, 0.5),), 2e-12, zeros + 0j, zeros + 0j, contact)
 
 

@@ -32,6 +32,7 @@ DERIVED = 100
 SCALES = {
     "displacement": "length", "opening": "length", "slip": "length", "slip_path": "length",
     "traction": "stress", "traction_n": "stress", "traction_s": "stress", "hoop_stress": "stress", "stress": "stress",
+    "slip_rate": "rate", "state": "time",
     "KI": "intensity", "KII": "intensity", "T": "stress",
     "reactions": "force", "resultant": "force", "part_resultant": "force", "whole": "force",
     "J": "force",  # per thickness, as forces are: stress times length

@@ -107,8 +107,7 @@ def make_step(mesh: Mesh, number: int, stage: int, factor: float, load: float) -
         slip=np.where(mode == STICK, 0.0, load * 2e-4 * (1 + along)),
         traction_n=np.where(closed, -load * (4 - along), 0.0),
         traction_s=np.where(closed, load * (1 + 0.2 * along), 0.0),
-        slip_path=load * 3e-4 * along,
-        broken=along > 1.0,
+        internal={"slip_path": load * 3e-4 * along, "broken": along > 1.0},
     )
     stick, slip, parted = (int((mode == which).sum()) for which in (STICK, SLIP, OPEN))
     iterations = tuple(Iteration(i + 1, 10.0 ** (-5 * i), 7 - 3 * i, stick, slip, parted, 0.01) for i in range(3))

@@ -17,8 +17,8 @@ def make_step(**fields: np.ndarray) -> Step:
     zeros = np.zeros(count)
     contact = ContactState(
         mode=np.full(count, SLIP, dtype=np.int8),
-        **{name: fields.get(name, zeros) for name in ("opening", "slip", "traction_n", "traction_s", "slip_path")},
-        broken=np.zeros(count, dtype=bool),
+        **{name: fields.get(name, zeros) for name in ("opening", "slip", "traction_n", "traction_s")},
+        internal={"slip_path": fields.get("slip_path", zeros), "broken": np.zeros(count, dtype=bool)},
     )
     return Step(1, 0, 1.0, (), 0.0, np.zeros(0, complex), np.zeros(0, complex), contact)
 

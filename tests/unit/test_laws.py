@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbem.contact.declaration import FrictionLaw, Slide
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -61,11 +62,11 @@ def scale_cohesion(laws: PairLaws, factor: float) -> tuple[StrengthGroup, ...]:
 def remember(slip: Real | float, count: int = 1, path: Real | float = 0.0) -> Memory:
     """A memory of pairs that stuck with the given slip."""
     none = np.zeros(count)
-    return Memory(make_modes(STICK, count=count), none + slip, none + path, none > 0, none)
+    return Memory(make_modes(STICK, count=count), none + slip, {"slip_path": none + path, "broken": none > 0}, none)
 
 
 def friction_bound(laws: PairLaws, p_n: Real, pressure: Real) -> Strength:
-    return evaluate_strength(laws, p_n, np.zeros(laws.count), pressure, np.zeros(laws.count, dtype=bool))
+    return evaluate_strength(laws, p_n, start_memory(laws).look_ahead(np.zeros(laws.count)), pressure)
 
 
 def make_modes(mode: int, sign: float = 1.0, count: int = 1) -> ModeState:
@@ -81,10 +82,11 @@ def test_only_coulombs_law_is_known_to_resist_nothing_by_its_parameters() -> Non
     assert resists_slip(laws).tolist() == [False]
     assert start_memory(laws).modes.mode.tolist() == [SLIP]
 
-    def constant(p_n: Real, slip: Real, friction: Real, cohesion: Real) -> Strength:
-        return Strength(1.0 + 0 * p_n, 0 * p_n, 0 * p_n)
+    class Constant(FrictionLaw):
+        def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:
+            return Strength(1.0 + 0 * p_n, 0 * p_n, 0 * p_n)
 
-    custom = replace(laws, strengths=(replace(laws.strengths[0], law=constant),))
+    custom = replace(laws, strengths=(replace(laws.strengths[0], law=Constant()),))
     assert resists_slip(custom).tolist() == [True]
     assert start_memory(custom).modes.mode.tolist() == [STICK]
 
@@ -351,7 +353,7 @@ def make_weakening(count: int, friction: float = 0.6, dynamic: float = 0.2, dist
 def test_friction_falls_linearly_with_the_slip_path_to_its_dynamic_value() -> None:
     path = np.array([0.0, 0.125, 0.25, 0.5, 3.0])
     p_n = np.full(5, -2.0)
-    strength = evaluate_strength(make_weakening(5), p_n, path, np.zeros(5), np.zeros(5, dtype=bool))
+    strength = evaluate_strength(make_weakening(5), p_n, remember(0.0, 5).look_ahead(path), np.zeros(5))
     np.testing.assert_allclose(strength.bound, 0.1 + 2 * np.array([0.6, 0.5, 0.4, 0.2, 0.2]))
     np.testing.assert_allclose(strength.by_traction, -np.array([0.6, 0.5, 0.4, 0.2, 0.2]))
     np.testing.assert_allclose(strength.by_slip, [-1.6, -1.6, -1.6, 0.0, 0.0])
@@ -410,7 +412,7 @@ def test_overloaded_brittle_bonds_fail_the_worst_first() -> None:
     failing = find_failures(laws, state, remember(0.0, 5), np.zeros(5))
     np.testing.assert_array_equal(failing, [False, True, True, False, False])
     # those fail once only, and without overload none does
-    broken = replace(remember(0.0, 5), broken=failing)
+    broken = remember(0.0, 5).lose(failing)
     np.testing.assert_array_equal(find_failures(laws, state, broken, np.zeros(5)), [False, False, False, True, False])
     calm = replace(state, p_n=np.full(5, -1.0), p_s=np.full(5, 0.7))
     assert not find_failures(laws, calm, remember(0.0, 5), np.zeros(5)).any()
@@ -428,8 +430,8 @@ def test_brittle_bonds_under_tension_carry_no_more_than_their_cone(p_s: float, f
 
 def test_broken_bonds_have_friction_left_but_no_cohesion_or_strength() -> None:
     laws = make_laws(brittle=True, tensile_strength=0.2, cohesion=0.3, friction=0.5)
-    broken = replace(remember(0.0), broken=np.array([True]))
-    bound = evaluate_strength(laws, np.array([-1.0]), np.zeros(1), np.zeros(1), np.array([True])).bound
+    broken = remember(0.0).lose(np.array([True]))
+    bound = evaluate_strength(laws, np.array([-1.0]), broken.look_ahead(np.zeros(1)), np.zeros(1)).bound
     assert bound == pytest.approx(0.5)
     none = np.zeros(1)
     assert propose_modes(laws, make_modes(STICK), make_state(0.1), broken, none).modes.mode[0] == OPEN

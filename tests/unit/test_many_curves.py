@@ -74,7 +74,7 @@ def make_step(mesh: Mesh, number: int, steps: int) -> Step:
     wave = 1e-3 * np.sin(np.arange(faces) + number)
     values = np.cos(pairs + number) - 0.5
     contact = ContactState((pairs % 3).astype(np.int8), np.abs(values), values, -np.abs(values), values,
-                           np.abs(values), np.zeros(len(pairs), dtype=bool))
+                           {"slip_path": np.abs(values), "broken": np.zeros(len(pairs), dtype=bool)})
     iteration = Iteration(1, 1e-12, 0, 0, 0, 0, 0.1)
     return Step(number, 0, number / steps, (iteration,), 1e-12, wave + 0j, wave + 0j, contact)
 

@@ -77,7 +77,7 @@ def make_square(size: float, material: Material = ROCK, order: int = 2, points: 
 def put_field(mesh: Mesh, displacement: Complex, traction: Complex) -> Step:
     """A step with given values at the nodes of a mesh without cracks."""
     zeros = np.zeros(0)
-    contact = ContactState(np.zeros(0, np.int8), zeros, zeros, zeros, zeros, zeros, np.zeros(0, bool))
+    contact = ContactState(np.zeros(0, np.int8), zeros, zeros, zeros, zeros, {"slip_path": zeros, "broken": zeros > 0})
     return Step(1, 0, 1.0, (), 0.0, displacement, traction, contact)
 
 

@@ -99,7 +99,7 @@ class Sorted:
 
 
 def choose_terms(tolerance: float) -> int:
-    """Terms of the expansions for a relative error of products; the margin was measured."""
+    """Terms of the expansions for a relative error of products; the margin was measured (theory, 42)."""
     return int(np.ceil(np.log(tolerance) / np.log(RATIO)))
 
 
@@ -190,7 +190,7 @@ def anchor_rows(
 
 
 def take_off_rigid_motions(v: Real, rigid: Sequence[RigidMotions]) -> Real:
-    """v less the rigid motions of bodies that fit its displacements best."""
+    """v less the rigid motions of bodies that fit its displacements best (theory, 43)."""
     strained = v.copy()
     for motions in rigid:
         strained[motions.columns] -= (motions.basis @ v[motions.columns]) @ motions.basis

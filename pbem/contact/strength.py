@@ -23,7 +23,7 @@ Real = NDArray[np.float64]
 
 
 def coulomb(p_n: Real, slip: Real, friction: Real, cohesion: Real) -> Strength:
-    """|p_s| <= cohesion - friction p_n, and no friction beyond the apex of the cone."""
+    """|p_s| <= cohesion - friction p_n, and no friction beyond the apex of the cone (theory, 48)."""
     bound = cohesion - friction * p_n
     return Strength(np.maximum(bound, 0.0), np.where(bound >= 0, -friction, 0.0), np.zeros_like(p_n))
 
@@ -31,7 +31,7 @@ def coulomb(p_n: Real, slip: Real, friction: Real, cohesion: Real) -> Strength:
 def slip_weakening(
     p_n: Real, slip: Real, friction: Real, cohesion: Real, friction_dynamic: Real, slip_distance: Real
 ) -> Strength:
-    """Coulomb's law with friction falling linearly to friction_dynamic over the slip distance."""
+    """Coulomb's law with friction falling linearly to friction_dynamic over the slip distance (theory, 49)."""
     weaker = np.clip(slip / slip_distance, 0.0, 1.0)
     static = coulomb(p_n, slip, friction + (friction_dynamic - friction) * weaker, cohesion)
     falling = (slip < slip_distance) & (static.bound > 0)

@@ -2,7 +2,7 @@
 
 With the other pairs' laws linear, the states of s pairs are affine in 2 s numbers d, state = state_0 + R d, and where
 tractions determine them so are the jumps in the tractions, g = g_0 + A p: A is the pairs' compliance. Coulomb's law of
-one step in the plane then is a linear complementarity problem (A. Klarbring, Ingenieur-Archiv 56, 1986), here in the
+one step then is a linear complementarity problem (A. Klarbring, Comput. Methods Appl. Mech. Eng. 58, 1986), here in the
 form of D. E. Stewart and J. C. Trinkle (Int. J. Numer. Methods Eng. 39, 1996). With N = tensile strength - pressure -
 p_n >= 0, friction traction p_s = b_+ - b_-, both >= 0, and a size of the slip l >= 0,
 
@@ -290,7 +290,10 @@ def _find_compliance(pairs: _Pairs) -> tuple[Real | None, bool]:
 
 
 def _pivot(pairs: _Pairs, compliance: Real, detached: Bool) -> ModeState | None:
-    """The modes of the complementarity problem in which some pairs are detached; None where pivoting fails."""
+    """The modes of the complementarity problem in which some pairs are detached; None where pivoting fails.
+
+    (theory, 56)
+    """
     count = len(detached)
     # In a unit of length in which compliances are numbers of about one.
     softness = float(np.abs(np.diag(compliance)).mean()) or 1.0

@@ -90,8 +90,10 @@ def _write_key(path: str, kind: str, entry: Schema, required: bool) -> str:
 
 
 def _wrap(text: str, indent: str = "") -> str:
-    words = " ".join(text.split())
-    return textwrap.fill(words, WIDTH, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)
+    # Lines are not broken within what is quoted as code.
+    words = re.sub("`[^`]*`", lambda code: code[0].replace(" ", "\0"), " ".join(text.split()))
+    lines = textwrap.fill(words, WIDTH, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)
+    return lines.replace("\0", " ")
 
 
 def _find_table(schema: Schema, entry: Schema) -> Schema | None:

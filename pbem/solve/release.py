@@ -91,7 +91,7 @@ class ReleasedTangent:
         return result
 
     def _complete(self, unknowns: Real, v: Real, constraints: ConstraintMap) -> Real:
-        """x_0 + X b for x_0 (2 nodes,) and its v_0 (4 nodes,), less known fields."""
+        """x_0 + X b for x_0 (2 nodes,) and its v_0 (4 nodes,), less known fields (theory, 62)."""
         released = constraints.released
         assert released is not None
         functional = self.problem.anchor_parts[1]

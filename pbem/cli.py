@@ -63,7 +63,7 @@ PETSc: any option of PETSc's is taken with the prefix pbem_ and wins over the ca
 Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores
 
 exit code: 0 finished; 1 unexpected error; 2 the case, the command line or the launch is wrong, nothing was written;
-3 not converged at the smallest step, the file holds every step reached"""
+3 not converged at the smallest step, the file holds every step reached (see `pbem help convergence`)"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -166,7 +166,7 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
-    check = add("check", _check, "validate a case and tell what would be computed")
+    check = add("check", _check, "validate a case and show what would be computed")
     check.add_argument("case", metavar="CASE")
     check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
     run = add("run", None, "compute a case and write its results", RUN_NOTES)
@@ -176,7 +176,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    info = add("info", _info, "tell what a result file holds")
+    info = add("info", _info, "show what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
     plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")
     plot.add_argument("file", metavar="FILE.h5")
@@ -310,7 +310,8 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
 def _describe_end(error: BaseException, target: Path) -> tuple[str, int]:
     """What is said of a run that has ended early, and the exit code."""
     if isinstance(error, ConvergenceError):
-        return f"not converged: {error}\n{target} holds every step reached", NOT_CONVERGED
+        advice = "`pbem help convergence` explains the reason"
+        return f"not converged: {error}\n{target} holds every step reached; {advice}", NOT_CONVERGED
     if isinstance(error, StorageError):
         return f"{error}; {_describe_rest(target)}", UNEXPECTED
     if isinstance(error, LawError):

@@ -107,7 +107,7 @@ def test_help_loads_no_library_and_takes_a_closed_pipe() -> None:
 
 def test_further_ranks_leave_help_to_the_first() -> None:
     environment = os.environ | {"OMPI_COMM_WORLD_RANK": "1", "OMPI_COMM_WORLD_SIZE": "2"}
-    arguments = [sys.executable, "-m", "pbem", "help", "signs"]
+    arguments = [sys.executable, "-m", "pbem", "help", "nothing of the kind"]
     done = subprocess.run(arguments, capture_output=True, text=True, env=environment, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 

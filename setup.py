@@ -1,4 +1,5 @@
-"""The compiled part of the build and the cases that are installed with the package; the rest is in pyproject.toml.
+"""The compiled part of the build, and the cases and pages that are installed with the package; the rest is in
+pyproject.toml.
 
 PBEM_MARCH names the processor to build for (as gcc's -march, or -mcpu on other machines than x86), e.g. x86-64-v3.
 Unset it is the processor of this machine, or the compiler's default where the compiler does not know how to name that;
@@ -57,7 +58,7 @@ setup(
     cmdclass={"build_ext": BuildKernels},
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
     package_dir={"pbem.cases": "cases"},
-    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"]},
+    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"], "pbem.pages": ["*.md"]},
     ext_modules=[
         Extension(
             "pbem.bem._kernels",

@@ -8,7 +8,8 @@ first side r and a second side l; n is the outward normal of the first side and 
     slip     g_s = (u_l - u_r) . s
     traction p   = traction on the first side; p_n <= 0 in compression; the second side carries -p
 
-Inside the program a point or a vector of the plane is one complex number x + iy.
+Inside the program a point or a vector of the plane is one complex number x + iy. Docstrings and comments cite formulas
+as (theory, 12): that is formula 12 of the page that `pbem help theory` prints.
 
     results = pbem.run("case.toml")              # solve a case; see pbem.driver.run
     results = pbem.open_results("case.h5")       # read a result file; see pbem.results.reader.open_results

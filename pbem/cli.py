@@ -1,4 +1,4 @@
-"""The command line: make, check, run, info, plot. Only `run` needs MPI and PETSc."""
+"""The command line: make, check, run, info, plot, help. Only `run` needs MPI and PETSc."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pbem.bundled import find_case
 from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import (
-    CaseError,
     ConvergenceError,
-    Fault,
     LaunchError,
     LawError,
     PbemError,
@@ -27,6 +26,7 @@ from pbem.errors import (
     printable,
 )
 from pbem.make import add_make_commands, make
+from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
 from pbem.version import __version__
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 # threads has to be set before.
 
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
-COMMANDS = ("make", "check", "run", "info", "plot")
+COMMANDS = ("make", "check", "run", "info", "plot", "help")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
 FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
 # Of `pbem run --operator`; defined in pbem.model.model.
@@ -51,6 +51,7 @@ Boundary elements for frictional contact in two-dimensional elasticity.
   pbem run CASE              compute; `pbem CASE` does the same
   pbem info FILE.h5          what a result file holds
   pbem plot FILE.h5          draw a result file
+  pbem help TOPIC            a page of the documentation; without TOPIC: the list of them
 
 CASE is a TOML file, or the name of a case that comes with the program.
 On several ranks: mpirun -n 4 pbem run CASE"""
@@ -62,7 +63,7 @@ PETSc: any option of PETSc's is taken with the prefix pbem_ and wins over the ca
 Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores
 
 exit code: 0 finished; 1 unexpected error; 2 the case, the command line or the launch is wrong, nothing was written;
-3 not converged at the smallest step, the file holds every step reached"""
+3 not converged at the smallest step, the file holds every step reached (see `pbem help convergence`)"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -114,36 +115,11 @@ def _discard_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def find_case(name: str) -> Path:
-    """The path of a case: a file, or the name of one that comes with the program (with or without .toml).
-
-    Raises CaseError if there is neither, with the names of those that there are.
-    """
-    if Path(name).is_file():
-        return Path(name)
-    bundled = list_bundled_cases()
-    stem = name.removesuffix(".toml")
-    if stem in bundled:
-        return bundled[stem]
-    near = difflib.get_close_matches(stem, bundled, n=1, cutoff=0.6)
-    hint = f" (did you mean '{near[0]}'?)" if near else ""
-    expected = f"a case file or one of the cases of the program: {', '.join(bundled)}" if bundled else "a case file"
-    raise CaseError(name, (Fault("CASE", f"'{name}', which is no file", expected + hint),))
-
-
-def list_bundled_cases() -> dict[str, Path]:
-    """The cases that come with the program, by name: in the package, or beside it in a checkout."""
-    package = Path(__file__).resolve().parent
-    for folder in (package / "cases", package.parent / "cases"):
-        cases = {path.stem: path for path in sorted(folder.glob("*.toml"))}
-        if cases:
-            return cases
-    return {}
-
-
 def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     if arguments and _names_a_case(arguments[0]):
         arguments = ["run", *arguments]
+    if len(arguments) == 2 and arguments[0] == "help" and arguments[1] in COMMANDS:
+        arguments = [arguments[1], "--help"]
     parser = make_parser()
     try:
         with contextlib.redirect_stderr(sys.stderr if rank == 0 else sys.stdout):
@@ -190,7 +166,7 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
-    check = add("check", _check, "validate a case and tell what would be computed")
+    check = add("check", _check, "validate a case and show what would be computed")
     check.add_argument("case", metavar="CASE")
     check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
     run = add("run", None, "compute a case and write its results", RUN_NOTES)
@@ -200,7 +176,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    info = add("info", _info, "tell what a result file holds")
+    info = add("info", _info, "show what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
     plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")
     plot.add_argument("file", metavar="FILE.h5")
@@ -210,7 +186,24 @@ def make_parser() -> argparse.ArgumentParser:
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
     plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
     plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
+    pages = add("help", _help, "print a page of the documentation, or the list of its topics")
+    pages.add_argument("topic", nargs="*", metavar="TOPIC", help="name of a page, or of a command")
     return parser
+
+
+def _help(options: argparse.Namespace) -> int:
+    words = " ".join(options.topic)
+    topic = find_topic(words)
+    if topic:
+        _tell(lay_out(read_page(topic)))
+    elif not words:
+        _tell(f"Topics of `pbem help TOPIC` (through a pager: `pbem help TOPIC | less`):\n\n{list_topics()}")
+    else:
+        near = suggest_topic(words)
+        hint = f"; did you mean '{near}'?" if near else "."
+        _say(f"pbem help: there is no topic '{words}'{hint} The topics are:\n\n{list_topics()}", 0)
+        return WRONG_INPUT
+    return 0
 
 
 def _make(options: argparse.Namespace) -> int:
@@ -317,7 +310,8 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
 def _describe_end(error: BaseException, target: Path) -> tuple[str, int]:
     """What is said of a run that has ended early, and the exit code."""
     if isinstance(error, ConvergenceError):
-        return f"not converged: {error}\n{target} holds every step reached", NOT_CONVERGED
+        advice = "`pbem help convergence` explains the reason"
+        return f"not converged: {error}\n{target} holds every step reached; {advice}", NOT_CONVERGED
     if isinstance(error, StorageError):
         return f"{error}; {_describe_rest(target)}", UNEXPECTED
     if isinstance(error, LawError):
@@ -336,7 +330,7 @@ def _describe_rest(target: Path) -> str:
 
 def _load_driver() -> Callable[..., Results]:
     """Import what computes; raises LaunchError on all ranks alike if MPI, PETSc or another library cannot be loaded."""
-    advice = "; README.md (Install and run) tells how mpi4py, petsc4py and PETSc have to be built"
+    advice = "; `pbem help install` says how mpi4py, petsc4py and PETSc have to be built"
     try:
         from pbem.parallel import refuse_together, wait_for_all, world
     except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py has not found the library of MPI

@@ -28,7 +28,7 @@ install_system_packages() {
     if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
         fail "this script knows Debian 12, 13 and Ubuntu 24.04 (apt-get). Elsewhere pbem needs Python >= 3.11, a C" \
             "compiler, MPI, PETSc >= 3.18 with MUMPS and ScaLAPACK, petsc4py, mpi4py, h5py, numpy, scipy, matplotlib," \
-            "pydantic and tqdm; README.md tells other ways to install them."
+            "pydantic and tqdm; pbem/pages/install.md says how else to install them."
     fi
     local missing=() package as_root=()
     for package in "${system_packages[@]}"; do

@@ -17,6 +17,8 @@
  *
  * The potentials (Kolosov-Muskhelishvili) turn the moments into complex factors P, Q: a density a s^k contributes
  * P a + Q conj(a). Rows give the value at the point as  A u + B t, with u, t the nodal displacements and tractions.
+ *
+ * Numbers such as (theory, 21) are those of the formulas in pbem/pages/theory.md.
  */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>

@@ -44,6 +44,7 @@ static void evaluate_reference(const Arc *arc, cplx s, int on, Moments *m)
         evaluate_moments(s, on, arc->order, m);
 }
 
+/* (theory, 17) */
 static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int order, int family,
                         const double *local)
 {
@@ -67,6 +68,7 @@ static void prepare_poles(Arc *arc)
     evaluate_reference(arc, arc->origin, 0, &arc->at_origin);
 }
 
+/* (theory, 30 to 32) */
 static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMoments *m)
 {
     const double R = arc->radius, q = arc->q, J = arc->jacobian;

@@ -39,7 +39,7 @@ class Background:
         return not (any(self.remote) or any(self.initial) or self.force)
 
     def displacement(self, point: Complex) -> Complex:
-        """Displacement (complex) at points: of the remote strain about the center, and of gravity.
+        """Displacement (complex) at points: of the remote strain about the center, and of gravity (theory, 5, 6).
 
         Gravity's stress is isotropic, -(b . (x - center)), so that its displacement is an analytic function of x.
         """
@@ -52,7 +52,7 @@ class Background:
         return (linear + weight) / (2 * shear_modulus)
 
     def stress(self, point: Complex) -> Real:
-        """sxx, syy, sxy (n, 3) at points."""
+        """sxx, syy, sxy (n, 3) at points (theory, 6)."""
         uniform = np.add(self.remote, self.initial)
         isotropic = -(np.conj(self.force) * (point - self.center)).real
         return uniform + isotropic[:, None] * np.array([1.0, 1.0, 0.0])

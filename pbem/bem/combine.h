@@ -46,6 +46,7 @@ INLINE void put_symmetric(Blocks *b, int node, Lanes P, Lanes Qr, Lanes Qi)
 }
 
 /* Displacement at the points, from moments of nodal shapes: of displacements into H, of tractions into G. */
+/* (theory, 26, 27) */
 INLINE void combine_displacements(int shapes, int tractions, const Factor *c, const Frame *f, const LaneMoments *m,
                                   Blocks *H, Blocks *G)
 {
@@ -67,7 +68,7 @@ INLINE void combine_displacements(int shapes, int tractions, const Factor *c, co
     }
 }
 
-/* Traction on the normals N at the points, in the same way. */
+/* Traction on the normals N at the points, in the same way (theory, 28, 29). */
 INLINE void combine_tractions(int shapes, int tractions, const Factor *c, const Frame *f, Lanes Nx, Lanes Ny,
                               const LaneMoments *m, Blocks *H, Blocks *G)
 {

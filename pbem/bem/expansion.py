@@ -48,7 +48,9 @@ def _far_weights(terms: int) -> Real:
 
 def shift_matrices(offset: Complex, inner: Real, outer: Real, terms: int) -> Complex:
     """binom(m, k) (d/R)^(m - k) (r/R)^k, (n, p + 1, p + 1); circles of radius r = inner lie at d = offset in those of
-    radius R = outer."""
+    radius R = outer.
+    (theory, 39)
+    """
     number = np.arange(terms + 1)
     step = (offset / outer)[:, None] ** number
     gap = number[:, None] - number[None, :]
@@ -58,7 +60,10 @@ def shift_matrices(offset: Complex, inner: Real, outer: Real, terms: int) -> Com
 
 
 def gather_from_children(moments: Complex, shift: Complex, offset: Complex, inner: Real, outer: Real) -> Complex:
-    """What children's coefficients (n, 2, p + 1) are about their parents' centres; offset: from parent to child."""
+    """What children's coefficients (n, 2, p + 1) are about their parents' centres; offset: from parent to child.
+
+    (theory, 39)
+    """
     p = moments.shape[-1] - 1
     number = np.arange(1, p + 1)
     result = np.zeros_like(moments)
@@ -73,7 +78,10 @@ def gather_from_children(moments: Complex, shift: Complex, offset: Complex, inne
 
 
 def pass_to_children(fields: Complex, shift: Complex, offset: Complex, outer: Real) -> Complex:
-    """What the parents' fields (n, 2, p + 1) are about their children's centres; offset: from parent to child."""
+    """What the parents' fields (n, 2, p + 1) are about their children's centres; offset: from parent to child.
+
+    (theory, 41)
+    """
     number = np.arange(1, fields.shape[-1])
     fields = fields.copy()
     turned = (np.conj(offset) / outer)[:, None]
@@ -86,6 +94,7 @@ def carry_over(moments: Complex, distance: Complex, source: Real, target: Real, 
     """Fields (n, 2, p + 1) about targets from coefficients of sources; distance: from source to target centre.
 
     source, target: radii of the circles; length: unit of the logarithm.
+    (theory, 40)
     """
     terms = moments.shape[-1] - 1
     number = np.arange(terms + 1)

@@ -10,7 +10,7 @@
 #define PBEM_FAR_ARCS_H
 #include "arc_rules.h"
 
-/* Rows of some points on the element of a rule. */
+/* Rows of some points on the element of a rule (theory, 9 to 12, 34). */
 INLINE void sum_rule(int order, int tractions, int stress, const Rows *r, const ArcRule *rule, Lanes zx, Lanes zy,
                      Lanes Nx, Lanes Ny, double *const *H, double *const *G)
 {

@@ -38,7 +38,7 @@ typedef struct {
     cplx Pu[MAX_SHAPES], Qu[MAX_SHAPES], Pt[MAX_SHAPES], Qt[MAX_SHAPES];
 } Factors;
 
-/* Crack-tip elements: factors of the displacement at the point, -int T u for the density u. */
+/* Crack-tip elements: factors of the displacement at the point, -int T u for the density u (theory, 26). */
 static void combine_tip_displacement(const Rows *r, const Moments *m, cplx e, Factors *out)
 {
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1));
@@ -48,7 +48,7 @@ static void combine_tip_displacement(const Rows *r, const Moments *m, cplx e, Fa
     }
 }
 
-/* Factors of the traction on the normal N at the point. */
+/* Factors of the traction on the normal N at the point (theory, 28). */
 static void combine_tip_traction(const Rows *r, const Moments *m, double h, cplx e, cplx N, Factors *out)
 {
     const double g = r->shear_modulus / (M_PI * (r->kappa + 1) * h);
@@ -60,7 +60,7 @@ static void combine_tip_traction(const Rows *r, const Moments *m, double h, cplx
     }
 }
 
-/* The same two for an arc, and for its tractions t: int U t, int D t. */
+/* The same two for an arc, and for its tractions t: int U t, int D t (theory, 33). */
 static void combine_arc_displacement(const Rows *r, const ArcMoments *m, int tractions, Factors *out)
 {
     const double kappa = r->kappa, fu = 1 / (2 * M_PI * (kappa + 1));
@@ -74,6 +74,7 @@ static void combine_arc_displacement(const Rows *r, const ArcMoments *m, int tra
     }
 }
 
+/* (theory, 33) */
 static void combine_arc_traction(const Rows *r, const ArcMoments *m, cplx N, int tractions, Factors *out)
 {
     const double kappa = r->kappa, g = r->shear_modulus / (M_PI * (kappa + 1)), f = -1 / (2 * M_PI * (kappa + 1));

@@ -22,7 +22,7 @@ SMOOTH = 1e-6
 def evaluate_hoop_stress(
     mesh: Mesh, initial: Sequence[Background], displacement: Complex, traction: Complex
 ) -> Real:
-    """Normal stress along the boundary (f,) at the nodes of `list_faces(mesh)`.
+    """Normal stress along the boundary (f,) at the nodes of `list_faces(mesh)` (theory, 71).
 
     displacement, traction (f,) complex, at these nodes. initial: per region its material and in-situ stress, which has
     no displacement. The stretch is the derivative of the polynomial through an element's own nodes and the nearest one

@@ -28,7 +28,7 @@ class Medium:
 
 
 def source_matrix(sources: Sources, center: complex, radius: float, terms: int) -> Real:
-    """Coefficients of elements about a centre: matrix (4 (p + 1), columns) on nodal values.
+    """Coefficients of elements about a centre: matrix (4 (p + 1), columns) on nodal values (theory, 35, 37, 38).
 
     Rows: real and imaginary part of a_0 .. a_p, then of b_0 .. b_p. Columns: x and y of the displacement (or jump) of
     every node, then, unless all elements are cracks, x and y of its traction. Integrals by Gauss points, exact for
@@ -106,7 +106,7 @@ def _place_points(sources: Sources, terms: int) -> tuple[Complex, Complex, Real]
 
 
 def trace_elements(sources: Sources, local: Real) -> tuple[Complex, Complex]:
-    """Points and d zeta/ds at the coordinates s (e, q) of elements."""
+    """Points and d zeta/ds at the coordinates s (e, q) of elements (theory, 17)."""
     half, middle = 0.5 * (sources.end - sources.start)[:, None], 0.5 * (sources.end + sources.start)[:, None]
     point, slope = middle + half * local, half + 0 * local
     if sources.sweep is not None and sources.center is not None and sources.sweep.any():
@@ -120,7 +120,7 @@ def trace_elements(sources: Sources, local: Real) -> tuple[Complex, Complex]:
 
 
 def _traction_density(sources: Sources, terms: int) -> Real:
-    """Traction at the integration points (e, q) by nodal values; none on cracks."""
+    """Traction at the integration points (e, q) by nodal values; none on cracks (theory, 18)."""
     s, _ = _gauss_points(terms + 4)
     local = sources.local
     shapes = s[:, None] ** np.arange(len(local)) @ interpolate_shapes(local)
@@ -133,7 +133,7 @@ def _traction_density(sources: Sources, terms: int) -> Real:
 def target_matrix(
     point: Complex, normal: Complex | None, medium: Medium, center: complex, radius: float, terms: int
 ) -> Real:
-    """Values at points (n,) from the field's coefficients about a centre: matrix (2 n, 4 (p + 1)).
+    """Values at points (n,) from the field's coefficients about a centre: matrix (2 n, 4 (p + 1)) (theory, 2, 4, 36).
 
     The displacement, or the traction on the normals (n,). Columns as the rows of source_matrix.
     """

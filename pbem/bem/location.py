@@ -72,7 +72,7 @@ def _locate_chunk(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> tupl
 
 
 def _add_angles(mesh: Mesh, points: Complex, w: Complex, regions: int) -> Integer:
-    """Winding numbers (q, regions) of the regions' loops about the points."""
+    """Winding numbers (q, regions) of the regions' loops about the points (theory, 80)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.angle((w - 1) / (w + 1))
     # A point between an arc and its chord, which lies on the left of the arc and on the right of the chord.

@@ -34,6 +34,7 @@ static int count_terms(double inverse_ratio)
     return 1 + (int)(39.2 / log(inverse_ratio));
 }
 
+/* (theory, 20, 21) */
 static void evaluate_moments(cplx w, int on_element, int order, Moments *m)
 {
     const double x = creal(w), y = on_element ? 0.0 : cimag(w);
@@ -91,6 +92,7 @@ static void evaluate_moments(cplx w, int on_element, int order, Moments *m)
 }
 
 /* Moments of t^(k + 1/2) seen from the tip; brought to the element's own coordinate, units and direction. */
+/* (theory, 24) */
 static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Moments *m)
 {
     const double sign = tip == TIP_AT_START ? 1.0 : -1.0;

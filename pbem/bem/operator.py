@@ -97,7 +97,7 @@ def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
 def assemble_rows(
     mesh: Mesh, materials: Sequence[Material], first_node: int, last_node: int, needed: Bool, length: float
 ) -> RowOperator:
-    """Rows of B of the nodes in [first_node, last_node).
+    """Rows of B of the nodes in [first_node, last_node) (theory, 7, 8).
 
     needed (4 nodes,): entries of v that can ever differ from zero; the other columns are not stored.
     length: the model's size; see scale_equations.
@@ -122,7 +122,7 @@ def assemble_rows(
 
 
 def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes: Integer, needed: Bool) -> list[Block]:
-    """Blocks whose product with v is the displacement -int T u + int U t at the given crack nodes.
+    """Blocks whose product with v is the displacement -int T u + int U t at the given crack nodes (theory, 13).
 
     There it is the mean displacement of the two faces. Block.rows count from the first of the given nodes.
     """
@@ -147,6 +147,7 @@ def add_anchor(
 
     Makes the equations of a body without supports regular: where the loads balance, the functional of the solution
     vanishes. pattern, functional (k,): complex.
+    (theory, 61)
     """
     own = (nodes >= operator.first_node) & (nodes < operator.last_node)
     columns = (2 * nodes[:, None] + np.arange(2)).ravel()
@@ -165,6 +166,7 @@ def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) ->
 
     The length is that of the node's element, at most the given one: the hypersingular integrals over an element are its
     displacements times shear modulus over length, so that all rows have entries of the same size on graded meshes too.
+    (theory, 14)
     """
     shear_modulus = np.array([material.shear_modulus for material in materials])[mesh.node_region]
     own = np.minimum(np.abs(mesh.end - mesh.start)[mesh.node_element], length)
@@ -172,7 +174,10 @@ def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) ->
 
 
 def collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_matrix:
-    """The free terms in the equations of nodes (k,): matrix (2 k, 4 nodes); scale (nodes,) as of scale_equations."""
+    """The free terms in the equations of nodes (k,): matrix (2 k, 4 nodes); scale (nodes,) as of scale_equations.
+
+    (theory, 13)
+    """
     value = np.where(mesh.node_crack[nodes], 1.0, 0.5) * scale[nodes]
     first_column = np.where(mesh.traction_equation[nodes], 2 * mesh.nodes, 0) + 2 * nodes
     columns = (first_column[:, None] + np.arange(2)).ravel()

@@ -46,7 +46,7 @@ class PointRows:
         return self._evaluate(v, (None,))[:, 0]
 
     def stress(self, v: Real) -> Real:
-        """sxx, syy, sxy (k, 3) at points off all elements; all ranks call this together."""
+        """sxx, syy, sxy (k, 3) at points off all elements; all ranks call this together (theory, 3)."""
         along = self._evaluate(v, (1.0, 1j))
         return np.stack([along[:, 0].real, along[:, 1].imag, 0.5 * (along[:, 0].imag + along[:, 1].real)], axis=1)
 

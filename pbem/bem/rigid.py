@@ -70,7 +70,7 @@ def need_rotations(mesh: Mesh, finite: Sequence[int], needed: Bool) -> Bool:
 
 
 def take_off_rigid_motions(v: Real, rigid: Sequence[RigidMotions]) -> Real:
-    """v less the rigid motions of bodies that fit its displacements best."""
+    """v less the rigid motions of bodies that fit its displacements best (theory, 43)."""
     strained = v.copy()
     for motions in rigid:
         strained[motions.columns] -= (motions.basis @ v[motions.columns]) @ motions.basis

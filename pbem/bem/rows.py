@@ -99,6 +99,7 @@ def evaluate_rows(
     On an arc the densities are polynomials of s with a point at apex (1 + i q s)/(1 - i q s) from the centre,
     q = tan(sweep/4); tractions are such polynomials times 1 + q^2 s^2.
     Source: Kolosov-Muskhelishvili potentials of the single and double layer; Cauchy integrals in closed form.
+    (theory, 7, 8)
     """
     size = (2 * len(point), 2 * sources.count * len(sources.local))
     displacement, traction = (np.empty(size), np.zeros(size) if tractions else None) if out is None else (

@@ -83,12 +83,13 @@ INLINE Lanes measure_ends(Lanes x, Lanes y)
 
 INLINE double integrate_power(int k) { return k % 2 ? 0.0 : 2.0 / (k + 1); }
 
-/* n_k from the others. log_ends = ln|w^2 - 1|. */
+/* n_k from the others. log_ends = ln|w^2 - 1| (theory, 22). */
 INLINE void find_logarithmic(int order, Lanes log_ends, LaneMoments *m)
 {
     for (int k = 0; k <= order; k++) m->n[k] = ((k % 2 ? m->cr[0] : log_ends) - m->cr[k + 1]) * (1.0 / (k + 1));
 }
 
+/* (theory, 23) */
 INLINE void evaluate_far(int order, int with_e, int terms, Lanes x, Lanes y, Lanes ends, LaneMoments *m)
 {
     const int top = order + 1;
@@ -140,7 +141,7 @@ INLINE void evaluate_far(int order, int with_e, int terms, Lanes x, Lanes y, Lan
     }
 }
 
-/* Near the element: upward from c_0 = log_ratio + i angle. */
+/* Near the element: upward from c_0 = log_ratio + i angle (theory, 20, 21). */
 INLINE void evaluate_near(int order, int with_e, Lanes x, Lanes y, Lanes log_ratio, Lanes angle, LaneMoments *m)
 {
     const Lanes over_ends = 2 / measure_ends(x, y);
@@ -180,6 +181,7 @@ INLINE void locate_from_tip(int tip, Lanes *x, Lanes *y)
 }
 
 /* Far from a tip element, x and y counted from the tip; moments in the element's own coordinate as the others. */
+/* (theory, 25) */
 INLINE void evaluate_far_tip(int order, int with_e, int terms, int tip, Lanes x, Lanes y, LaneMoments *m)
 {
     const double sign = tip == TIP_AT_START ? 1.0 : -1.0;

@@ -142,7 +142,7 @@ class Interactions:
 
 
 def find_interactions(targets: Forest, sources: Forest, ratio: float, wanted: Bool | None = None) -> Interactions:
-    """Descend both forests together until clusters are well apart or leaves.
+    """Descend both forests together until clusters are well apart or leaves (theory, 42).
 
     Well apart: with x, y the radii of source and target over the distance of their centres, x/(1 - y) and y/(1 - x) are
     at most `ratio`, by which the errors of the expansions fall from term to term.

@@ -10,78 +10,31 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
 
-MOST_ELEMENTS = 100_000
-MOST_GENERATED = 1_000_000
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _check_number(value: object) -> object:
-    """An integer of any length passes pydantic's float; one too long for a float is no number to compute with."""
-    if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**300:
-        raise PydanticCustomError("expected", "{expected}", {"expected": "a number of at most 300 digits"})
-    return value
-
-
-def _check_elements(value: object) -> object:
-    """One error in place of one for each member of the union int | list of int."""
-    counts = value if isinstance(value, list) else [value]
-    expected = f"a whole number from 1 to {MOST_ELEMENTS}, or a list with one such number for each leg"
-    if not counts:
-        raise PydanticCustomError("expected", "{expected}", {"expected": expected})
-    for count in counts:
-        if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= MOST_ELEMENTS:
-            raise PydanticCustomError("expected", "{expected}", {"expected": expected})
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _check_gap(value: object) -> object:
-    if isinstance(value, dict):
-        return value
-    if not _is_number(value) or not 0 <= value <= LARGEST:  # type: ignore[operator]
-        expected = "a finite number >= 0, or { expression = \"...\" }"
-        raise PydanticCustomError("expected", "{expected}", {"expected": expected})
-    return value
-
-
-def _check_option(value: object) -> object:
-    """A PETSc option's value; the library takes text only."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float) and abs(value) < float("inf"):
-        return repr(value)
-    raise PydanticCustomError("expected", "{expected}", {"expected": "a text, a finite number, true or false"})
-
-
-# Numbers beyond this are slips of the pen, and their squares would overflow.
-LARGEST = 1e100
-_SHORT = BeforeValidator(_check_number)
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST), _SHORT]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST), _SHORT]
-NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST), _SHORT]
-Angle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-3600, le=3600), _SHORT]
-Part = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=1), _SHORT]
-Spread = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10), _SHORT]
-Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1, lt=0.5), _SHORT]
-HalfTurn = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90), _SHORT]
-FrictionAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=90), _SHORT]
-Power = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=10), _SHORT]
-ProductTolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-13, le=1e-2), _SHORT]
-Tolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=1), _SHORT]
-Fraction = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1), _SHORT]
-Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
-Text = Annotated[str, Field(strict=True)]
-Flag = Annotated[bool, Field(strict=True)]
-Point = tuple[Number, Number]
-Elements = Annotated[int | tuple[int, ...], BeforeValidator(_check_elements)]
+from pbem.case.values import (
+    MOST_ELEMENTS,
+    MOST_GENERATED,
+    Angle,
+    Count,
+    Elements,
+    Flag,
+    Fraction,
+    FrictionAngle,
+    HalfTurn,
+    NotNegative,
+    Number,
+    Part,
+    Point,
+    Poisson,
+    Positive,
+    Power,
+    ProductTolerance,
+    Spread,
+    Text,
+    Tolerance,
+    check_gap,
+    check_option,
+)
 
 
 class Table(BaseModel):
@@ -91,149 +44,211 @@ class Table(BaseModel):
 
 
 class UnitsTable(Table):
-    """Labels for plots and results."""
+    """Labels for pictures and results. Nothing is converted: any consistent units will do."""
 
     length: Text = Field("", description="label of the unit of length")
     stress: Text = Field("", description="label of the unit of stress")
 
 
 class MaterialTable(Table):
-    """A linear elastic, isotropic material."""
+    """A linear elastic, isotropic material. NAME is of your choice; regions refer to it."""
 
     young: Positive = Field(description="Young's modulus, stress")
     poisson: Poisson = Field(description="Poisson's ratio")
-    plane: Literal["strain", "stress"] = "strain"
-    density: NotNegative = Field(0.0, description="mass per volume, used with [gravity]")
+    plane: Literal["strain", "stress"] = Field("strain", description="plane strain or plane stress")
+    density: NotNegative = Field(0.0, description="mass per volume, for `[gravity]`")
 
 
 class CurveTable(Table):
-    """A polyline, circle or arc, or a curve by expressions, and its elements."""
+    """A polyline, a circle, an arc, or a curve by expressions; and its elements. Every curve is given once; regions
+    share it by its NAME. Give one of `points`, `center` with `radius`, and `expression`; and one of `elements` and
+    `size`."""
 
-    points: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(None, description="vertices of a polyline")
-    center: Point | None = Field(None, description="center of a circle or arc")
-    radius: Positive | None = Field(None, description="radius of a circle or arc, length")
-    angles: tuple[Angle, Angle] | None = Field(
-        None, description="degrees at which an arc starts and ends; counter-clockwise if the second is larger"
+    points: Annotated[tuple[Point, ...], Field(min_length=2)] | None = Field(
+        None, description="vertices of a polyline; its straight parts are called legs"
     )
-    expression: tuple[Text, Text] | None = Field(None, description="x and y as functions of t from 0 to 1")
-    elements: Elements | None = Field(None, description="number of elements: a total, or one number for each leg")
-    size: Positive | None = Field(None, description="target length of an element, in place of `elements`")
-    grading: Literal["auto", "start", "end", "both", "none"] = "auto"
-    power: Power = Field(3.0, description="element ends at t^power from a refined end")
+    center: Point | None = Field(None, description="centre of a circle or an arc")
+    radius: Positive | None = Field(None, description="its radius")
+    angles: tuple[Angle, Angle] | None = Field(
+        None,
+        description="degrees at which an arc starts and ends; counter-clockwise if the second is larger; without this "
+        "key: a full circle",
+    )
+    expression: tuple[Text, Text] | None = Field(
+        None,
+        description='x and y as functions of `t` from 0 to 1, e.g. `["2*t", "0.1*sin(2*pi*t)"]`; the elements are '
+        "straight, between points of the curve",
+    )
+    elements: Elements | None = Field(
+        None,
+        description='number of elements: a total, or a list with one number for each leg; with `grading = "auto"` '
+        "the least number, see `pbem help accuracy`",
+    )
+    size: Positive | None = Field(
+        None,
+        description='length that no element exceeds; with a `grading` other than `"auto"` and `"none"`: before the '
+        "refinement",
+    )
+    grading: Literal["auto", "start", "end", "both", "none"] = Field(
+        "auto",
+        description='refine towards one end, both ends or none of each leg; `"auto"`: towards corners, changes of '
+        "condition or load, ends of contact and junctions, and as short as near faces need; a grading that is given "
+        "is kept, except beside crack tips",
+    )
+    power: Power = Field(3.0, description="element ends lie at t^power from a refined end")
 
 
 class RegionTable(Table):
     """A body of one material: its boundary and its cracks, by the names of curves."""
 
-    material: Text
-    boundary: tuple[Text, ...] = Field((), description="names of the curves that bound the region, in any order")
-    cracks: tuple[Text, ...] = Field((), description="names of curves inside the region, two faces each")
-    infinite: Flag = Field(False, description="the region is the outside of its loops")
+    material: Text = Field(description="name of a material")
+    boundary: tuple[Text, ...] = Field(
+        (), description="curves around the body and around its holes, in any order and direction"
+    )
+    cracks: tuple[Text, ...] = Field((), description="curves inside the region, with two faces each")
+    infinite: Flag = Field(
+        False, description="the region is the outside of its loops; without loops it is the whole plane"
+    )
 
 
 class SpringTable(Table):
-    """An elastic support: stress per displacement, along the normal and along the curve."""
+    """An elastic support, through all stages: stress per displacement, along the normal and along the curve."""
 
-    kn: NotNegative = 0.0
-    ks: NotNegative = 0.0
+    kn: NotNegative = Field(0.0, description="elastic support: adds -kn un to tn, through all stages")
+    ks: NotNegative = Field(0.0, description="the same along the curve: adds -ks us to ts")
 
 
 class StageConditionTable(Table):
     """Displacement or traction in two directions; what is not given is free of traction."""
 
-    ux: Number | None = None
-    uy: Number | None = None
-    tx: Number | None = None
-    ty: Number | None = None
-    un: Number | None = Field(None, description="displacement along the outward normal")
+    ux: Number | None = Field(None, description="displacement along x")
+    uy: Number | None = Field(None, description="displacement along y")
+    tx: Number | None = Field(None, description="or traction along x")
+    ty: Number | None = Field(None, description="or traction along y")
+    un: Number | None = Field(
+        None, description="or displacement along the outward normal; not together with x and y components"
+    )
     us: Number | None = Field(None, description="displacement along the normal turned by +90 degrees")
-    tn: Number | None = None
-    ts: Number | None = None
-    pressure: Number | None = Field(None, description="tn = -pressure, ts = 0")
+    tn: Number | None = Field(None, description="or traction along the outward normal")
+    ts: Number | None = Field(None, description="or traction along the normal turned by +90 degrees")
+    pressure: Number | None = Field(None, description="`tn = -pressure`, `ts = 0`")
 
 
 class ConditionTable(StageConditionTable):
-    """Displacement or traction in two directions, and springs in place of displacements."""
+    """Conditions on a curve of one region: displacement or traction in two directions. What is not given is free of
+    traction."""
 
-    spring: SpringTable | None = Field(None, description="adds -kn un to tn and -ks us to ts, through all stages")
+    spring: SpringTable | None = Field(None, description="an elastic support in place of displacements")
 
 
 class ExpressionTable(Table):
     """A quantity as a function of x and y."""
 
-    expression: Text
+    expression: Text = Field(description="a function of `x` and `y`")
 
 
 class LawTable(Table):
-    """What the two faces of an interface, crack or contact do. Strengths and pressure are stresses."""
+    """What the two faces do: of a curve of two regions (an interface) or of a crack. Strengths and pressures are
+    stresses."""
 
     law: Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "custom"] | None = Field(
-        None, description="if not given, \"bonded\" on shared curves and \"coulomb\" on cracks and contacts; "
-        "\"rate_and_state\": friction coefficient f0 + a ln(V/V0) + b ln(V0 theta/L) at the slip rate V, the state "
-        "theta by the ageing law d theta/dt = 1 - V theta/L; every stage then needs its duration"
+        None,
+        description='without this key `"bonded"` for a curve of two regions and `"coulomb"` for a crack; `"open"`: the '
+        'faces never touch; `"rate_and_state"`: friction coefficient f0 + a ln(V/V0) + b ln(V0 theta/L) at the slip '
+        'rate V and the state theta, with d theta/dt = 1 - V theta/L; `"custom"`: see `pbem help laws`',
     )
     friction: NotNegative | None = Field(
-        None, description="friction coefficient; of rate_and_state f0, that of steady slip at the reference rate"
+        None, description="friction coefficient; 0 if its angle is not given either; f0 of `rate_and_state`"
     )
-    friction_angle: FrictionAngle | None = Field(None, description="degrees")
-    cohesion: NotNegative = 0.0
+    friction_angle: FrictionAngle | None = Field(None, description="or its angle, degrees")
+    cohesion: NotNegative = Field(0.0, description="friction bound without normal traction")
     tensile_strength: NotNegative = Field(0.0, description="normal tension carried before the faces part")
-    cohesion_lost: Flag = Field(False, description="cohesion and tensile strength end with the first slip or parting")
-    friction_dynamic: NotNegative | None = Field(None, description="friction coefficient after slip_distance")
+    cohesion_lost: Flag = Field(
+        False, description="cohesion and tensile strength end with the first slip or parting (a brittle bond)"
+    )
+    friction_dynamic: NotNegative | None = Field(None, description="friction falls linearly to this coefficient ...")
     slip_distance: Positive | None = Field(
-        None, description="slip, length, over which friction falls; L of rate_and_state, over which the state changes"
+        None, description="... over this length of slip; L of `rate_and_state`, over which the state changes"
     )
-    rate_effect: Positive | None = Field(None, description="a of rate_and_state: how friction rises with ln V")
-    state_effect: NotNegative | None = Field(None, description="b of rate_and_state: how friction rises with ln theta")
-    reference_rate: Positive | None = Field(None, description="V0 of rate_and_state, length/time")
+    rate_effect: Positive | None = Field(None, description="a of `rate_and_state`: how friction rises with ln V")
+    state_effect: NotNegative | None = Field(
+        None, description="b of `rate_and_state`: how friction rises with ln theta"
+    )
+    reference_rate: Positive | None = Field(None, description="V0 of `rate_and_state`, length/time")
     initial_state: Positive | None = Field(
-        None, description="theta of rate_and_state at the beginning, time; slip_distance/reference_rate if not given"
+        None, description="theta of `rate_and_state` at the start, time; `slip_distance/reference_rate` if not given"
     )
-    normal_stiffness: Positive | None = Field(None, description="elastic joint in front of the law, stress/length")
+    normal_stiffness: Positive | None = Field(
+        None, description="elastic joint in front of the law, stress per length; without this key rigid"
+    )
     tangential_stiffness: Positive | None = Field(None, description="the same along the faces")
-    gap: Annotated[float | ExpressionTable, BeforeValidator(_check_gap)] = Field(0.0, description="initial opening")
-    pressure: Number = Field(0.0, description="fluid pressure on the open faces")
-    pressurised: Literal["open", "all"] = "open"
-    file: Text | None = Field(None, description="Python file of a custom law, relative to the case file")
+    gap: Annotated[float | ExpressionTable, BeforeValidator(check_gap)] = Field(
+        0.0, description="initial opening, not negative; an expression is a function of `x` and `y`"
+    )
+    pressure: Number = Field(
+        0.0, description="fluid pressure on open faces; the faces part when their compression falls to it"
+    )
+    pressurised: Literal["open", "all"] = Field(
+        "open",
+        description='`"all"`: the fluid is in closed parts too, and friction acts on the compression less the pressure',
+    )
+    file: Text | None = Field(None, description='Python file of a `"custom"` law, relative to the case file')
     parameters: Mapping[str, Number] = Field({}, description="numbers that the custom law is called with")
 
 
 class ContactTable(LawTable):
-    """Two different curves that may touch, and their law."""
+    """Two different curves that may touch; their meshes need not match. The law is `"coulomb"` if none is given; the
+    initial gap follows from the geometry. All keys of `[interfaces.CURVE]` are accepted as well."""
 
-    between: tuple[Text, Text]
+    between: tuple[Text, Text] = Field(description="the two curves, in any order; results lie on the first one")
 
 
 class GenerateTable(LawTable):
-    """Random cracks or circular inclusions, each a curve `name_1`, `name_2`, ..., and the law of them all."""
+    """Stands for many curves at random places: cracks, or circular inclusions. All keys of `[interfaces.CURVE]` are
+    accepted as well, for all of these curves."""
 
-    kind: Literal["cracks", "inclusions"]
-    name: Text = Field(description="their curves (and regions of inclusions) are name_1, name_2, ...")
+    kind: Literal["cracks", "inclusions"] = Field(description="what is generated")
+    name: Text = Field(
+        description="the curves are called NAME_1, NAME_2, ...; each inclusion is a region of the same name"
+    )
     region: Text = Field(description="region in which they lie")
     material: Text | None = Field(None, description="material of inclusions")
-    count: Annotated[int, Field(strict=True, ge=1, le=MOST_GENERATED)]
+    count: Annotated[int, Field(strict=True, ge=1, le=MOST_GENERATED)] = Field(description="how many")
     elements: Annotated[int, Field(strict=True, ge=1, le=MOST_ELEMENTS)] = Field(description="elements on each")
     half_length: Positive | None = Field(None, description="half-length of cracks")
     radius: Positive | None = Field(None, description="radius of inclusions")
     distribution: Literal["uniform", "lognormal", "power"] = Field(
         "uniform",
-        description="of the sizes: uniform in size (1 +- spread), lognormal with the median size, or a power law from "
-        "the size to the largest one",
+        description='of the sizes; `"uniform"`: in size (1 +- spread); `"lognormal"`: the size is the median; '
+        '`"power"`: from the size up to `largest`',
     )
-    spread: Spread = Field(0.0, description="of a uniform distribution, or standard deviation of the logarithm")
-    exponent: Positive | None = Field(None, description="a of the power law: numbers fall like size^-a")
-    largest: Positive | None = Field(None, description="largest size of the power law")
-    orientation: Angle | None = Field(None, description="of cracks, degrees from x; without: all directions alike")
-    orientation_spread: HalfTurn = Field(0.0, description="degrees: uniform in orientation +- spread")
-    density: Positive | None = Field(None, description="number per unit area; the centres lie in the area that follows")
-    fraction: Part | None = Field(None, description="or part of the area that inclusions take")
+    spread: Spread = Field(
+        0.0,
+        description="of a uniform distribution; of a lognormal one the standard deviation of the logarithm, cut off at "
+        "three of them",
+    )
+    exponent: Positive | None = Field(None, description="of a power law: numbers fall like size^-exponent")
+    largest: Positive | None = Field(None, description="largest size of a power law")
+    orientation: Angle | None = Field(
+        None, description="of cracks, degrees from the x axis; without this key all directions are equally likely"
+    )
+    orientation_spread: HalfTurn = Field(0.0, description="degrees: uniform in orientation +- this")
+    density: Positive | None = Field(
+        None, description="number per unit area: the centres lie in an area of count / density"
+    )
+    fraction: Part | None = Field(None, description="or the part of the area that inclusions take")
     box: tuple[Number, Number, Number, Number] | None = Field(
-        None, description="or x and y of two opposite corners of a rectangle inside of which they lie"
+        None, description="or x0, y0, x1, y1 of a rectangle inside of which they lie as a whole"
     )
-    shape: Literal["square", "disc"] = Field("square", description="of the area in which the centres lie")
-    center: Point = Field((0.0, 0.0), description="of that area")
-    distance: Positive = Field(description="least distance of any two, and from the sides of the box")
-    seed: Annotated[int, Field(strict=True, ge=0, le=2**53)] = Field(1, description="of the random numbers")
+    shape: Literal["square", "disc"] = Field("square", description="shape of the area of the centres")
+    center: Point = Field((0.0, 0.0), description="centre of that area")
+    distance: Positive = Field(
+        description="least distance of any two, those of other tables `[[generate]]` included, and from the sides of a "
+        "box"
+    )
+    seed: Annotated[int, Field(strict=True, ge=0, le=2**53)] = Field(
+        1, description="of the random numbers: the same table gives the same model on every machine"
+    )
 
 
 class StressTable(Table):
@@ -245,7 +260,7 @@ class StressTable(Table):
 
 
 class GravityTable(Table):
-    """Acceleration."""
+    """Acceleration; a region's weight per volume is its density times this."""
 
     gx: Number = 0.0
     gy: Number = 0.0
@@ -254,66 +269,87 @@ class GravityTable(Table):
 class AnalysisTable(Table):
     """Which equations, elements and load steps."""
 
-    scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
-    order: Annotated[int, Field(strict=True, ge=0, le=3)] = 2
+    scheme: Literal["SST", "DBEM", "HST", "THST"] = Field(
+        "SST",
+        description='which integral equation is collocated on a face. `"SST"`: displacement everywhere; `"DBEM"`: '
+        'traction on the second side of contacts; `"HST"`: traction on both sides; `"THST"`: traction everywhere. '
+        "Elements at corners and ends of contact keep the displacement equation; so do, with DBEM and HST, parts of a "
+        "contact's curves that face nothing. Cracks always have the dual pair; narrow slots keep displacement on one "
+        "face",
+    )
+    order: Annotated[int, Field(strict=True, ge=0, le=3)] = Field(2, description="polynomial order on an element")
     tips: Flag = Field(True, description="crack-tip elements with the square-root shape")
-    steps: Count = Field(10, description="load steps; ignored when [[stages]] is given")
+    steps: Count = Field(10, description="load steps; without effect if there are `[[stages]]`")
     accuracy: Part | None = Field(
-        None, description="refine and solve again until the estimated relative error is below this"
+        None,
+        description="refine and solve again until twice the estimated relative error of reactions, of slips and "
+        "openings, and of K is below this, at every stored step; see `pbem help accuracy`",
     )
 
 
 class StageInterfaceTable(Table):
     """What of an interface can change from stage to stage."""
 
-    pressure: Number
+    pressure: Number = Field(description="fluid pressure at the end of the stage")
 
 
 class StageTable(Table):
-    """A part of the load history: the values at its end."""
+    """A part of the load history: the values at its end; in between they are linear. Stages follow each other in the
+    order of the file. What a stage leaves out keeps the value reached before. Without `[[stages]]` all loads grow in
+    proportion."""
 
-    name: Text | None = None
-    steps: Count = 10
+    name: Text | None = Field(None, description="for messages and results")
+    steps: Count = Field(10, description="load steps of the stage")
     duration: Positive | None = Field(
-        None, description="time that the stage takes, shared by its steps; for laws that depend on time"
+        None, description="time that the stage takes, shared by its steps; needed by laws that depend on time"
     )
-    boundary: Mapping[str, StageConditionTable] = {}
-    interfaces: Mapping[str, StageInterfaceTable] = {}
-    contacts: Mapping[str, StageInterfaceTable] = {}
-    remote: StressTable | None = None
-    gravity: GravityTable | None = None
+    boundary: Mapping[str, StageConditionTable] = Field(
+        {}, description="values at the end of the stage: `ux` to `pressure` as in `[boundary.CURVE]`"
+    )
+    interfaces: Mapping[str, StageInterfaceTable] = Field({}, description="of an interface or a crack")
+    contacts: Mapping[str, StageInterfaceTable] = Field({}, description="of a contact")
+    remote: StressTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
+    gravity: GravityTable | None = Field(None, description="`gx`, `gy` at the end of the stage")
 
 
 class SolverTable(Table):
     """How the discrete equations are solved."""
 
-    linear: Literal["auto", "lu", "mumps", "gmres"] = "auto"
-    operator: Literal["auto", "dense", "hierarchical"] = "auto"
-    tolerance: ProductTolerance = 1e-8
-    newton_tolerance: Tolerance = 1e-9
-    newton_max_iterations: Count = 50
-    min_step: Fraction = 1e-4
+    linear: Literal["auto", "lu", "mumps", "gmres"] = Field(
+        "auto",
+        description='`"lu"`: dense; `"mumps"`: sparse, chosen by `"auto"` for several regions; `"gmres"`: keeps old '
+        "factors as preconditioner. The hierarchical operator always uses GMRES",
+    )
+    operator: Literal["auto", "dense", "hierarchical"] = Field(
+        "auto",
+        description='`"dense"`: every entry of the matrix is stored; `"hierarchical"`: far elements by the fast '
+        'multipole method, chosen by `"auto"` above 10 000 unknowns in a region unless `linear` asks for factors',
+    )
+    tolerance: ProductTolerance = Field(1e-8, description="relative error of the hierarchical operator's products")
+    newton_tolerance: Tolerance = Field(1e-9, description="relative residual of the discrete equations")
+    newton_max_iterations: Count = Field(50, description="after so many iterations the load step is halved")
+    min_step: Fraction = Field(1e-4, description="least load step, as a fraction of a stage")
 
 
 class InteriorTable(Table):
     """A grid of points inside the regions."""
 
-    box: tuple[Number, Number, Number, Number] = Field(description="x and y of two opposite corners")
+    box: tuple[Number, Number, Number, Number] = Field(description="x0, y0, x1, y1: two opposite corners")
     shape: tuple[Count, Count] = Field(description="numbers of points along x and y")
 
 
 class OutputTable(Table):
     """What is stored."""
 
-    interior: InteriorTable | None = None
-    points: tuple[Point, ...] = ()
+    interior: InteriorTable | None = Field(None, description="a grid of points inside the regions")
+    points: tuple[Point, ...] = Field((), description="single points")
     every: Count = Field(1, description="every n-th load step is stored, and the last of each stage")
 
 
 class CaseFile(Table):
     """All tables of a case file."""
 
-    title: Text = ""
+    title: Text = Field("", description="text for pictures and results")
     units: UnitsTable = UnitsTable()
     materials: Annotated[Mapping[str, MaterialTable], Field(min_length=1)]
     curves: Mapping[str, CurveTable] = {}
@@ -322,13 +358,17 @@ class CaseFile(Table):
     boundary: Mapping[str, ConditionTable] = {}
     interfaces: Mapping[str, LawTable] = {}
     contacts: Mapping[str, ContactTable] = {}
-    remote: StressTable | None = None
+    remote: StressTable | None = Field(None, description="Stress at infinity, for infinite regions.")
     gravity: GravityTable | None = None
-    initial_stress: Mapping[str, StressTable] = {}
+    initial_stress: Mapping[str, StressTable] = Field(
+        {}, description="In-situ stress of a material, there before any load; tractions and stresses include it."
+    )
     analysis: AnalysisTable = AnalysisTable()
     stages: tuple[StageTable, ...] = ()
     solver: SolverTable = SolverTable()
-    petsc: Mapping[str, Annotated[str, BeforeValidator(_check_option)]] = {}
+    petsc: Mapping[str, Annotated[str, BeforeValidator(check_option)]] = Field(
+        {}, description="Any option of PETSc, without the leading dash; the command line wins over the file."
+    )
     output: OutputTable = OutputTable()
 
 

@@ -35,7 +35,7 @@ class Anchor:
 
 
 def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, ...]:
-    """One anchor for each free motion, on regions chosen so that the anchors tell all motions apart."""
+    """One anchor for each free motion, on regions chosen so that the anchors tell all motions apart (theory, 61)."""
     numbers = {name: number for number, name in enumerate(mesh.region_names)}
     bounds = np.searchsorted(mesh.region, np.arange(len(numbers) + 1)) * (mesh.order + 1)
     nodes = _Nodes(mesh, numbers, bounds, mesh.node_crack)

@@ -171,7 +171,7 @@ def find_compliance(pairs: PairProblem) -> tuple[Real | None, bool]:
 
 
 def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeState | None:
-    """The modes of the complementarity problem in which some pairs are detached; None where pivoting fails."""
+    """The modes of the complementarity problem in which some pairs are detached; None where it fails (theory, 56)."""
     count = len(detached)
     # In a unit of length in which compliances are numbers of about one.
     softness = float(np.abs(np.diag(compliance)).mean()) or 1.0

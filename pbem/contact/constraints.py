@@ -69,7 +69,10 @@ DISPLACEMENT, TRACTION = 0, 1
 def build_constraints(
     mesh: Mesh, outer: OuterNodes, gap: Real, law: Linearisation, load: Load, traction_scale: float
 ) -> ConstraintMap:
-    """The map for the given linearised laws of the pairs and the given load; gap (m,): initial openings."""
+    """The map for the given linearised laws of the pairs and the given load; gap (m,): initial openings.
+
+    (theory, 44)
+    """
     entries = _Entries(mesh.nodes)
     offset = np.zeros((2, mesh.nodes), dtype=complex)
     _constrain_outer_nodes(entries, offset, outer, load, traction_scale)
@@ -80,6 +83,7 @@ def build_constraints(
 def _constrain_outer_nodes(
     entries: _Entries, offset: Complex, outer: OuterNodes, load: Load, traction_scale: float
 ) -> None:
+    """Displacement and traction of outer nodes by their unknowns and the prescribed values (theory, 45)."""
     for k in range(2):
         direction, known = outer.direction[:, k], outer.displacement_known[:, k]
         unknown = 2 * outer.node + k
@@ -96,6 +100,7 @@ def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, 
     """The slot node follows the other side but for the jump; the other side carries the opposite of its traction.
 
     The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge.
+    (theory, 47, 65)
     """
     pairs, links = mesh.pairs, mesh.links
     n, s = pairs.normal, 1j * pairs.normal

@@ -135,7 +135,7 @@ def find_joint(model: Model, name: str) -> Interface | Contact:
 
 
 def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
-    """Laws of every pair, and a soft trial stiffness from modulus and length."""
+    """Laws of every pair, and a soft trial stiffness from modulus and length (theory, 52)."""
     pairs = mesh.pairs
     laws = [find_joint(model, name).law for name in mesh.interface_names]
     material = np.array([region.material.plane_modulus for region in model.regions])
@@ -303,7 +303,7 @@ def plastic_slip(laws: PairLaws, state: PairState) -> Real:
 
 
 def commit(laws: PairLaws, memory: Memory, modes: ModeState, state: PairState) -> Memory:
-    """What is remembered of a converged step."""
+    """What is remembered of a converged step (theory, 50)."""
     slip = plastic_slip(laws, state)
     slipped = np.where(modes.mode == SLIP, np.abs(slip - memory.slip), 0.0)
     internal = {name: values.copy() for name, values in memory.internal.items()}

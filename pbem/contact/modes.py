@@ -68,6 +68,7 @@ def linearise(
     the bodies unload, the tangent sends the slip backwards, and with a bound fixed in each iteration it runs on until
     it finds the next equilibrium. "strength": how it changes with the normal traction, too (Tresca's law in each
     iteration): slower, but its modes do not chase each other.
+    (theory, 46, 51)
     """
     tangent = np.zeros((laws.count, 4, 2))
     offset = np.zeros((laws.count, 4))
@@ -124,7 +125,7 @@ def tensile_limit(laws: PairLaws, memory: Memory) -> Real:
 
 
 def slip_ahead(modes: ModeState, memory: Memory, slip: Real) -> Real:
-    """Length of the present step's slip (m,) in the sense of the friction traction, 0 against it."""
+    """Length of the present step's slip (m,) in the sense of the friction traction, 0 against it (theory, 50)."""
     ahead = np.where(modes.mode == SLIP, modes.sign * (slip - memory.slip), 0.0)
     return np.maximum(ahead, 0.0)
 
@@ -218,7 +219,7 @@ def propose_modes(
     softening: float = 1.0,
     floor: float = 0.0,
 ) -> Proposal:
-    """Choose modes from trial values (semi-smooth Newton); a mode is kept while rounding could decide.
+    """Choose modes from trial values (semi-smooth Newton); a mode is kept while rounding could decide (theory, 53, 54).
 
     Open if p_n + pressure exceeds the tensile strength, or if r g_n > 0 in a pair that is open already; else slip if
     |p_s + r (slip - slip before)| exceeds the friction bound, with the sign of that trial; else stick. Pairs that creep
@@ -279,7 +280,10 @@ FAIL_TOGETHER = 0.7
 
 
 def find_failures(laws: PairLaws, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0) -> Bool:
-    """The intact brittle bonds (m,) that fail next: those overloaded most, and the pairs that they lead."""
+    """The intact brittle bonds (m,) that fail next: those overloaded most, and the pairs that they lead.
+
+    (theory, 55)
+    """
     limit = tensile_limit(laws, memory) - pressure
     strength = evaluate_strength(
         laws, np.minimum(state.p_n, limit), memory.look_ahead(np.zeros(laws.count)), pressure

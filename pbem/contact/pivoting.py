@@ -39,7 +39,7 @@ class Pivoted:
 
 
 def solve_by_pivoting(matrix: Real, constant: Real) -> Pivoted:
-    """Lemke's algorithm for the matrix M (n, n) and the constant q (n,), rows of numbers of one size."""
+    """Lemke's algorithm for the matrix M (n, n) and the constant q (n,), rows of numbers of one size (theory, 56)."""
     count = len(constant)
     scale = float(np.abs(constant).max(initial=0.0))
     if not count or constant.min() >= -ROUNDING * scale:

@@ -26,7 +26,7 @@ SMALL = 1e-3
 
 
 def age_state(state: Real, slip: Real, duration: float, slip_distance: Real) -> Real:
-    """The state (k,), a time, after a step of constant rate with the slip (k,)."""
+    """The state (k,), a time, after a step of constant rate with the slip (k,) (theory, 82)."""
     x = slip / slip_distance
     return np.asarray(state * np.exp(-x) + duration * _average_decay(x))
 
@@ -65,7 +65,7 @@ class RateAndState(FrictionLaw):
         self, p_n: Real, slide: Slide, /, friction: Real, rate_effect: Real, state_effect: Real, reference_rate: Real,
         slip_distance: Real, initial_state: Real,
     ) -> Strength:
-        """See FrictionLaw; without duration at the rate and state in the beginning."""
+        """See FrictionLaw; without duration at the rate and state in the beginning (theory, 81)."""
         duration, state = slide.duration, slide.start[STATE.name]
         rate, by_slip = slide.start[SLIP_RATE.name], np.zeros_like(p_n)
         if duration > 0:

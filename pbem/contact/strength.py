@@ -34,7 +34,7 @@ class Coulomb(FrictionLaw):
     linear = True
 
     def strength(self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real) -> Strength:  # type: ignore[override]
-        """See FrictionLaw."""
+        """See FrictionLaw (theory, 48)."""
         return _evaluate_cone(p_n, friction, cohesion)
 
     def resists(self, parameters: Parameters) -> NDArray[np.bool_]:
@@ -52,7 +52,7 @@ class SlipWeakening(FrictionLaw):
     def strength(  # type: ignore[override]
         self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, friction_dynamic: Real, slip_distance: Real
     ) -> Strength:
-        """See FrictionLaw."""
+        """See FrictionLaw (theory, 49)."""
         slip = slide.path
         weaker = np.clip(slip / slip_distance, 0.0, 1.0)
         static = _evaluate_cone(p_n, friction + (friction_dynamic - friction) * weaker, cohesion)

@@ -43,7 +43,7 @@ class Elements:
         return np.where(self.sweep == 0, np.abs(self.end - self.start), radius * np.abs(self.sweep))
 
     def place(self, local: Real) -> Complex:
-        """Points (m, p) at the coordinates s, (p,) of all elements or (m, p) of each."""
+        """Points (m, p) at the coordinates s, (p,) of all elements or (m, p) of each (theory, 16)."""
         straight = 0.5 * (self.end + self.start)[:, None] + 0.5 * (self.end - self.start)[:, None] * local
         return np.where(self.sweep[:, None] == 0, straight, self.center[:, None] + self._radii(local))
 
@@ -55,7 +55,7 @@ class Elements:
         return np.where(self.sweep[:, None] == 0, np.broadcast_to(-1j * direction[:, None], radii.shape), outward)
 
     def stretch(self, local: Real) -> Real:
-        """Length of the element per unit of s (m, p) at the coordinates s."""
+        """Length of the element per unit of s (m, p) at the coordinates s (theory, 17)."""
         straight = 0.5 * np.abs(self.end - self.start)[:, None]
         tangent = self._quarter_tangents()[:, None]
         jacobian = 2 * np.abs(self.start - self.center)[:, None] * np.abs(tangent) / (1 + (tangent * local) ** 2)

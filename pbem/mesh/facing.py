@@ -46,7 +46,7 @@ def place_pairs(chain: Chain) -> Columns:
 def pair_contact(
     joint: Contact, chains: Mapping[str, Chain], order: Sequence[str], count: int
 ) -> tuple[Columns, Columns]:
-    """Pairs and links by averages over the parts that face each other; the pairs' numbers begin at count.
+    """Pairs and links by averages over the parts that face each other; the pairs' numbers begin at count (theory, 65).
 
     Each pair belongs to a node of the slave, whose displacement follows the master; the master carries the slave's
     tractions. Nodes of the slave that face nothing are no pairs and free of traction. Whichever curve is the slave, the

@@ -57,7 +57,7 @@ class Coupling:
 
 
 def couple_curves(slave: Elements, master: Elements, local: Real, others: Elements) -> Coupling:
-    """Integrate products of shapes over the parts of the slave whose normals meet the master.
+    """Integrate products of shapes over the parts of the slave whose normals meet the master (theory, 64).
 
     others: elements that hide the master where they stand in between; the slave's and the master's may be among them.
     """

@@ -33,6 +33,7 @@ def interpolate_shapes(local: Real, exponent: float = 0.0) -> Real:
     """Coefficients (power k, shape j) of the shapes s^exponent * s^k that are 1 at node j and 0 at the others.
 
     local (p + 1,): the nodes' coordinates on the axis that the powers refer to; positive if exponent is not whole.
+    (theory, 18)
     """
     powers = local[:, None] ** (np.arange(len(local)) + exponent)
     return np.ascontiguousarray(np.linalg.inv(powers))
@@ -51,6 +52,7 @@ def tip_shapes(nodes: tuple[float, ...]) -> tuple[Real, Real]:
     """Coefficients of the square-root shapes t^(k + 1/2), t = distance from the tip over the length, in (0, 1).
 
     First for a tip at the element's start, then at its end; rows are powers, columns the nodes in element order.
+    (theory, 19)
     """
     local = np.array(nodes)
     return interpolate_shapes((1 + local) / 2, 0.5), interpolate_shapes((1 - local) / 2, 0.5)

@@ -82,7 +82,7 @@ class Leg:
         return self.divide(self.elements, self.refine_start, self.refine_end)
 
     def divide(self, elements: int, refine_start: bool, refine_end: bool) -> NDArray[np.float64]:
-        """Fractions (elements + 1,) at t^power from every refined end, whatever elements the leg has."""
+        """Fractions (elements + 1,) at t^power from every refined end, whatever elements the leg has (theory, 79)."""
         t = np.linspace(0.0, 1.0, elements + 1)
         if refine_start and refine_end:
             t = np.where(t <= 0.5, 0.5 * (2 * t) ** self.power, 1 - 0.5 * (2 * (1 - t)) ** self.power)

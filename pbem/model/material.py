@@ -18,16 +18,17 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
+        """G = E/(2 (1 + nu)) (theory, 1)."""
         return self.young / (2.0 * (1.0 + self.poisson))
 
     @property
     def kappa(self) -> float:
-        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress."""
+        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress (theory, 1)."""
         if self.plane == "strain":
             return 3.0 - 4.0 * self.poisson
         return (3.0 - self.poisson) / (1.0 + self.poisson)
 
     @property
     def plane_modulus(self) -> float:
-        """E' = 8 G / (kappa + 1): E/(1 - nu^2) in plane strain, E in plane stress."""
+        """E' = 8 G / (kappa + 1): E/(1 - nu^2) in plane strain, E in plane stress (theory, 1)."""
         return 8.0 * self.shear_modulus / (self.kappa + 1.0)

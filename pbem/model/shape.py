@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from pbem.case import Case
-from pbem.case.schema import LARGEST, MOST_ELEMENTS, CurveTable
+from pbem.case.schema import CurveTable
+from pbem.case.values import LARGEST, MOST_ELEMENTS
 from pbem.errors import Fault
 from pbem.model.curve import Curve, Leg
 from pbem.model.expression import ExpressionError, evaluate_expression

@@ -84,7 +84,7 @@ def measure_stored(weight: Real, record: PairRecord) -> float:
 
 
 def measure_work(laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord) -> PairWork:
-    """The work in a step; weight (m,): length of the boundary that belongs to each pair."""
+    """The work in a step; weight (m,): length of the boundary that belongs to each pair (theory, 76)."""
     moved, slid = new.g_n - old.g_n, new.g_s - old.g_s
     pressed = 0.5 * (old.p_n + old.pressure + new.p_n + new.pressure) * moved
     trapezoid = pressed + 0.5 * (old.p_s + new.p_s) * slid

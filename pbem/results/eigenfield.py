@@ -20,6 +20,7 @@ def evaluate_eigenfield(
     A = T/4 the uniform stress T along the crack; m = -1/2 and -1 are their duals.
     angle: of each point, continuous on either side of the crack wherever that is. In units of the plane modulus E', so
     that the shear modulus is (kappa + 1)/8: displacements are lengths, tractions are strains.
+    (theory, 2, 4, 66)
     """
     radius = np.abs(z)
 

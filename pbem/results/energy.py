@@ -149,7 +149,7 @@ class EnergyBalance:
         self._state = self._describe_rest() if last is None else self._describe(last)
 
     def add(self, step: Step) -> Energy:
-        """The energies after the next step; `runaway` tells whether faces ran away in it."""
+        """The energies after the next step; `runaway` tells whether faces ran away in it (theory, 75)."""
         old, new, before = self._state, self._describe(step), self._reached
         nodes = self._outer.node
         moved = (new.displacement - old.displacement)[nodes]
@@ -216,6 +216,7 @@ class EnergyBalance:
     def _compose(
         self, traction: Complex, displacement: Complex, stage: int, factor: float, pairs: PairRecord
     ) -> _State:
+        """The energy that is stored, and what weights and far stresses work on (theory, 73, 74)."""
         backgrounds = evaluate_backgrounds(self._model, stage, factor)
         elastic = traction - self._in_situ
         loads, conjugates = [np.zeros(0)], [np.zeros(0)]

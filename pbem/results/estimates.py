@@ -142,6 +142,7 @@ class Comparison:
                          displacement=np.nan)
 
     def _subtract(self, step: Step, second: Step, beside: Beside) -> Estimates:
+        """What the two solutions differ by, over the divisors (theory, 77)."""
         by = 1.0 / self._divisor
         forces = by * (sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second))
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)

@@ -99,7 +99,10 @@ class InterfaceRelease:
 def _integrate_arc(
     tip: InterfaceTip, turn: Real, half: float, moved: Complex, stress: Real, material: Material
 ) -> float:
-    """Of w n_x - t . du/dx on an arc; x is the tip's direction, turn (p,) the angles from it, half: half the arc's."""
+    """Of w n_x - t . du/dx on an arc; x is the tip's direction, turn (p,) the angles from it, half: half the arc's.
+
+    (theory, 69)
+    """
     points, weights = place_gauss(ON_ARC)
     normal = np.exp(1j * turn)
     local = moved * np.conj(tip.direction)
@@ -122,7 +125,7 @@ def _integrate_arc(
 def _integrate_boundary(
     mesh: Mesh, tip: InterfaceTip, elements: Integer, displacement: Complex, traction: Complex, material: Material
 ) -> float:
-    """Of w n_x - t . du/dx on the elements within the circle, from their displacements and tractions.
+    """Of w n_x - t . du/dx on the elements within the circle, from their displacements and tractions (theory, 69).
 
     Where the interface is not bonded the displacement grows like a root, which is right only in the mean: there the
     tangential derivative is integrated by parts. The faces meet at the tip, so that it has no part in the sum of both.

@@ -39,7 +39,7 @@ class Ends:
     mixed: Bool
 
     def choose_divisors(self, smooth: float) -> Real:
-        """What differences of tractions (c,) are to be divided by; smooth: away from ends."""
+        """What differences of tractions (c,) are to be divided by; smooth: away from ends (theory, 77)."""
         at_end = np.where(self.moving, min(MOVING, smooth), min(FIXED, smooth))
         return np.where(self.beside, at_end, smooth)
 

@@ -68,7 +68,7 @@ def _is_whole_and_straight(shape: TipShape) -> bool:
 
 
 def _integrate_straight_crack(shape: TipShape) -> Real:
-    """K from the tractions that the crack's own jumps make on it, all of it straight and between two tips.
+    """K from the tractions that the crack's own jumps make on it, all of it straight and between two tips (theory, 67).
 
     K = sqrt(2/(pi L)) int t sqrt((L - r)/r) dr, t on the upper face (Tada, Paris, Irwin, crack in an infinite plane):
     exact for any mesh as far as the tractions are polynomials on its elements.
@@ -119,7 +119,7 @@ class _Near:
         self.on_y = self.field.traction(self.radius * self.normal, 1j * along_x)
 
     def integrate_intensity(self) -> Real:
-        """K by Betti's theorem with the duals of the square-root fields: on the circle and on both faces.
+        """K by Betti's theorem with the duals of the square-root fields: on the circle and on both faces (theory, 68).
 
         Of the tractions t*, t and displacements u*, u, the integral of t . u* - t* . u around the tip is -8 pi times
         Re(A conj(A*)), A and A* being the amplitudes of the two fields.
@@ -144,7 +144,7 @@ class _Near:
         return np.sqrt(2 * np.pi) * np.stack([rows[0], -rows[1]])
 
     def integrate_release(self) -> Real:
-        """Rice's J, of w n_x - t . du/dx, on the circle and on both faces; its form in the jumps.
+        """Rice's J, of w n_x - t . du/dx, on the circle and on both faces; its form in the jumps (theory, 69).
 
         On the faces it is the integral of g . dD, D the jump across the crack (upper less lower) and g what the faces
         carry, turned where the crack turns: integrated by parts, since the jumps of single elements are only right in
@@ -189,6 +189,7 @@ class _Near:
 
         Hooke's law gives it from the stretch of the faces in the mean, in which the square-root terms cancel. The near
         part of it is taken from the stress that the jumps make; the rest is smooth and continued to the tip.
+        (theory, 70)
         """
         lateral = (3 - self.shape.kappa) / (1 + self.shape.kappa)
         length = self.elements.arc_lengths(self.shape.local).ravel()

@@ -39,7 +39,10 @@ SAME = 1e-9
 
 
 def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
-    """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted."""
+    """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted.
+
+    (theory, 72)
+    """
     mesh, count = problem.mesh, len(problem.mesh.region_names)
     whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
     bounding = np.flatnonzero(~mesh.node_crack)

@@ -90,7 +90,7 @@ class PairSolution:
 
 
 def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
-    """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k, c) for each of c solutions."""
+    """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k, c) for each of c solutions (theory, 59)."""
     count = len(split.a_offset)
     varied = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)) | (split.b_offset != 0).any(axis=1))
     active = (2 * varied[:, None] + np.arange(2)).ravel()

@@ -106,7 +106,7 @@ def _maximise(
     problem: Problem, memory: Memory, loads: list[Load], matrix: sparse.csr_matrix, constant: Real, change: Real,
     size: float,
 ) -> _Solved:
-    """The largest share of the change that is balanced.
+    """The largest share of the change that is balanced (theory, 57).
 
     Unknowns: tractions times the model's length over `size`, in the order of the map's unknowns, and the share.
     """

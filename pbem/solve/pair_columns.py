@@ -33,7 +33,7 @@ class PairColumns:
         self.coupling = np.zeros((0, 0))
 
     def add(self, pairs: Integer) -> None:
-        """Compute the columns of further pairs; all ranks together."""
+        """Compute the columns of further pairs; all ranks together (theory, 58)."""
         columns = _pair_up(pairs)
         effect = np.empty((self.reference.rows, self.effect.shape[1] + len(columns)), order="F")
         effect[:, : self.effect.shape[1]] = self.effect

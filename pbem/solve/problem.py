@@ -114,7 +114,7 @@ class Problem:
         return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale)
 
     def apply(self, v: Real, load: Load, released: Real | None = None) -> Real:
-        """This rank's rows of the integral equations, less the part that comes from far away; lengths.
+        """This rank's rows of the integral equations, less the part that comes from far away; lengths (theory, 15, 44).
 
         released (a, r): combinations of the anchors that do not act.
         """
@@ -151,7 +151,10 @@ class Problem:
         return norm_of_parts(self.comm, part)
 
     def recover_crack_displacement(self, v: Real, load: Load) -> Complex:
-        """Mean displacement of the two faces at all crack nodes (complex, in mesh order), on every rank."""
+        """Mean displacement of the two faces at all crack nodes (complex, in mesh order), on every rank.
+
+        (theory, 13)
+        """
         elastic = v - load.known
         part = np.zeros(2 * len(self.crack_nodes))
         for block in self.crack_rows:

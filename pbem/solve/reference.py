@@ -178,7 +178,7 @@ class Reference:
         return self._complete(rhs, self.solver.solve_columns(rhs[self.kept_rows]))
 
     def _complete(self, rhs: Real, kept: Real) -> Real:
-        """Add the eliminated unknowns (rows, k) to the solution for the others."""
+        """Add the eliminated unknowns (rows, k) to the solution for the others (theory, 60)."""
         if self.kept.all():
             return kept
         assert self.present is not None

@@ -91,7 +91,7 @@ class ReleasedTangent:
         return result
 
     def _complete(self, unknowns: Real, v: Real, constraints: ConstraintMap) -> Real:
-        """x_0 + X b for c columns x_0 (2 nodes, c) and their v_0 (4 nodes, c), less known fields."""
+        """x_0 + X b for c columns x_0 (2 nodes, c) and their v_0 (4 nodes, c), less known fields (theory, 62)."""
         released = constraints.released
         assert released is not None
         functional = self.problem.anchor_parts[1]

@@ -105,7 +105,7 @@ class SchwarzPreconditioner:
         return count
 
     def apply(self, residual: Real, result: Real) -> None:
-        """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,)."""
+        """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,) (theory, 63)."""
         less, nodes = self._less, self._nodes
         assert less is not None
         turned = less.apply(residual)

@@ -81,7 +81,7 @@ def find_mpi_libraries(files: Iterable[str]) -> tuple[str, ...]:
 
 def refuse_libraries(found: Libraries, world: int) -> str | None:
     """What to say when PETSc is not one that the ranks can compute with; None if all is well. world: mpi4py's size."""
-    advice = "; build mpi4py, PETSc and petsc4py with one MPI (README.md: Install and run)"
+    advice = "; build mpi4py, PETSc and petsc4py with one MPI (see `pbem help install`)"
     if found.scalar.kind == "c":
         return f"PETSc computes with complex numbers ({found.scalar}); pbem needs one built with real scalars"
     if found.scalar != np.dtype(np.float64):

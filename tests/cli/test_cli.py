@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 import pbem
-from pbem import cli
+from pbem import bundled
+from pbem.bundled import find_case, list_bundled_cases
 from pbem.case.schema import SolverTable
-from pbem.cli import OPERATORS, find_case, list_bundled_cases, main, split_petsc_options
+from pbem.cli import OPERATORS, main, split_petsc_options
 from pbem.errors import CaseError, ConvergenceError
 from pbem.model.model import Operator
 from pbem.results.reader import open_results
@@ -266,16 +267,16 @@ def test_petsc_options_reach_the_run(folder: Path, capsys: Capture) -> None:
 
 
 def test_cases_of_the_program_are_found_by_name(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    bundled = list_bundled_cases()
-    assert "two_blocks" in bundled and all(path.is_file() for path in bundled.values())
-    assert find_case("two_blocks") == find_case("two_blocks.toml") == bundled["two_blocks"]
+    cases = list_bundled_cases()
+    assert "two_blocks" in cases and all(path.is_file() for path in cases.values())
+    assert find_case("two_blocks") == find_case("two_blocks.toml") == cases["two_blocks"]
     assert find_case("blocks.toml") == Path("blocks.toml")
     with pytest.raises(CaseError, match=r"two_blocks.*did you mean 'two_blocks'\?"):
         find_case("two_bocks")
     # What lies in the working directory goes before what comes with the program.
     (folder / "two_blocks").write_text(BLOCKS)
     assert find_case("two_blocks") == Path("two_blocks")
-    monkeypatch.setattr(cli, "list_bundled_cases", dict)
+    monkeypatch.setattr(bundled, "list_bundled_cases", dict)
     with pytest.raises(CaseError, match=r"expected a case file$"):
         find_case("two_bocks")
 

@@ -82,10 +82,6 @@ class FactoredTangent:
         self.reference.present = constraints.matrix
         return np.stack([self._solve_by_any(constraints, each) for each in forces.T], axis=1)
 
-    def solve_system(self, rhs: Real) -> Real:
-        """The unknowns (2 nodes,), on every rank, for this rank's part of the right-hand side, by the factors."""
-        return gather_parts(self.problem.comm, self.reference.solve_columns(rhs[:, None])[:, 0])
-
     def _solve_by_any(self, constraints: ConstraintMap, rhs: Real) -> Real:
         """Solve with the factors there are if that is expected to pay, else with new ones."""
         if self.factored is not None and not are_equal(self.factored, constraints.matrix):

@@ -171,7 +171,7 @@ def _check_law(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     if "friction" in table and "friction_angle" in table:
         findings.append(Finding((*loc, "friction_angle"), "both friction and friction_angle", "only one of them"))
-    further = table.get("law") in NEEDED or any(key in table for keys in OWN_KEYS.values() for key in keys)
+    further = table.get("law") in list(NEEDED) or any(key in table for keys in OWN_KEYS.values() for key in keys)
     weakens = table.get("law") != "frictionless" and not further
     if weakens and ("friction_dynamic" in table) != ("slip_distance" in table):
         given = "friction_dynamic" if "friction_dynamic" in table else "slip_distance"

@@ -61,6 +61,24 @@ def test_the_push_at_which_a_block_topples() -> None:
     assert find(write_pushed_block(1.5, {"friction": 3.0, "cohesion": 9.0, "tensile_strength": 2.0})) == 1.0
 
 
+CRACKED = BLOCKS | {
+    "curves": BLOCKS["curves"] | {"c": {"points": [[0.8, 1.4], [1.3, 1.6]], "elements": 4}},
+    "regions": BLOCKS["regions"] | {"upper": BLOCKS["regions"]["upper"] | {"cracks": ["c"]}},
+}
+
+
+@pytest.mark.parametrize("law", ["coulomb", "open"])
+def test_what_the_faces_of_a_crack_carry_bounds_no_load(law: str) -> None:
+    # A fluid in the crack, more than the block bears and from nothing on in the same stage, balances by itself.
+    crack = {"law": law} if law == "open" else {"law": law, "friction": 0.5}
+    stage = {"name": "press", "steps": 1, "boundary": {"top": {"tx": 0.0, "ty": -1.0}}}
+    push = {"name": "push", "steps": 1, "boundary": {"top": {"tx": 0.7, "ty": -1.0}}}
+    push["interfaces"] = {"c": {"pressure": 3.0}}
+    both = {"joint": {"law": "coulomb", "friction": 0.25}, "c": crack}
+    text = write_case(CRACKED | {"interfaces": both, "stages": [stage, push]})
+    assert find(text) == pytest.approx(0.25 / 0.7, rel=1e-2)
+
+
 def test_a_run_comes_to_its_limit_load_in_a_few_steps() -> None:
     listener = Listener()
     told = r"limit load reached at fraction 0\.3[45].*translation along x"

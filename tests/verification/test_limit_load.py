@@ -102,6 +102,34 @@ def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: 
     assert caught.value.reason == "mode cycle"
 
 
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_a_search_that_fails_far_below_the_bound_keeps_its_reason(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Friction bears 0.25 of 0.7; the search is made to fail at 0.2 and above.
+    def fail(*arguments: object) -> object:
+        if listener.target > 0.2:
+            raise ConvergenceError("mode cycle", "as it is made to")
+        return solve(*arguments)  # type: ignore[arg-type]
+
+    class Told(Listener):
+        target = 0.0
+
+        def start_step(self, stage: int, reached: float, target: float) -> None:
+            super().start_step(stage, reached, target)
+            self.target = target if stage else 0.0
+
+    solve, listener = march.solve_step, Told()
+    monkeypatch.setattr(march, "solve_step", fail)
+    with pytest.raises(ConvergenceError, match=r"as it is made to; no forces .* beyond 0\.35") as caught:
+        run(write_pushed_block(0.7, {"friction": 0.25}).replace("steps = 2", f"steps = {steps}"), listener)
+    assert caught.value.reason == "mode cycle"
+    assert "fraction 0.2 of" in str(caught.value) or "fraction 0.199" in str(caught.value)
+
+
+def test_advice_on_a_limit_load_is_a_clause_of_its_own() -> None:
+    with pytest.raises(ConvergenceError, match=r"; prescribe a displacement in place of the load to go beyond$"):
+        run(write_pushed_block(0.7, {"friction": 0.25}))
+
+
 BONDED = {"friction": 0.25, "cohesion": 0.3, "tensile_strength": 0.5, "cohesion_lost": True}
 
 
@@ -145,6 +173,7 @@ def test_what_is_known_to_fail_is_not_tried_again_before_it_is_near() -> None:
     limited = march.Ceiling().lower(1.0, 0.4, fails)
     assert 0.39 < limited.choose(0.1, 1.0, 1e-4) < 0.4
     assert not limited.is_reached(0.3, 1.0, 1e-4) and limited.is_reached(0.395, 1.0, 1e-4)
-    # Tries that fail are a limit load only where there is one.
+    # Tries that fail are no limit load, but where what forces balance is near itself.
     assert not ceiling.is_reached(0.499, 1.0, 1e-4)
-    assert limited.lower(0.35, 0.35, fails).is_reached(0.345, 1.0, 1e-4)
+    assert not limited.lower(0.35, 0.35, fails).is_reached(0.349, 1.0, 1e-4)
+    assert limited.lower(0.398, 0.398, fails).is_reached(0.395, 1.0, 1e-4)

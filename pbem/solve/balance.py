@@ -45,11 +45,12 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
     """
     mesh, count = problem.mesh, len(problem.mesh.region_names)
     whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
-    bounding = np.flatnonzero(~mesh.node_crack)
-    least = _find_least_traction(problem, v, np.abs(whole[bounding]).max(initial=0.0))
-    faces = _Faces(mesh.position[bounding], mesh.weight[bounding], whole[bounding], known[bounding])
-    regions = _add_up(faces, mesh.node_region[bounding], count, least)
+    least = _find_least_traction(problem, v, np.abs(whole).max(initial=0.0))
+    faces, of = _collect_faces(problem, whole, known)
+    regions = _add_up(faces, of, count, least)
     finite = np.array([not region.infinite for region in problem.model.regions])
+    carried_weight = _find_carried_weight(problem, known)
+    regions = replace(regions, force=regions.force - np.where(finite, 0.0, carried_weight))
     # An infinite region may carry a moment, which decays.
     turned = np.where(finite, _divide(np.abs(regions.moment), regions.moments), 0.0)
     relative = np.maximum(_divide(np.abs(regions.force), regions.forces), turned)
@@ -61,7 +62,7 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
             carried[own] = np.maximum(carried[own], part)
     most = np.full(count, regions.forces.max())
     parts, part_relative = _measure_parts(problem, whole, known, least)
-    total, total_relative = _measure_whole(problem, faces, bounding, least)
+    total, total_relative = _measure_whole(problem, faces, of, least, carried_weight)
     return Balance(
         resultant=regions.resultant, relative=relative, carried=carried, weight=_divide(regions.forces, most),
         part_resultant=parts.resultant, part_relative=part_relative,
@@ -72,13 +73,17 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> 
 
 @dataclass(frozen=True)
 class _Faces:
-    """Nodes (n,) of faces: places, weights, tractions, and of these the part in balance with weight and in-situ
-    stress."""
+    """Faces at nodes (n,): places, weights, tractions, and of these the part in balance with weight and in-situ stress.
 
+    node: their numbers. bounding: those of boundaries, as opposed to cracks, of which both faces are listed.
+    """
+
+    node: NDArray[np.int64]
     position: Complex
     weight: Real
     traction: Complex
     known: Complex
+    bounding: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -96,8 +101,52 @@ class _Sums:
         return np.stack([self.force.real, self.force.imag, self.moment], axis=1)
 
 
-def _add_up(faces: _Faces, of: NDArray[np.int64], count: int, least: float) -> _Sums:
-    """The sums over the faces of bodies; of (n,): number of the body of each node, in rising order."""
+def _collect_faces(problem: Problem, whole: Complex, known: Complex) -> tuple[_Faces, NDArray[np.int64]]:
+    """All faces, and the regions that they bound (n,), in rising order; tractions are given at the nodes."""
+    mesh = problem.mesh
+    node = np.concatenate([np.arange(mesh.nodes), np.flatnonzero(mesh.node_crack)])
+    sign = np.where(np.arange(len(node)) < mesh.nodes, 1.0, -1.0)
+    order = np.argsort(mesh.node_region[node], kind="stable")
+    node, sign = node[order], sign[order]
+    faces = _Faces(
+        node, mesh.position[node], mesh.weight[node], sign * whole[node], sign * known[node], ~mesh.node_crack[node]
+    )
+    return faces, mesh.node_region[node]
+
+
+def _find_carried_weight(problem: Problem, known: Complex) -> complex:
+    """The weight of finite bodies that an infinite region carries, as nothing else holds them along it; 0 if none.
+
+    As the loads of the model balance without weight (or it would have been refused), that is the region's resultant.
+    known (nodes,): tractions in balance with weight; those of in-situ stress do no work on rigid motions.
+    """
+    mesh = problem.mesh
+    if not known.any() or not problem.plane_translations:
+        return 0j
+    (plane,) = (region.name for region in problem.model.regions if region.infinite)
+    directions, powers = [], []
+    for motion in problem.plane_translations:
+        direction, power = motion.velocities[plane][0], 0.0
+        for number, name in enumerate(mesh.region_names):
+            if name in motion.velocities and name != plane:
+                own = np.flatnonzero((mesh.node_region == number) & ~mesh.node_crack)
+                shift, spin = motion.velocities[name]
+                velocity = shift + 1j * spin * mesh.position[own]
+                power -= float(mesh.weight[own] @ (np.conj(known[own]) * velocity).real)
+        directions.append([direction.real, direction.imag])
+        powers.append(power)
+    # Along a direction in which something holds the region, nothing is known of its force.
+    force = np.linalg.lstsq(np.array(directions), np.array(powers), rcond=SAME)[0]
+    return complex(*force)
+
+
+def _add_up(
+    faces: _Faces, of: NDArray[np.int64], count: int, least: float, middle: complex | None = None
+) -> _Sums:
+    """The sums over the faces of bodies; of (n,): number of the body of each face, in rising order.
+
+    middle: about which moments are taken; None for that of each body's boundary.
+    """
 
     def add(values: Real) -> Real:
         return np.bincount(of, faces.weight * values, count).astype(float)
@@ -105,19 +154,24 @@ def _add_up(faces: _Faces, of: NDArray[np.int64], count: int, least: float) -> _
     def add_vectors(values: Complex) -> Complex:
         return add(values.real) + 1j * add(values.imag)
 
-    length = add(np.ones(len(of)))
-    # About a node of the body first, as coordinates can be large.
-    start = np.append(faces.position, 0j)[np.searchsorted(of, np.arange(count))]
-    # Of a plane with nothing but cracks in it there is no boundary.
-    middle = start + add_vectors(faces.position - start[of]) / np.where(length > 0, length, 1.0)
-    lever = faces.position - middle[of]
+    if middle is None:
+        outline = faces.bounding.astype(float)
+        length = add(outline)
+        # About a node of the body first, as coordinates can be large.
+        start = np.append(faces.position, 0j)[np.searchsorted(of, np.arange(count))]
+        # Of a plane with nothing but cracks in it there is no boundary.
+        middles = start + add_vectors(outline * (faces.position - start[of])) / np.where(length > 0, length, 1.0)
+    else:
+        middles = np.full(count, middle)
+    lever = faces.position - middles[of]
     whole, known = faces.traction, faces.known
     elastic = whole - known
+    # Loads of which none is left over on a body are no less a measure of its errors: fluid on both faces of a crack,
+    # in-situ stress.
     return _Sums(
-        middle=middle, force=add_vectors(elastic), moment=add((np.conj(lever) * elastic).imag),
-        forces=np.maximum(add(np.abs(whole)), least * length) + np.abs(add_vectors(known)),
-        moments=np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever)))
-        + np.abs(add((np.conj(lever) * known).imag)),
+        middle=middles, force=add_vectors(elastic), moment=add((np.conj(lever) * elastic).imag),
+        forces=np.maximum(add(np.abs(whole)), least * add(np.ones(len(of)))) + add(np.abs(known)),
+        moments=np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever))) + add(np.abs(known * lever)),
     )
 
 
@@ -135,7 +189,10 @@ def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: floa
     order = order[of[order] >= 0]
     nodes, sign, of = nodes[order], sign[order], of[order]
     sums = _add_up(
-        _Faces(mesh.position[nodes], mesh.weight[nodes], sign * whole[nodes], sign * known[nodes]),
+        _Faces(
+            nodes, mesh.position[nodes], mesh.weight[nodes], sign * whole[nodes], sign * known[nodes],
+            np.ones(len(nodes), dtype=bool),
+        ),
         of, len(chosen), least,
     )
     finite = np.array([not problem.model.regions[parts.region[part]].infinite for part in chosen], dtype=bool)
@@ -143,16 +200,27 @@ def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: floa
     return sums, np.maximum(_divide(np.abs(sums.force), sums.forces), turned)
 
 
-def _measure_whole(problem: Problem, faces: _Faces, bounding: NDArray[np.int64], least: float) -> tuple[_Sums, float]:
+def _measure_whole(
+    problem: Problem, faces: _Faces, of: NDArray[np.int64], least: float, carried_weight: complex
+) -> tuple[_Sums, float]:
     """The sums over outer curves, and the weight: what acts on all bodies together from outside.
 
-    What interfaces and contacts carry from one to the other cancels in it, as it should.
+    What interfaces and contacts carry from one to the other cancels in it, as it should; but errors are as large as
+    what acts on the bodies, so that they are measured by the one on which most does, about the same middle.
     """
     outer = np.zeros(problem.mesh.nodes, dtype=bool)
     outer[problem.outer.node] = True
-    traction = np.where(outer[bounding], faces.traction, 0.0)
-    weight = np.where(outer[bounding] | (faces.known != 0), faces.weight, 0.0)
-    sums = _add_up(replace(faces, traction=traction, weight=weight), np.zeros(len(bounding), dtype=np.int64), 1, least)
+    acting = outer[faces.node]
+    seen = replace(
+        faces, traction=np.where(acting, faces.traction, 0.0),
+        weight=np.where(acting | (faces.bounding & (faces.known != 0)), faces.weight, 0.0),
+    )
+    sums = _add_up(seen, np.zeros(len(of), dtype=np.int64), 1, least)
+    bodies = _add_up(faces, of, len(problem.mesh.region_names), least, middle=complex(sums.middle[0]))
+    sums = replace(
+        sums, force=sums.force - carried_weight, forces=bodies.forces.max(keepdims=True),
+        moments=bodies.moments.max(keepdims=True),
+    )
     infinite = any(region.infinite for region in problem.model.regions)
     parts = [_divide(np.abs(sums.force), sums.forces), _divide(np.abs(sums.moment), sums.moments)]
     return sums, float(parts[0][0] if infinite else max(part[0] for part in parts))

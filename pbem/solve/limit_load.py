@@ -34,8 +34,10 @@ MOST_PAIRS = 20_000
 def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float | None:
     """The largest fraction of a stage in [reached, target] whose loads some tractions balance; None if unknown.
 
-    Without what pairs have lost for good, but as if none of them had slipped. Unknown for laws that do not say how much
-    they bear, models without finite bodies, and where the programme finds no balance at `reached` itself.
+    reached itself where hardly more than its loads are balanced, target where all are. Of the pairs those between
+    bodies count, without what they have lost for good, but as if none of them had slipped; what the faces of a crack
+    carry acts within one body and balances by itself. Unknown for laws that do not say how much they bear, models
+    without finite bodies, and where the programme finds no balance at `reached` itself.
     """
     solved = _solve(problem, memory, stage, reached, target)
     share = solved.share if solved else None
@@ -119,9 +121,16 @@ def _maximise(
     limit = tensile_limit(laws, memory)
     low, high = np.full(columns + 1, -np.inf), np.full(columns + 1, np.inf)
     low[-1], high[-1] = 0.0, 1.0
+    balance = sparse.hstack([matrix * (1 / problem.model.size), change[:, None]]).tocsr()
+    used = np.zeros(columns + 1, dtype=bool)
+    used[np.unique(balance.indices)] = used[-1] = True
+    # What the faces of a crack carry balances by itself, within the one body: their laws would bound nothing but the
+    # share, by their pressure.
+    bearing = used[at_n] | used[at_s]
+    used[at_n[bearing]] = used[at_s[bearing]] = True
     # Without pressure parted faces carry nothing; with it, what it gives.
-    own = ~(laws.bonded | laws.follows | laws.parted)
-    parted = np.flatnonzero(laws.parted)
+    own = bearing & ~(laws.bonded | laws.follows | laws.parted)
+    parted = np.flatnonzero(bearing & laws.parted)
     count, last = len(own), np.full(len(own), columns)
     pair = np.arange(count)
 
@@ -140,9 +149,6 @@ def _maximise(
     most = np.concatenate([values[own] for _, values in bounds])
     low[at_s[parted]] = high[at_s[parted]] = 0.0
     fixed = build([(one, at_n), (rise, last)])[parted]
-    balance = sparse.hstack([matrix * (1 / problem.model.size), change[:, None]]).tocsr()
-    used = np.zeros(columns + 1, dtype=bool)
-    used[np.unique(balance.indices)] = used[-1] = True
     # What is left may grow with the loads.
     spare = BALANCED * np.abs(constant).max()
     left = BALANCED * sparse.csr_matrix(([np.abs(change).max()] * len(change), (np.arange(len(change)), [columns] *

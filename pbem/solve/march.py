@@ -26,6 +26,8 @@ from pbem.solve.tangent import AnyTangent
 NEAR = 0.02
 # Of what forces in the contacts could still balance, a step takes this part.
 SAFE = 0.97
+# The end of what is said of a limit load.
+BEYOND = "prescribe a displacement in place of the load to go beyond"
 
 
 @dataclass(frozen=True)
@@ -59,10 +61,10 @@ class Ceiling:
     def is_reached(self, reached: float, target: float, least: float) -> bool:
         """Whether hardly anything is left between what was reached and what cannot be.
 
-        Beyond a fraction that failed in some other way is a limit load only if there is one: where forces balance less
-        than the whole, friction can bear less than they, as bodies part and slip where they are loaded most.
+        A search that fails further below, where bodies part and slip where they are loaded most, says nothing of the
+        loads: its own reason is told in the end, whatever the steps.
         """
-        lowest = min(self.balanced, self.free, self.failed if self.balanced < np.inf else np.inf)
+        lowest = min(self.balanced, self.free)
         return lowest <= target and lowest - reached < max(least, NEAR * lowest)
 
     def lower(self, target: float, balanced: float, error: ConvergenceError) -> Ceiling:
@@ -215,7 +217,7 @@ def _advance(
                 raise _end_at_limit(problem, stage, reached, ceiling, error) from error
             half = SAFE * (balanced - reached) if balanced < target else 0.5 * (target - reached)
             if half < least:
-                raise _end_march(problem, stage, reached, target, error) from error
+                raise _end_march(problem, memory, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
             target = reached + half
 
@@ -255,13 +257,15 @@ def _end_at_limit(
     known = error.reason in ("free motion", "limit load")
     why = f"at {ceiling.tried:.6g} {error.detail if known else 'no modes of the contacts were found that settle'}"
     if ceiling.balanced < np.inf:
-        most = f"no forces that the contacts can carry balance the loads beyond {ceiling.balanced:.6g}"
-        why = f"{why}; up to {ceiling.balanced:.6g} some could" if error.reason == "limit load" else f"{most}; {why}"
+        some = f"{why}; up to {ceiling.balanced:.6g} some could"
+        why = some if error.reason == "limit load" else f"{_describe_bound(ceiling.balanced)}; {why}"
     return ConvergenceError(
-        "limit load",
-        f"limit load reached at fraction {reached:.6g} of stage {name!r}: {why}, or prescribe a displacement in place "
-        "of the load",
+        "limit load", f"limit load reached at fraction {reached:.6g} of stage {name!r}: {why}; {BEYOND}"
     )
+
+
+def _describe_bound(balanced: float) -> str:
+    return f"no forces that the contacts can carry balance the loads beyond {balanced:.6g}"
 
 
 def _end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceError) -> ConvergenceError:
@@ -274,7 +278,7 @@ def _end_at_rest(problem: Problem, stage: int, target: float, error: Convergence
 
 
 def _end_march(
-    problem: Problem, stage: int, reached: float, target: float, error: ConvergenceError
+    problem: Problem, memory: Memory, stage: int, reached: float, target: float, error: ConvergenceError
 ) -> ConvergenceError:
     """The error of a step that is as small as allowed.
 
@@ -285,12 +289,15 @@ def _end_march(
         return ConvergenceError(
             "limit load",
             f"limit load reached at fraction {reached:.6g} of stage {name!r}, no equilibrium at {target:.6g}: there "
-            f"{error.detail}, or prescribe a displacement in place of the load",
+            f"{error.detail}; {BEYOND}",
         )
+    # Of the whole stage: whether a try went beyond the bound depends on the steps.
+    balanced = _find_balanced(problem, memory, stage, reached, 1.0)
+    bound = f"; {_describe_bound(balanced)}" if balanced < 1.0 else ""
     return ConvergenceError(
         error.reason,
         f"stage {name!r} stopped at the fraction {reached:.6g}; the step to {target:.6g} failed and is the "
-        f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}",
+        f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}{bound}",
     )
 
 

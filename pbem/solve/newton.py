@@ -84,7 +84,8 @@ def solve_step(
     when the modes of all other pairs have settled. Where groups of a crack network that settle by themselves lead to
     modes that do not, the search begins anew without that. All decisions are taken by the first rank.
     Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
-    "singular tangent", "linear solver".
+    "singular tangent", "linear solver"; and what `refuse` answers, asked now and then with the memory as it is by then:
+    "limit load" in a march, where nothing can balance the loads with the bonds that are left.
     """
     iterations: list[Iteration] = []
     if is_nearby(tangent) and not is_one_group(problem.mesh) and find_linear(problem.laws).all():

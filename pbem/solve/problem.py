@@ -24,7 +24,7 @@ from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.mesh.numbering import number_components, split_components
 from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
-from pbem.model.support import FreeMotion
+from pbem.model.support import FreeMotion, find_plane_translations
 from pbem.parallel import gather_parts, norm_of_parts
 from pbem.solve.groups import Group
 
@@ -87,6 +87,11 @@ class Problem:
     def cut_parts(self) -> Integer:
         """Numbers of the parts that share their region with others."""
         return np.flatnonzero(self.parts.cut)
+
+    @cached_property
+    def plane_translations(self) -> tuple[FreeMotion, ...]:
+        """Translations of an infinite region that no prescribed displacement and no spring holds."""
+        return find_plane_translations(self.model)
 
     def find_support(self, modes: ModeState) -> Support:
         """What holds the bodies in given modes; remembered, as modes are asked of several times."""

@@ -64,12 +64,14 @@ class Balance:
     """What is left over on r regions.
 
     resultant (r, 3): force along x and y (stress times length) and moment about the region's centre, the mean of its
-    boundary. relative (r,): the larger of force and moment, to the sums of their parts without signs; of infinite
-    regions, which may carry a moment, the force. carried (r,): as relative, of what the acting anchors carry; 0
-    without any.
+    boundary; of an infinite region less the weight that it carries. relative (r,): the larger of force and moment, to
+    the sums without signs of all that acts: tractions, those of both faces of cracks, and those in balance with weight
+    and in-situ stress; of infinite regions, which may carry a moment, the force. carried (r,): as relative, of what the
+    acting anchors carry; 0 without any.
     weight (r,): the sum of forces without signs, to that of the region with the most.
     part_resultant (p, 3), part_relative, part_weight (p,): the same of the parts into which cracks cut regions; none
-    where they do not. whole (3,), whole_relative: of all that acts on the model from outside, about its middle.
+    where they do not. whole (3,), whole_relative: of all that acts on the model from outside, about its middle, to the
+    sums of the body on which most acts.
     """
 
     resultant: NDArray[np.float64]

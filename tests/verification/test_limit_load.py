@@ -61,6 +61,24 @@ def test_the_push_at_which_a_block_topples() -> None:
     assert find(write_pushed_block(1.5, {"friction": 3.0, "cohesion": 9.0, "tensile_strength": 2.0})) == 1.0
 
 
+CRACKED = BLOCKS | {
+    "curves": BLOCKS["curves"] | {"c": {"points": [[0.8, 1.4], [1.3, 1.6]], "elements": 4}},
+    "regions": BLOCKS["regions"] | {"upper": BLOCKS["regions"]["upper"] | {"cracks": ["c"]}},
+}
+
+
+@pytest.mark.parametrize("law", ["coulomb", "open"])
+def test_what_the_faces_of_a_crack_carry_bounds_no_load(law: str) -> None:
+    # A fluid in the crack, more than the block bears and from nothing on in the same stage, balances by itself.
+    crack = {"law": law} if law == "open" else {"law": law, "friction": 0.5}
+    stage = {"name": "press", "steps": 1, "boundary": {"top": {"tx": 0.0, "ty": -1.0}}}
+    push = {"name": "push", "steps": 1, "boundary": {"top": {"tx": 0.7, "ty": -1.0}}}
+    push["interfaces"] = {"c": {"pressure": 3.0}}
+    both = {"joint": {"law": "coulomb", "friction": 0.25}, "c": crack}
+    text = write_case(CRACKED | {"interfaces": both, "stages": [stage, push]})
+    assert find(text) == pytest.approx(0.25 / 0.7, rel=1e-2)
+
+
 def test_a_run_comes_to_its_limit_load_in_a_few_steps() -> None:
     listener = Listener()
     told = r"limit load reached at fraction 0\.3[45].*translation along x"
@@ -82,6 +100,34 @@ def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: 
     with pytest.raises(ConvergenceError) as caught:
         next(march.march(assembled, Listener(), start))
     assert caught.value.reason == "mode cycle"
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_a_search_that_fails_far_below_the_bound_keeps_its_reason(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Friction bears 0.25 of 0.7; the search is made to fail at 0.2 and above.
+    def fail(*arguments: object) -> object:
+        if listener.target > 0.2:
+            raise ConvergenceError("mode cycle", "as it is made to")
+        return solve(*arguments)  # type: ignore[arg-type]
+
+    class Told(Listener):
+        target = 0.0
+
+        def start_step(self, stage: int, reached: float, target: float) -> None:
+            super().start_step(stage, reached, target)
+            self.target = target if stage else 0.0
+
+    solve, listener = march.solve_step, Told()
+    monkeypatch.setattr(march, "solve_step", fail)
+    with pytest.raises(ConvergenceError, match=r"as it is made to; no forces .* beyond 0\.35") as caught:
+        run(write_pushed_block(0.7, {"friction": 0.25}).replace("steps = 2", f"steps = {steps}"), listener)
+    assert caught.value.reason == "mode cycle"
+    assert "fraction 0.2 of" in str(caught.value) or "fraction 0.199" in str(caught.value)
+
+
+def test_advice_on_a_limit_load_is_a_clause_of_its_own() -> None:
+    with pytest.raises(ConvergenceError, match=r"; prescribe a displacement in place of the load to go beyond$"):
+        run(write_pushed_block(0.7, {"friction": 0.25}))
 
 
 BONDED = {"friction": 0.25, "cohesion": 0.3, "tensile_strength": 0.5, "cohesion_lost": True}
@@ -127,6 +173,7 @@ def test_what_is_known_to_fail_is_not_tried_again_before_it_is_near() -> None:
     limited = march.Ceiling().lower(1.0, 0.4, fails)
     assert 0.39 < limited.choose(0.1, 1.0, 1e-4) < 0.4
     assert not limited.is_reached(0.3, 1.0, 1e-4) and limited.is_reached(0.395, 1.0, 1e-4)
-    # Tries that fail are a limit load only where there is one.
+    # Tries that fail are no limit load, but where what forces balance is near itself.
     assert not ceiling.is_reached(0.499, 1.0, 1e-4)
-    assert limited.lower(0.35, 0.35, fails).is_reached(0.345, 1.0, 1e-4)
+    assert not limited.lower(0.35, 0.35, fails).is_reached(0.349, 1.0, 1e-4)
+    assert limited.lower(0.398, 0.398, fails).is_reached(0.395, 1.0, 1e-4)

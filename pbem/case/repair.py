@@ -64,7 +64,7 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
         for needed in NEEDED[own] if own else ():
             raw[table][loc[1]].setdefault(needed, _LAW_STAND_IN)
         return True
-    if table in ("interfaces", "contacts") and raw[table][loc[1]].get("law") in NEEDED:
+    if table in ("interfaces", "contacts") and raw[table][loc[1]].get("law") in list(NEEDED):
         law, key = raw[table][loc[1]], key.replace("friction_angle", "friction")
         if key not in known:  # it may be one of them
             for needed in NEEDED[law["law"]]:

@@ -22,8 +22,6 @@ from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, propose_modes
 from pbem.contact.subset import settle_subset
-from pbem.errors import ConvergenceError
-from pbem.parallel import do_on_first
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.tangent import AnyTangent, Solved
@@ -68,7 +66,7 @@ def run_cascade(
     scale = problem.traction_scale
     start = memory.lose(broken)
     subset = take_subset(problem.laws, start, load.pressure, modes, pairs)
-    lost, own = do_on_first(problem.comm, ConvergenceError, lambda: _follow(subset, response, scale, floor))
+    lost, own = problem.decide(lambda: _follow(subset, response, scale, floor))
     broken[pairs] = lost
     broken = broken[leader]
     if own is None:

@@ -231,7 +231,7 @@ def _refuse(problem: Problem, memory: Memory, stage: int, target: float, now: Me
 
     As the first rank finds it.
     """
-    possible = do_on_first(problem.comm, ConvergenceError, lambda: can_balance(problem, now, stage, target))
+    possible = problem.decide(lambda: can_balance(problem, now, stage, target))
     if possible is not False:
         return None
     if np.array_equal(memory.broken, now.broken):
@@ -243,9 +243,7 @@ def _refuse(problem: Problem, memory: Memory, stage: int, target: float, now: Me
 
 def _find_balanced(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float:
     """The largest fraction up to the target that forces in the contacts could balance, as the first rank finds it."""
-    found = do_on_first(
-        problem.comm, ConvergenceError, lambda: find_balanced_fraction(problem, memory, stage, reached, target)
-    )
+    found = problem.decide(lambda: find_balanced_fraction(problem, memory, stage, reached, target))
     return target if found is None else found
 
 

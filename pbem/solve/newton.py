@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
-from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
@@ -28,7 +27,7 @@ from pbem.contact.modes import (
 )
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError
-from pbem.parallel import broadcast, do_on_first
+from pbem.parallel import broadcast
 from pbem.solve.cascade import run_cascade
 from pbem.solve.groups import is_one_group
 from pbem.solve.hold import Hold
@@ -119,7 +118,7 @@ def _search_modes(
     laws = problem.laws
     hold = Hold(problem)
     comm = problem.comm
-    modes = do_on_first(comm, ConvergenceError, lambda: follow_leaders(
+    modes = problem.decide(lambda: follow_leaders(
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
     while True:
@@ -135,7 +134,7 @@ def _search_modes(
                 solved = tangent.check(solved, constraints, load, law)
                 outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
         except ConvergenceError:
-            do_on_first(comm, ConvergenceError, lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
         fails, cascade = outcome.settled and bool(outcome.failing.any()), None
@@ -154,14 +153,13 @@ def _search_modes(
         if driven:
             search.restart()
         elif outcome.settled and not fails:
-            do_on_first(comm, ConvergenceError, lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
         if refused:
-            moves = do_on_first(comm, ConvergenceError, lambda now=proposal.modes: (  # type: ignore[misc]
-                hold.describe_collapse(now)))
+            moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
             raise ConvergenceError(refused.reason, refused.detail + moves)
         search.note(proposal, outcome.law_error)
         if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
@@ -179,8 +177,7 @@ def _search_modes(
             if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
                 raise _end(hold, "mode cycle", proposal, search)
         slipped, former = plastic_slip(laws, pairs) - memory.slip, modes
-        modes = do_on_first(
-            comm, ConvergenceError,
+        modes = problem.decide(
             lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
@@ -190,7 +187,7 @@ def _search_modes(
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
     """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
-    return do_on_first(hold.problem.comm, ConvergenceError, lambda: (
+    return hold.problem.decide(lambda: (
         hold.describe_free_motion(proposal.modes)
         or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))
 
@@ -237,7 +234,7 @@ def _pivot(
             lambda own: not hold.find_free(complete(own)),
         )
 
-    found: Settled = do_on_first(problem.comm, ConvergenceError, settle)
+    found: Settled = problem.decide(settle)
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
     if search.conclude(found) and not broadcast(problem.comm, len(hold.pairs)):
         raise _end(hold, "no admissible modes", search.proposal, search)
@@ -275,21 +272,18 @@ class _Outcome:
 def _judge(
     problem: Problem, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved, caution: Caution
 ) -> _Outcome:
-    """By the first rank: another could come to other modes where rounding decides."""
-
     laws = problem.laws
 
     def judge() -> _Outcome:
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
         floor = _find_floor(problem, solved)
-        with asked_by_one_rank(group.law for group in laws.strengths):
-            proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
-            law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
-            failing = find_failures(laws, pairs, memory, load.pressure, floor)
+        proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
+        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
+        failing = find_failures(laws, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
         return _Outcome(pairs, proposal, settled, failing, law_error)
 
-    return do_on_first(problem.comm, ConvergenceError, judge)
+    return problem.decide(judge)
 
 
 def _record(number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:

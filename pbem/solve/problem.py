@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -16,21 +17,24 @@ from pbem.bem.operator import Block, RowOperator
 from pbem.bem.pointwise import PointRows
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap, build_constraints
+from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.laws import ModeState, PairLaws, stick_creeping
 from pbem.contact.loads import Load, OuterNodes, evaluate_load
 from pbem.contact.modes import Linearisation
 from pbem.contact.support import Support, find_support, find_ties
+from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.mesh.numbering import number_components, split_components
 from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
 from pbem.model.support import FreeMotion, find_plane_translations
-from pbem.parallel import gather_parts, norm_of_parts
+from pbem.parallel import do_on_first, gather_parts, norm_of_parts
 from pbem.solve.groups import Group
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Complex = NDArray[np.complex128]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,17 @@ class Problem:
     @property
     def unknowns(self) -> int:
         return 2 * self.mesh.nodes
+
+    def decide(self, action: Callable[[], T]) -> T:
+        """What the first rank finds, on all ranks: another could come to other modes where rounding decides.
+
+        What it asks of the friction laws is asked by it alone. Raises its ConvergenceError on all ranks.
+        """
+        def ask() -> T:
+            with asked_by_one_rank(group.law for group in self.laws.strengths):
+                return action()
+
+        return do_on_first(self.comm, ConvergenceError, ask)
 
     @cached_property
     def all_crack_nodes(self) -> Integer:

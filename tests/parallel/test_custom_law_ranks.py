@@ -6,8 +6,10 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import pbem
 from pbem.results.reader import open_results
@@ -83,3 +85,26 @@ def test_a_law_that_is_right_runs_on_two_ranks(folder: Path) -> None:
     done = launch(2, "run", "case.toml", "--quiet", cwd=folder)
     assert done.returncode == 0, done.stderr
     assert open_results(folder / "case.h5").status == "finished"
+
+
+def read_broken(path: Path) -> NDArray[np.bool_]:
+    with h5py.File(path) as file:
+        return np.asarray(file["all/contact/broken"][()], dtype=bool)
+
+
+def test_bonds_of_a_custom_law_fail_alike_on_two_ranks(tmp_path: Path) -> None:
+    # The cascade and the pivoting ask the law on one rank alone.
+    text = CASE.replace("friction = 0.2 }", "friction = 0.2, c = 1.3 }\ncohesion_lost = true\ntensile_strength = 0.5")
+    strength = "Strength(np.maximum(c - friction * p_n, 0), np.where(c > friction * p_n, -friction, 0.0), 0 * p_n)"
+    law = LAW.replace("friction):", "friction, c):").replace("CHANGE", f"return {strength}")
+    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "law.py").write_text(law)
+    one = pbem.run(tmp_path / "case.toml", tmp_path / "one.h5")
+    broken = read_broken(tmp_path / "one.h5")
+    lost = broken.sum(axis=1)
+    assert lost[0] < lost[-1], lost
+    done = launch(2, "run", "case.toml", "-o", "two.h5", "--quiet", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    two = open_results(tmp_path / "two.h5")
+    np.testing.assert_array_equal(read_broken(tmp_path / "two.h5"), broken)
+    np.testing.assert_allclose(two.traction, one.traction, rtol=0, atol=1e-9 * np.abs(one.traction).max())

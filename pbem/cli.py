@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import difflib
 import io
-import math
 import os
 import sys
 import time
@@ -26,7 +25,7 @@ from pbem.errors import (
     StorageError,
     printable,
 )
-from pbem.make import add_make_commands, make
+from pbem.make import add_make_commands, make, read_finite
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
 from pbem.version import __version__
 
@@ -186,7 +185,7 @@ def make_parser() -> argparse.ArgumentParser:
     plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
     plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
-    plot.add_argument("--magnify", type=_read_finite, default=None, metavar="X", help="scale of the displacements")
+    plot.add_argument("--magnify", type=read_finite, default=None, metavar="X", help="scale of the displacements")
     pages = add("help", _help, "print a page of the documentation, or the list of its topics")
     pages.add_argument("topic", nargs="*", metavar="TOPIC", help="name of a page, or of a command")
     return parser
@@ -205,13 +204,6 @@ def _help(options: argparse.Namespace) -> int:
         _say(f"pbem help: there is no topic '{words}'{hint} The topics are:\n\n{list_topics()}", 0)
         return WRONG_INPUT
     return 0
-
-
-def _read_finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text}; expected a finite number")
-    return value
 
 
 def _make(options: argparse.Namespace) -> int:

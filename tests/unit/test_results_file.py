@@ -232,7 +232,7 @@ def test_what_is_no_result_file_is_refused(tmp_path: Path) -> None:
         with pytest.raises(ResultFileError, match=said):
             open_results(tmp_path / f"{name}.h5")
     for name in ("cut", "text", "other"):
-        with pytest.raises(ResultFileError, match=r"is not a result file|was cut off"):
+        with pytest.raises(ResultFileError, match=r"is not a result file|was cut off|is not an HDF5 file"):
             ResultWriter.resume(tmp_path / f"{name}.h5", MODEL, MESH, 1, "3.18.5")
     with pytest.raises(ResultFileError, match="no such file"):
         open_results(tmp_path / "none.h5")

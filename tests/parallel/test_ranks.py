@@ -74,6 +74,9 @@ def measure_scales(results: dict[str, Array]) -> dict[str, float]:
         kind = find_kind(name)
         if kind:
             scales[kind] = max(scales.get(kind, 0.0), float(np.nanmax(np.abs(values), initial=0.0)))
+    # Forces that cancel, as on the two faces of a crack, are known to rounding of what they are made of.
+    size = float(np.ptp(results["nodes/position"], axis=0).max())
+    scales["force"] = max(scales.get("force", 0.0), size * scales.get("stress", 0.0))
     return scales
 
 

@@ -168,10 +168,10 @@ def _solve(
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     writer = do_on_first(world, PbemError, open_writer, share=False)
-    if model.analysis.accuracy is not None:
-        do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
-    last: Step | None = broadcast(world, writer.last_step if writer else None)
-    try:
+    try:  # from here on whatever happens has to leave a closed file
+        if model.analysis.accuracy is not None:
+            do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
+        last: Step | None = broadcast(world, writer.last_step if writer else None)
         signals.at_once = world.size == 1
         problem = assemble_problem(model, mesh, world)
         signals.at_once = False

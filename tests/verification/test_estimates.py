@@ -14,10 +14,11 @@ import pbem
 from pbem import driver
 from pbem.cli import main
 from pbem.driver import make_estimator
-from pbem.errors import CaseError, ConvergenceError, StopError
+from pbem.errors import CaseError, ConvergenceError, StopError, StorageError
 from pbem.model.model import Model
 from pbem.results import accuracy as limits
 from pbem.results.reader import open_results
+from pbem.results.writer import ResultWriter
 from pbem.solve import second
 from pbem.solve.step import Step
 from tests.cli.cli_sample import BLOCKS
@@ -226,6 +227,27 @@ def test_a_pass_without_memory_leaves_the_file_of_the_former_one(
         pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
     results = open_results(tmp_path / "block.h5")
     assert results.status == "stopped" and len(results.steps) == 2
+
+
+@pytest.mark.parametrize("failing", [1, 2])
+def test_a_pass_whose_number_finds_no_room_leaves_a_closed_file(
+    failing: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    note = ResultWriter.note_pass
+
+    def note_or_fail(writer: ResultWriter, number: int, first_unknowns: int) -> None:
+        if number == failing:
+            raise StorageError(str(tmp_path / "block.h5"), "no room for a note")
+        note(writer, number, first_unknowns)
+
+    monkeypatch.setattr(ResultWriter, "note_pass", note_or_fail)
+    (tmp_path / "block.toml").write_text(BLOCK.format(accuracy=1e-4))
+    with pytest.raises(StorageError, match="no room for a note"):
+        pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+    results = open_results(tmp_path / "block.h5")
+    assert results.status in ("failed", "stopped") and "no room" in results.failure
+    assert len(results.steps) == 2 * (failing - 1)
+    assert not list(tmp_path.glob(".block.h5*"))
 
 
 def test_a_pass_that_is_stopped_can_be_gone_on_with(

@@ -14,7 +14,7 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.choice import make_dense_tangent
-from pbem.solve.linear import PREFIX, PETSc, petsc_options
+from pbem.solve.linear import PREFIX, PETSc, pass_over_divergence, petsc_options
 from pbem.solve.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
@@ -81,6 +81,7 @@ class KrylovTangent:
                 'leave pc_type out, or ask for operator = "dense"',
             )
         self._solver = solver
+        self._tolerance = float(solver.getTolerances()[0])  # the user's ksp_rtol, if one is given
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
         """Solve B (M x + m) = 0 for a constraint map.
@@ -103,11 +104,11 @@ class KrylovTangent:
         scale = problem.measure(forced)
         self._left.setArray(begin)
         self._right.setArray(-forced)
-        self._solver.setTolerances(rtol=SAFETY * tolerance)
+        self._solver.setTolerances(rtol=self._tolerance)
         residual, count = np.inf, 0
         for _ in range(MOST_ATTEMPTS):
             before = residual
-            self._solver.solve(self._right, self._left)
+            self._run_gmres()
             self.iterations.append(int(self._solver.getIterationNumber()))
             count += self.iterations[-1]
             own = np.array(self._left.getArray())
@@ -137,8 +138,14 @@ class KrylovTangent:
         raise ConvergenceError(
             "linear solver",
             f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"
-            '; try operator = "dense"',
+            + (f"; the option ksp_rtol = {self._tolerance:g} lets it end there"
+               if self._tolerance > SAFETY * tolerance else '; try operator = "dense"'),
         )
+
+    def _run_gmres(self) -> None:
+        """Improve the left vector for the right one; whether it is good enough is measured by the callers."""
+        with pass_over_divergence():
+            self._solver.solve(self._right, self._left)
 
     def _widen(self) -> bool:
         """Let the groups of the preconditioner take in more around them; whether there was more to take."""
@@ -175,7 +182,7 @@ class KrylovTangent:
         for k in range(states.shape[1]):
             self._right.setArray(-self._apply(np.asarray(states[:, k])))
             self._left.set(0.0)
-            self._solver.solve(self._right, self._left)
+            self._run_gmres()
             result[:, k] = self.gather(np.array(self._left.getArray()))[unknowns]
         self._solver.setTolerances(rtol=usual[0])
         return result
@@ -235,10 +242,10 @@ class KrylovTangent:
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See AnyTangent; without the anchors that the constraint map releases."""
         self.constraints = constraints
-        self._solver.setTolerances(rtol=SAFETY * self.problem.model.solver.newton_tolerance)
+        self._solver.setTolerances(rtol=self._tolerance)
         self._left.set(0.0)
         self._right.setArray(forces)
-        self._solver.solve(self._right, self._left)
+        self._run_gmres()
         return self.gather(np.array(self._left.getArray()))
 
     def destroy(self) -> None:

@@ -17,6 +17,7 @@ from pbem.results.reader import Results
 from pbem.solve import groups
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.linear import petsc_options
 from pbem.solve.step import SilentReporter, Step
 from tests.cli.cli_sample import BLOCKS
 from tests.identities.solving import linearise_pairs
@@ -153,6 +154,43 @@ def test_factors_of_the_hierarchical_operator_are_refused(tmp_path: Path) -> Non
     case.write_text(CRACKS)
     with pytest.raises(pbem.ConvergenceError, match="'lu' needs a stored matrix"):
         pbem.run(case, tmp_path / "run.h5", operator="hierarchical", petsc={"pc_type": "lu"})
+
+
+def test_the_users_tolerance_of_gmres_is_taken(many_groups: None) -> None:
+    model = read(CRACKS)
+    problem = assemble_problem(model, generate_mesh(model), world)
+    load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem)
+    constraints = problem.constrain(law, load)
+    forces = -problem.apply(constraints.offset, load)
+    counts = []
+    for given, least, most in ((None, 0.0, 1e-9), ("1e-2", 1e-5, 0.1), ("1e-12", 0.0, 1e-11)):
+        with petsc_options({} if given is None else {"ksp_rtol": given}):
+            tangent = make_tangent(problem)
+        assert isinstance(tangent, KrylovTangent)
+        if given == "1e-2":  # Newton's method wants more
+            with pytest.raises(pbem.ConvergenceError, match=r"asked: 1.0e-09\); the option ksp_rtol = 0.01"):
+                tangent.solve(constraints, load, law)
+        else:
+            assert tangent.solve(constraints, load, law).residual <= model.solver.newton_tolerance
+        counts.append(tangent.iterations[0])
+        found = tangent.solve_forces(constraints, load, law, forces)
+        assert least <= np.linalg.norm(tangent.multiply(found) - forces) / np.linalg.norm(forces) < most
+        tangent.destroy()
+    assert counts[1] < counts[0] < counts[2]
+
+
+@pytest.mark.parametrize("limit", ["1", "40"])
+def test_gmres_that_may_raise_an_error_says_what_it_reached(limit: str, many_groups: None, tmp_path: Path) -> None:
+    """With ksp_error_if_not_converged PETSc raises one of its own, which tells nothing of the model."""
+    (tmp_path / "case.toml").write_text(CRACKS)
+    petsc = {"ksp_error_if_not_converged": "1", "ksp_max_it": limit}
+    if limit == "40":
+        results = pbem.run(tmp_path / "case.toml", tmp_path / "run.h5", operator="hierarchical", petsc=petsc)
+        assert results.status == "finished"
+        return
+    with pytest.raises(pbem.ConvergenceError, match="GMRES reached a relative residual") as caught:
+        pbem.run(tmp_path / "case.toml", tmp_path / "run.h5", operator="hierarchical", petsc=petsc)
+    assert caught.value.reason == "linear solver"
 
 
 def test_a_run_is_resumed_with_either_operator(many_groups: None, tmp_path: Path) -> None:

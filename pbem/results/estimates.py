@@ -18,6 +18,7 @@ from pbem.solve.beside import Beside
 from pbem.solve.step import ContactState, Step
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 # The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
 # 5; with the order lowered by one. Measured over the problems with known answers by scripts/bench_estimate.py.
@@ -25,6 +26,8 @@ MERGED = (1.0, 3.0, 5.0, 5.0)
 LOWERED = 5.0
 # Of the largest displacement: jumps and factors below are rounding, and have no relative error.
 ROUNDING = 1e-8
+# Of the modulus times the largest displacement over the model's size: no traction is known better.
+DIGITS = 1e-13
 # Differences of K pass through zero by chance; of the relative error of a crack's jumps this part at least is K's.
 LEAST_FACTOR_ERROR = 0.005
 # Jumps below this part of what the tractions strain over an interface are none: where faces stay together as they are
@@ -59,7 +62,8 @@ class Scales:
     """The largest values so far.
 
     reactions: magnitude; jumps: on any interface, at least LEAST_JUMP; tractions: root of their mean square on an
-    interface; peak: traction of a pair; factors: K; displacement.
+    interface; peak: traction of a pair; factors: K; displacement; strained: modulus times strain of a region, or what
+    counts as much (see _measure_strained), of which a part ROUNDING is rounding.
     """
 
     reactions: float = 0.0
@@ -68,6 +72,7 @@ class Scales:
     peak: float = 0.0
     factors: float = 0.0
     displacement: float = 0.0
+    strained: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,23 @@ class Comparison:
             peak=float(np.sqrt(_largest(contact.traction_n**2 + contact.traction_s**2))),
             factors=max(_largest(each) for each in factors),
             displacement=_largest(np.abs(step.displacement)),
+            strained=self._measure_strained(step),
         )
+
+    def _measure_strained(self, step: Step) -> float:
+        """The largest modulus times strain, stress, of any region, each with its own modulus and its own displacement.
+
+        A stiff region goes along with a soft one: its strain is what is left of its displacement without the motion as
+        a rigid body. Where all of it is such a motion, the softest modulus counts.
+        """
+        model, mesh, moved = self._model, self._mesh, step.displacement[: self._mesh.nodes]
+        moduli = np.array([region.material.plane_modulus for region in model.regions])
+        largest = _largest(np.abs(step.displacement))
+        strained = max(moduli.min(), DIGITS / ROUNDING * moduli.max()) * largest
+        for number, modulus in enumerate(moduli):
+            own = mesh.node_region == number
+            strained = max(strained, modulus * _measure_distortion(mesh.position[own], moved[own]))
+        return float(strained / model.size)
 
     def compare(self, step: Step, second: Step | None) -> tuple[Estimates, Relative]:
         """The estimated errors of a step; second: the same step of the second solution, None if that has failed."""
@@ -224,26 +245,23 @@ class Comparison:
 
     def relate_violations(self, violations: Violations) -> Violations:
         """As parts of the largest jump (penetration) and of the largest traction so far; 0 where these are rounding."""
-        scales, modulus = self.scales, max(region.material.plane_modulus for region in self._model.regions)
+        scales = self.scales
         jump = scales.jumps if scales.jumps > ROUNDING * scales.displacement else np.inf
-        least = ROUNDING * scales.displacement / self._model.size * modulus
-        peak = scales.peak if scales.peak > least else np.inf
+        peak = scales.peak if scales.peak > ROUNDING * scales.strained else np.inf
         return Violations(violations.penetration / jump, violations.tension / peak, violations.cone / peak)
 
     def _relate(self, estimates: Estimates) -> Relative:
-        scales, model = self.scales, self._model
-        moved = scales.displacement
-        modulus = max(region.material.plane_modulus for region in model.regions)
-        strain = ROUNDING * moved / model.size
+        scales, size = self.scales, self._model.size
+        moved, rounding = scales.displacement, ROUNDING * scales.strained
         return Relative(
-            reactions=_divide(_worst(estimates.reactions), scales.reactions, strain * modulus * model.size),
+            reactions=_divide(_worst(estimates.reactions), scales.reactions, rounding * size),
             jumps=_divide(max(_worst(estimates.opening), _worst(estimates.slip), key=_nan_first), scales.jumps,
                           ROUNDING * moved),
             tractions=_divide(max(_worst(estimates.traction_n), _worst(estimates.traction_s), key=_nan_first),
-                              scales.tractions, strain * modulus),
+                              scales.tractions, rounding),
             factors=_divide(max(_worst_known(estimates.KI, self._rules.is_tip),
                                 _worst_known(estimates.KII, self._rules.is_tip), key=_nan_first),
-                            scales.factors, strain * modulus * np.sqrt(model.size)),
+                            scales.factors, rounding * np.sqrt(size)),
             displacement=_divide(estimates.displacement, moved, 0.0),
         )  # fmt: skip
 
@@ -266,6 +284,15 @@ def to_rows(estimates: Estimates, relative: Relative, parts: Violations) -> dict
     rows = {name: value for name, value in vars(parts).items()}
     rows |= {name: np.asarray(value) for name, value in vars(estimates).items()}
     return rows | {f"relative_{name}": np.asarray(value) for name, value in vars(relative).items()}
+
+
+def _measure_distortion(position: Complex, displacement: Complex) -> float:
+    """The largest displacement (k,) that is left of the nearest motion as a rigid body, small rotation included."""
+    if not len(position):
+        return 0.0
+    arm, left = position - position.mean(), displacement - displacement.mean()
+    turn = (np.conj(arm) * left).imag.sum() / max((np.abs(arm) ** 2).sum(), np.finfo(float).tiny)
+    return _largest(np.abs(left - 1j * turn * arm))
 
 
 def _largest(values: NDArray[np.floating]) -> float:

@@ -339,3 +339,50 @@ def test_wrong_accuracies_are_refused(line: str, fault: str, tmp_path: Path) -> 
     (tmp_path / "block.toml").write_text(text)
     with pytest.raises(CaseError, match=fault):
         pbem.run(tmp_path / "block.toml", tmp_path / "block.h5")
+
+
+STACK = """
+materials.soft = {{ young = {soft}, poisson = 0.3 }}
+materials.stiff = {{ young = {stiff}, poisson = 0.3 }}
+[curves]
+b = {{ points = [[0, 0], [2, 0]], elements = 4 }}
+r1 = {{ points = [[2, 0], [2, 1]], elements = 3 }}
+s = {{ points = [[0, 1], [2, 1]], elements = 5 }}
+l1 = {{ points = [[0, 1], [0, 0]], elements = 3 }}
+r2 = {{ points = [[2, 1], [2, 2]], elements = 3 }}
+t = {{ points = [[2, 2], [0, 2]], elements = 4 }}
+l2 = {{ points = [[0, 2], [0, 1]], elements = 3 }}
+[regions.below]
+material = "soft"
+boundary = ["b", "r1", "s", "l1"]
+[regions.above]
+material = "stiff"
+boundary = ["s", "r2", "t", "l2"]
+[interfaces.s]
+law = "coulomb"
+friction = 0.3
+[boundary]
+b = {{ ux = 0, uy = 0 }}
+t = {{ {load} }}
+[analysis]
+steps = 1
+"""
+
+
+def test_a_stiff_body_on_a_soft_one_is_estimated_as_any(tmp_path: Path) -> None:
+    # As the stiff body goes along with the soft one, its modulus times that displacement is no stress of the model.
+    relative = []
+    for stiff in (1e3, 1e6):
+        (tmp_path / "stack.toml").write_text(STACK.format(soft=1e-3, stiff=stiff, load="ty = -1e-5"))
+        found = pbem.run(tmp_path / "stack.toml", tmp_path / "stack.h5", force=True).errors.relative
+        relative.append([float(found[name][-1]) for name in ("reactions", "tractions", "jumps")])
+    assert min(relative[0]) > 1e-8  # the stiff body is rigid: the contrast no longer changes anything
+    np.testing.assert_allclose(relative[1], relative[0], rtol=1e-2)
+
+
+@pytest.mark.parametrize("stiff", [1e-3, 1e6])
+def test_tractions_of_rounding_have_no_relative_error(stiff: float, tmp_path: Path) -> None:
+    moved = STACK.format(soft=1e-3, stiff=stiff, load="ty = 0").replace("ux = 0, uy = 0", "ux = 0.3, uy = 0.1")
+    (tmp_path / "stack.toml").write_text(moved.replace('law = "coulomb"\nfriction = 0.3', 'law = "bonded"'))
+    found = pbem.run(tmp_path / "stack.toml", tmp_path / "stack.h5").errors.relative
+    assert all(float(found[name][-1]) == 0.0 for name in ("reactions", "tractions", "jumps"))

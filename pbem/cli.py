@@ -6,6 +6,7 @@ import argparse
 import contextlib
 import difflib
 import io
+import math
 import os
 import sys
 import time
@@ -209,8 +210,15 @@ def make_parser() -> argparse.ArgumentParser:
     plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
     plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
-    plot.add_argument("--magnify", type=float, default=None, metavar="X", help="scale of the displacements")
+    plot.add_argument("--magnify", type=_read_finite, default=None, metavar="X", help="scale of the displacements")
     return parser
+
+
+def _read_finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text}; expected a finite number")
+    return value
 
 
 def _make(options: argparse.Namespace) -> int:

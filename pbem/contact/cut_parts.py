@@ -13,7 +13,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import Parts
 from pbem.model.model import Model
 from pbem.model.rigid import GROUND, Link, find_moving_bodies
-from pbem.model.support import describe_motion
+from pbem.model.support import describe_motion, find_least_stiffness
 
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
@@ -68,7 +68,8 @@ def _link_to_ground(
             # The part without a boundary; those inside of closed cracks are held by these.
             yield int(np.flatnonzero(parts.region == number)[-1]), GROUND, np.eye(3)
     body = parts.first[mesh.node_element[outer.node]]
-    held = outer.displacement_known | (outer.stiffness > 0)
+    least = np.array([find_least_stiffness(model, region) for region in model.regions])
+    held = outer.displacement_known | (outer.stiffness > least[mesh.node_region[outer.node], None])
     groups = []
     for k in range(2):
         own = np.flatnonzero(held[:, k])

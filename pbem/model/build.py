@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,7 +35,7 @@ from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shape import shape_curves
-from pbem.model.support import find_free_motions, find_plane_translations
+from pbem.model.support import find_free_motions, find_least_stiffness, find_plane_translations
 
 # Faults shown of what one table [[generate]] made.
 MOST_FAULTS = 5
@@ -231,6 +231,13 @@ def _note_loads(model: Model) -> list[str]:
                                   "weights and in-situ stresses are zero, and so will be the results."]
 
 
+def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
+    curves = {side.curve for region in model.regions if region.name in names
+              for loop in region.loops for side in loop.sides}
+    return any(0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
+               for stiffness in condition.stiffness)
+
+
 def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults, balanced = [], []
@@ -241,7 +248,9 @@ def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
         if unbalance is None:
             balanced.append(motion.text)
             continue
-        expected = "displacement conditions, springs, or bonded or touching neighbours, that prevent it"
+        soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
+        springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
+        expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
         faults.append(case.fault(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
     notes = []
     for motion in find_plane_translations(model):

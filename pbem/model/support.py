@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pbem.case.finding import list_names
 from pbem.model.junction import format_point
-from pbem.model.model import Contact, Interface, Law, Model, Side
+from pbem.model.model import Contact, Interface, Law, Model, Region, Side
 from pbem.model.rigid import GROUND, Link, find_moving_bodies
 from pbem.model.sampling import sample_side
 from pbem.model.touching import measure_opening
@@ -23,6 +23,9 @@ Tie = Literal["both", "normal", "none"]
 TOUCHING = 1e-6
 # A distance is known to so many roundings of the largest coordinate that it was computed from.
 ROUNDINGS = 64
+# Springs softer than this part of modulus over size hold nothing: what they carry is lost in the rounding of elastic
+# equations. A block of 16 elements on springs alone is solved down to 1e-10, and its tangent is singular at 1e-11.
+LEAST_STIFFNESS = 5e-11
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,11 @@ def _frame(model: Model) -> tuple[complex, float]:
     return complex(points.mean()), model.size
 
 
+def find_least_stiffness(model: Model, region: Region) -> float:
+    """The stiffness, stress/length, above which springs on a region hold it."""
+    return LEAST_STIFFNESS * region.material.plane_modulus / model.size
+
+
 def _motions(points: NDArray[np.complex128], center: complex, scale: float) -> NDArray[np.complex128]:
     """Displacements (points x 3) of the unit motions along x, along y, and about the center."""
     return np.stack([np.ones_like(points), np.full_like(points, 1j), 1j * (points - center) / scale], axis=1)
@@ -120,7 +128,7 @@ def _link_to_ground(model: Model, center: complex, scale: float, plane_held: boo
             if condition is None:
                 continue
             held = [
-                quantity == "displacement" or stiffness > 0
+                quantity == "displacement" or stiffness > find_least_stiffness(model, region)
                 for quantity, stiffness in zip(condition.known, condition.stiffness, strict=True)
             ]
             if any(held):

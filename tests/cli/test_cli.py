@@ -167,6 +167,9 @@ def test_info_and_plot_read_a_result_file(computed: Path, capsys: Capture) -> No
     capsys.readouterr()
     assert main(["plot", "blocks.h5", "--step", "7"]) == 2
     assert "holds no load step 7; it holds: 1, 2, 3" in capsys.readouterr().err
+    for scale in ("nan", "inf", "ten"):
+        assert main(["plot", "blocks.h5", "--magnify", scale]) == 2
+        assert scale in capsys.readouterr().err
 
 
 def test_help_and_version(capsys: Capture) -> None:

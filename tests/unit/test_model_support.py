@@ -40,6 +40,22 @@ def test_side_held_along_itself_leaves_two_motions(condition: str) -> None:
     assert "translation along y of 'body'" in faults[1].found
 
 
+@pytest.mark.parametrize(("modulus", "size"), [(2000.0, 1.0), (2e9, 1e-3)])
+def test_springs_that_are_rounding_hold_nothing(modulus: float, size: float) -> None:
+    scaled = [(f"{x}, {y}", f"{x * size}, {y * size}") for x, y in ((2, 0), (2, 2), (0, 2))]
+    for part, held in ((1e-30, False), (1e-12, False), (2e-10, True)):
+        spring = f"spring = {{ kn = {part * modulus / size}, ks = {part * modulus / size} }}"
+        text = change(SQUARE, ("ux = 0.0\nuy = 0.0", spring), ("young = 2000.0", f"young = {modulus}"))
+        for old, new in scaled:
+            text = text.replace(f"[{old}]", f"[{new}]")
+        if held:
+            assert not find_free_motions(build(text))
+            continue
+        fault = find_faults(text)[0]
+        assert fault.place == "regions.body (line 11)" and "translation along y" in str(fault)
+        assert "springs stiffer than" in str(fault)
+
+
 @pytest.mark.parametrize(
     "conditions",
     [
@@ -47,7 +63,7 @@ def test_side_held_along_itself_leaves_two_motions(condition: str) -> None:
         "un = 0.0\nus = 0.0",
         "un = 0.0\n[boundary.left]\nun = 0.0",
         "uy = 0.0\n[boundary.left]\nux = 0.0",
-        "spring = { kn = 1.0, ks = 1e-9 }",
+        "spring = { kn = 1.0, ks = 1e-6 }",
         "us = 0.0\nspring = { kn = 1.0 }",
         "spring = { kn = 1.0 }\n[boundary.left]\nspring = { kn = 1.0 }",
     ],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -108,7 +110,7 @@ def test_wrong_expression_is_told(line: str, place: str, text: str) -> None:
 
 def test_turned_and_scaled_wave_closes() -> None:
     for scale, angle in ((1e-4, 0.3), (1e5, 2.0)):
-        c, s = scale * np.cos(angle), scale * np.sin(angle)
+        c, s = scale * math.cos(angle), scale * math.sin(angle)
         wave = "0.1*sin(2*pi*t)"
 
         def place(x: float, y: float, c: float = c, s: float = s) -> str:

@@ -24,13 +24,13 @@ def write_stack(path: Path, gap: float, pressed: float, turn: float = 0.0, size:
     """Three blocks of 2 x 1 on each other, with gaps between them; size: of a unit; turn: of the stack (radians)."""
 
     def place(*points: complex) -> str:
-        turned = [size * np.exp(1j * turn) * point for point in points]
+        turned = [complex(size * np.exp(1j * turn) * point) for point in points]
         return f"{{ points = {[[z.real, z.imag] for z in turned]}, elements = 4 }}"
 
     curves = {f"j{k}": place(1j * k, 2 + 1j * k) for k in range(4)}
     curves |= {f"r{k}": place(2 + 1j * k, 2 + 1j * (k + 1)) for k in range(3)}
     curves |= {f"l{k}": place(1j * (k + 1), 1j * k) for k in range(3)}
-    down = -1j * pressed * size * np.exp(1j * turn)
+    down = complex(-1j * pressed * size * np.exp(1j * turn))
     lines = ["materials.m = { young = 1000.0, poisson = 0.2 }"]
     lines += [f"curves.{name} = {text}" for name, text in curves.items()]
     for k in range(3):

@@ -23,8 +23,9 @@ Bool = NDArray[np.bool_]
 ONE_GROUP = 1500
 # Elements of a group at most; both sides of an interface count.
 GROUP_ELEMENTS = 48
-# Cracks that meet are divided by place, not by curve: what is enclosed by them moves as a whole. Their groups have so
-# many elements at most, and around them the nearest elements, so many times as many, whichever group those belong to.
+# Cracks that meet are divided by place, not by curve: what is enclosed by them moves as a whole. So are the two faces
+# of a slit, whose equations differ by no more than its width makes of them. Their groups have so many elements at
+# most, and around them the nearest elements, so many times as many, whichever group those belong to.
 CONNECTED_ELEMENTS = 128
 NEAREST_SHARE = 2.0
 # Candidates for the nearest, as a multiple of those taken.
@@ -77,18 +78,28 @@ def divide_model(mesh: Mesh) -> list[Integer]:
 def connect_cracks(mesh: Mesh) -> tuple[Integer, Bool]:
     """Of every element the number of its set, the cracks that meet or else one curve; and whether a set is of several.
 
-    Cracks meet in a common end of two elements.
+    Cracks meet in a common end of two elements. The faces of a contact within one region are taken to meet as well.
     """
     own = np.flatnonzero(mesh.crack)
     curves = len(mesh.curve_names)
     points, at = np.unique(np.concatenate([mesh.start[own], mesh.end[own]]), return_inverse=True)
     size = curves + len(points)
-    meeting = (np.ones(len(at)), (np.tile(mesh.curve[own], 2), curves + at.ravel()))
+    first, second = _find_slits(mesh)
+    joined = np.concatenate([np.tile(mesh.curve[own], 2), first]), np.concatenate([curves + at.ravel(), second])
+    meeting = (np.ones(len(joined[0])), joined)
     _, label = csgraph.connected_components(sparse.coo_matrix(meeting, shape=(size, size)), directed=False)
     # The number of a set is that of its first curve.
     _, first, inverse = np.unique(label[:curves], return_index=True, return_inverse=True)
     set_of_curve = first[inverse.ravel()]
     return set_of_curve[mesh.curve], np.bincount(set_of_curve, minlength=curves) > 1
+
+
+def _find_slits(mesh: Mesh) -> tuple[Integer, Integer]:
+    """Curves (k,) and (k,) that face each other in a contact within one region, as those of a thin slit in it."""
+    pairs, element = mesh.pairs, mesh.node_element
+    one, other = element[pairs.first[~pairs.crack]], element[pairs.second[~pairs.crack]]
+    same = mesh.region[one] == mesh.region[other]
+    return mesh.curve[one[same]], mesh.curve[other[same]]
 
 
 def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tuple[int, int]:

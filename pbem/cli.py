@@ -6,7 +6,6 @@ import argparse
 import contextlib
 import difflib
 import io
-import math
 import os
 import sys
 import time
@@ -27,7 +26,7 @@ from pbem.errors import (
     StorageError,
     printable,
 )
-from pbem.make import add_make_commands, make
+from pbem.make import add_make_commands, make, read_finite
 from pbem.version import __version__
 
 if TYPE_CHECKING:
@@ -210,15 +209,8 @@ def make_parser() -> argparse.ArgumentParser:
     plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
                       help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
     plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
-    plot.add_argument("--magnify", type=_read_finite, default=None, metavar="X", help="scale of the displacements")
+    plot.add_argument("--magnify", type=read_finite, default=None, metavar="X", help="scale of the displacements")
     return parser
-
-
-def _read_finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text}; expected a finite number")
-    return value
 
 
 def _make(options: argparse.Namespace) -> int:

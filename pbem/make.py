@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
@@ -84,6 +85,17 @@ def _add_area(parser: argparse.ArgumentParser) -> Any:
     area.add_argument("--density", type=float, metavar="D", help="number per unit area"
                       + (" (default: 0.1 / A^2)" if "cracks" in parser.prog else ""))
     return area
+
+
+def read_finite(text: str) -> float:
+    """An argument that is a number, not infinite nor NaN."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a finite number")
+    return value
 
 
 def _read_orientation(text: str) -> float | None:

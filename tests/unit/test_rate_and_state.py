@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from pbem.contact.complementarity import take_subset
 from pbem.contact.declaration import COMMON, InternalVariable, Slide, list_variables
 from pbem.contact.laws import OPEN, SLIP, Memory, ModeState, PairState, StrengthGroup, commit, start_memory
 from pbem.contact.modes import (
@@ -21,7 +22,6 @@ from pbem.contact.modes import (
 )
 from pbem.contact.rate_and_state import RateAndState, _age_by_slip, age_state
 from pbem.contact.strength import LAWS, coulomb
-from pbem.contact.subset import take_subset
 from pbem.results.dissipation import PairRecord, measure_work
 from tests.unit.test_laws import make_laws
 

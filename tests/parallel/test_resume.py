@@ -163,8 +163,10 @@ def test_a_finished_run_is_left_as_it_is(folder: Path, whole: Results, mpirun: L
 
 def test_an_interrupt_keeps_the_steps_for_a_resumption(folder: Path, whole: Results) -> None:
     """Ctrl-C in the terminal of a run on one rank; sent by itself, as another process may be late."""
+    # Jobs in the background of a shell ignore interrupts, and what they start does too.
+    heeding = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     process = subprocess.run(
-        [sys.executable, "-c", STOPPING, "interrupt", "3", "run", "case.toml"],
+        [sys.executable, "-c", heeding + STOPPING, "interrupt", "3", "run", "case.toml"],
         cwd=folder, env=make_environment(), capture_output=True, text=True, start_new_session=True, timeout=60,
     )  # fmt: skip
     error = process.stderr

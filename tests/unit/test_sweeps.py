@@ -158,7 +158,7 @@ def grow_branches(seed: int, pieces: int) -> str:
             if random.random() < 0.6:
                 end = bend + random.uniform(0.1, 0.25) * np.exp(1j * (angle + random.uniform(-1, 1)))
                 curves[f"end_{k}_{side + 1}"] = np.array([bend, end])
-    points = {name: [[round(z.real, 4), round(z.imag, 4)] for z in ends] for name, ends in curves.items()}
+    points = {name: [[round(z.real, 4), round(z.imag, 4)] for z in ends.tolist()] for name, ends in curves.items()}
     head = write_network(1, 4).split("cracks = ")[0].replace(", sxy = 0.3", "")
     text = f"{head}cracks = {list(curves)}\n[curves]\n"
     text += "".join(f"{name} = {{ points = {ends}, elements = 4 }}\n" for name, ends in points.items())

@@ -2,7 +2,7 @@
 
 With the other pairs' laws linear, the states of s pairs are affine in 2 s numbers d, state = state_0 + R d, and where
 tractions determine them so are the jumps in the tractions, g = g_0 + A p: A is the pairs' compliance. Coulomb's law of
-one step in the plane then is a linear complementarity problem (A. Klarbring, Ingenieur-Archiv 56, 1986), here in the
+one step then is a linear complementarity problem (A. Klarbring, Comput. Methods Appl. Mech. Eng. 58, 1986), here in the
 form of D. E. Stewart and J. C. Trinkle (Int. J. Numer. Methods Eng. 39, 1996). With N = tensile strength - pressure -
 p_n >= 0, friction traction p_s = b_+ - b_-, both >= 0, and a size of the slip l >= 0,
 

@@ -140,8 +140,9 @@ class Comparison:
         moduli = np.array([region.material.plane_modulus for region in model.regions])
         largest = _largest(np.abs(step.displacement))
         strained = max(moduli.min(), DIGITS / ROUNDING * moduli.max()) * largest
+        bounds = np.searchsorted(mesh.node_region, np.arange(len(moduli) + 1))
         for number, modulus in enumerate(moduli):
-            own = mesh.node_region == number
+            own = slice(bounds[number], bounds[number + 1])
             strained = max(strained, modulus * _measure_distortion(mesh.position[own], moved[own]))
         return float(strained / model.size)
 

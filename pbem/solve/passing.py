@@ -34,9 +34,12 @@ def find_passing(model: Model, mesh: Mesh, displacement: Complex) -> Passing | N
 
     displacement (n,): at the nodes; bodies that share a curve keep each other in place. None if there is none.
     """
+    if len(mesh.region_names) == 1:
+        return None
     bounding = ~mesh.crack[mesh.node_element]
     largest = float(np.abs(displacement[bounding]).max(initial=0.0))
-    regions = [np.flatnonzero(bounding & (mesh.node_region == number)) for number in range(len(mesh.region_names))]
+    nodes = np.flatnonzero(bounding)
+    regions = np.split(nodes, np.searchsorted(mesh.node_region[nodes], np.arange(1, len(mesh.region_names))))
     moved = mesh.position + displacement
     worst = None
     for one, other in _pair_near(model, mesh, regions, moved):
@@ -62,7 +65,7 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
     """Bodies by number, and others that they are not joined to, where their boxes meet once they have moved."""
     numbers = {name: number for number, name in enumerate(mesh.region_names)}
     owners: dict[int, set[int]] = {}
-    for curve, region in {(int(curve), int(region)) for curve, region in zip(mesh.curve, mesh.region, strict=True)}:
+    for curve, region in np.unique(np.column_stack([mesh.curve, mesh.region]), axis=0).tolist():
         owners.setdefault(curve, set()).add(region)
     joined = {frozenset(own) for own in owners.values() if len(own) == 2}
     curves = {name: owners.get(number, set()) for number, name in enumerate(mesh.curve_names)}

@@ -61,6 +61,11 @@ def apply(preconditioner: SchwarzPreconditioner, residual: Real) -> Real:
     return result
 
 
+def assert_same(one: Real, other: Real) -> None:
+    """Equal but for sums taken in another order."""
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())
+
+
 @pytest.mark.parametrize("modes", ["stick", "mixed"])
 @each_sample
 def test_with_one_group_it_is_the_inverse(name: str, modes: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,7 +110,7 @@ def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) ->
     assert affected >= sum(slot in group.around for group in problem.groups)
     fresh = precondition(problem)
     fresh.update(constrain(problem, changed))
-    np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+    assert_same(apply(preconditioner, residual), apply(fresh, residual))
     # And back, and to others here and there.
     several = ModeState(modes.mode.copy(), modes.sign.copy())
     several.mode[::5] = (several.mode[::5] + 1) % 3
@@ -113,7 +118,7 @@ def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) ->
         preconditioner.update(constrain(problem, each))
         fresh = precondition(problem)
         fresh.update(constrain(problem, each))
-        np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+        assert_same(apply(preconditioner, residual), apply(fresh, residual))
 
 
 @each_sample
@@ -160,7 +165,7 @@ def test_a_group_without_an_inverse_passes_its_residual_on(many_groups: None) ->
     preconditioner.update(constraints)
     fresh = precondition(problem)
     fresh.update(constraints)
-    np.testing.assert_array_equal(apply(preconditioner, residual), apply(fresh, residual))
+    assert_same(apply(preconditioner, residual), apply(fresh, residual))
 
 
 def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import pbem
 from pbem import driver
@@ -44,6 +45,11 @@ KINDS = {
     "block dragged along a plane: force": "reactions",
     "panel with friction, 8 elements a side: slip": "jumps",
 }
+
+
+def assert_same(one: NDArray[np.float64], other: NDArray[np.float64]) -> None:
+    """Equal but for sums taken in another order."""
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())
 
 
 @pytest.fixture
@@ -164,7 +170,7 @@ def test_a_refined_run_is_gone_on_with_and_drawn(tmp_path: Path) -> None:
     part.write_bytes(whole.read_bytes())
     again = pbem.run(case, part, resume=True)
     assert again.fractions == fractions
-    assert np.array_equal(again.displacement, results.displacement)
+    assert_same(again.displacement, results.displacement)
     assert main(["plot", str(whole), "--mesh"]) == 0
     assert (tmp_path / "whole_mesh.png").stat().st_size > 10_000
     assert main(["info", str(whole)]) == 0
@@ -213,7 +219,7 @@ def test_a_pass_that_fails_leaves_the_file_of_the_former_one(
     results = open_results(tmp_path / "block.h5")
     assert results.status == "failed" and "pass 2" in results.failure
     assert len(results.steps) == 2
-    assert np.array_equal(results.displacement, rough.displacement)
+    assert_same(results.displacement, rough.displacement)
     assert sorted(path.name for path in tmp_path.glob("*block.h5*")) == ["block.h5"]
     assert not list(tmp_path.glob(".block.h5*"))
 
@@ -299,7 +305,7 @@ def test_a_law_that_fails_in_the_second_solution_alone_is_said(tmp_path: Path) -
     results = pbem.run(tmp_path / "blocks.toml", tmp_path / "blocks.h5")
     assert results.status == "finished" and "law.py fails" in results.errors.missing
     assert np.isnan(results.errors.relative["jumps"]).all()
-    assert np.array_equal(results.displacement, sound.displacement)
+    assert_same(results.displacement, sound.displacement)
 
 
 def test_statuses_that_do_not_settle_on_the_coarser_mesh_are_those_of_the_run(

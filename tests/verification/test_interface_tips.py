@@ -124,7 +124,8 @@ def test_info_shows_what_is_released_and_says_why_nothing_else(tmp_path: Path) -
     solved = solve_inclusion(3.0, 60.0, pressure=1.0)
     text = store(solved, tmp_path / "a.h5")
     results = open_results(tmp_path / "a.h5")
-    np.testing.assert_array_equal(results.tips["seam"].J[-1], evaluate_release(solved))
+    # Evaluated twice: sums may be taken in another order where memory begins elsewhere.
+    np.testing.assert_allclose(results.tips["seam"].J[-1], evaluate_release(solved), rtol=1e-13)
     assert f"seam start nan nan {results.tips['seam'].J[-1, 0]:.5g} nan" in text
     assert "No K at 'seam' (start), 'seam' (end): a crack along an interface ends there" in text
 

@@ -260,11 +260,6 @@ class SchwarzPreconditioner:
                 parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
                 values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
         values *= -np.repeat(self._scale[nodes], 2)[:, None]
-        own_anchors = [number for number, anchor in enumerate(self._anchors) if anchor.region == region]
-        for one in own_anchors:
-            for other in own_anchors:
-                if self._acting[one, other]:
-                    self._anchor(values, nodes, seen, one, other)
         for motions in self._rigid:
             place, there = _find_places(columns, motions.columns)
             if motions.region == region and there.all():
@@ -272,6 +267,12 @@ class SchwarzPreconditioner:
                 rotation[motions.columns] = motions.basis[-1]
                 left = (self.free[number_components(nodes)] @ rotation) + values @ rotation[columns]
                 values[:, place] -= np.outer(left, motions.basis[-1])
+        # After the rotations, which the anchors hold.
+        own_anchors = [number for number, anchor in enumerate(self._anchors) if anchor.region == region]
+        for one in own_anchors:
+            for other in own_anchors:
+                if self._acting[one, other]:
+                    self._anchor(values, nodes, seen, one, other)
         return values, columns
 
     def _find_anchored(self, constraints: ConstraintMap) -> Bool:

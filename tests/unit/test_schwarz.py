@@ -13,6 +13,7 @@ from pbem.bem import hierarchical
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
+from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve import assembly, groups
 from pbem.solve.assembly import assemble_problem
@@ -92,6 +93,38 @@ def test_with_one_group_gmres_ends_at_once(name: str, monkeypatch: pytest.Monkey
     # The inverse is that of the exact tangent operator, the product has the errors of the expansions.
     assert sum(tangent.iterations) <= 3 and solved.residual <= 1e-9
     tangent.destroy()
+
+
+# A disc that may turn in its hole: only the anchor holds the rotation, which the discs' equations do not see.
+DISC = """
+materials.rock = {{ young = 1e3, poisson = 0.2 }}
+curves.rim = {{ center = [{x}, 2], radius = 2, elements = 12 }}
+curves.hole = {{ center = [{x}, 9], radius = 1, elements = 8 }}
+regions.plane = {{ material = "rock", boundary = ["rim", "hole"], infinite = true }}
+regions.disc = {{ material = "rock", boundary = ["rim"] }}
+boundary.hole = {{ tn = -3.0 }}
+interfaces.rim = {{ law = "frictionless" }}
+remote = {{ sxx = -20.0, syy = -20.0 }}
+solver = {{ operator = "{operator}" }}
+analysis = {{ steps = 1 }}
+"""
+
+
+@pytest.mark.parametrize("x", [0.0, 1e5])
+def test_a_rotation_that_an_anchor_holds_is_in_the_inverse(x: float) -> None:
+    _, model = parse_model(DISC.format(x=x, operator="hierarchical"))
+    problem = assemble_problem(model, generate_mesh(model), world)
+    assert len(problem.anchors) == 1 and any(motions.interpolated for motions in problem.operator.rigid)
+    tangent = make_tangent(problem)
+    assert isinstance(tangent, KrylovTangent)
+    solved = tangent.solve(constrain(problem), problem.evaluate_load(0, 1.0))
+    assert sum(tangent.iterations) <= 3 and solved.residual <= 1e-9
+    tangent.destroy()
+    _, dense = parse_model(DISC.format(x=x, operator="dense"))
+    exact = assemble_tangent(assemble_problem(dense, generate_mesh(dense), world))
+    forced = problem.apply(constrain(problem).offset, problem.evaluate_load(0, 1.0), None)
+    expected = np.linalg.solve(exact, -forced)
+    np.testing.assert_allclose(solved.unknowns, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", ["cracks", "panel", "infinite", "inclusions"])

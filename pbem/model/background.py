@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from pbem.case import Case
-from pbem.case.schema import GravityTable, StressTable
+from pbem.description.case import Case
+from pbem.description.schema import GravityTable, StressTable
 from pbem.errors import Fault
 from pbem.model.roles import unknown_name
 

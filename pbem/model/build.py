@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from pbem.case import Case, parse_draft, read_case_text
-from pbem.case.finding import list_names
+from pbem.description.case import Case
 from pbem.errors import CaseError, Fault
+from pbem.geometry.curve import Curve
+from pbem.geometry.junction import find_crossings, split_at_junctions
+from pbem.geometry.loop import Loops, find_loops
 from pbem.model.balance import describe_unbalance
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
@@ -20,22 +21,20 @@ from pbem.model.crack import (
     describe_near_misses,
     find_tips,
 )
-from pbem.model.curve import Curve
 from pbem.model.facing import check_facing, split_opposite_ends
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
-from pbem.model.junction import find_crossings, split_at_junctions
 from pbem.model.law import check_gap
 from pbem.model.loading import Loading, read_loading
-from pbem.model.loop import Loops, find_loops
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.roles import Roles, resolve_roles
-from pbem.model.shape import shape_curves
+from pbem.model.shaping import shape_curves
 from pbem.model.support import find_free_motions, find_least_stiffness, find_plane_translations
+from pbem.wording import list_names
 
 # Faults shown of what one table [[generate]] made.
 MOST_FAULTS = 5
@@ -55,28 +54,13 @@ class _Topology:
 
 def build_model(case: Case) -> Model:
     """Resolve and check a case. Raises CaseError with every fault of names, topology, laws, loads and support."""
-    model, faults = _examine(case, conditions_known=True)
+    model, faults = examine(case, conditions_known=True)
     if model is None or faults:
-        raise CaseError(case.source, _shorten(faults))
+        raise CaseError(case.source, shorten(faults))
     return model
 
 
-def read_model(path: str | Path) -> tuple[Case, Model]:
-    """Read a case file and build its model. Raises CaseError with the faults of file and topology together."""
-    return parse_model(read_case_text(path), str(path))
-
-
-def parse_model(text: str, source: str = "case") -> tuple[Case, Model]:
-    """`parse_case` and `build_model` in one: raises CaseError with the faults of both together."""
-    draft = parse_draft(text, source)
-    model, faults = _examine(draft.case, draft.conditions_known) if draft.case else (None, [])
-    faults = [*draft.faults, *faults]
-    if draft.case is None or model is None or faults:
-        raise CaseError(source, _shorten(faults))
-    return draft.case, model
-
-
-def _shorten(faults: list[Fault]) -> tuple[Fault, ...]:
+def shorten(faults: list[Fault]) -> tuple[Fault, ...]:
     """Each fault once; of many at the same table [[generate]] the first few, and how many more there are."""
     shown: list[Fault] = []
     counts: Counter[str] = Counter()
@@ -92,7 +76,8 @@ def _shorten(faults: list[Fault]) -> tuple[Fault, ...]:
     return tuple(shown)
 
 
-def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:
+def examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:
+    """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged."""
     roles = resolve_roles(case)
     loading = read_loading(case, roles)
     topology = _find_topology(case, roles)

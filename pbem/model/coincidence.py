@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import project
-from pbem.model.junction import format_point
-from pbem.model.loop import Loops
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import project
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import Loops
 from pbem.model.roles import Roles
 
 # Faces nearer to each other than this part of the shorter of their legs are meant to be one.

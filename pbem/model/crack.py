@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points, project
-from pbem.model.junction import format_point
-from pbem.model.loop import Loops, is_inside, loop_legs
-from pbem.model.model import Loop
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import inner_points, project
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import Loop, Loops, is_inside, loop_legs
 
 # A tip nearer to another curve than this part of its crack's last leg is taken for a slip of the pen.
 NEAR_MISS = 1e-6

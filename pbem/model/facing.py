@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points, measure_distances, project, surround
-from pbem.model.junction import format_point, split_leg
-from pbem.model.loop import Loops, side_legs
-from pbem.model.model import Contact, Model, Region, Side
-from pbem.model.sampling import leg_normals
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import inner_points, measure_distances, project, surround
+from pbem.geometry.junction import format_point, split_leg
+from pbem.geometry.loop import Loops, Side, side_legs
+from pbem.geometry.sampling import leg_normals
+from pbem.model.model import Contact, Model, Region
 
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]

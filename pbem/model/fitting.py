@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pbem.case import Case
-from pbem.case.finding import list_names
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.curve import Curve
-from pbem.model.junction import format_point
+from pbem.geometry.curve import Curve
+from pbem.geometry.junction import format_point
 from pbem.model.lengths import count_elements
 from pbem.model.model import Region
 from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
 from pbem.model.slot import Side
+from pbem.wording import list_names
 
 # Curves and corners that are named in one note.
 MOST_NAMED = 8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
 
 MOST_POINTS = 10_000_000

@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
-from pbem.case.effects import NEEDED, OPTIONAL, OWN_KEYS, WITHOUT_EFFECT, Kind
-from pbem.case.schema import LawTable
+from pbem.description.case import Case
+from pbem.description.effects import NEEDED, OPTIONAL, OWN_KEYS, WITHOUT_EFFECT, Kind
+from pbem.description.schema import LawTable
 from pbem.errors import Fault
-from pbem.model.curve import Curve
-from pbem.model.expression import ExpressionError, evaluate_expression
-from pbem.model.junction import format_point
+from pbem.geometry.curve import Curve
+from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.junction import format_point
 from pbem.model.model import Law
 from pbem.model.touching import find_least, sample_gap
 

@@ -6,9 +6,9 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pbem.case import Case
-from pbem.case.effects import TIMED
-from pbem.case.schema import LawTable, StageConditionTable
+from pbem.description.case import Case
+from pbem.description.effects import TIMED
+from pbem.description.schema import LawTable, StageConditionTable
 from pbem.errors import Fault
 from pbem.model.background import Backgrounds, read_backgrounds
 from pbem.model.law import read_law

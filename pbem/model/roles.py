@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from pbem.case import Case
-from pbem.case.finding import list_names, suggest
+from pbem.description.case import Case
 from pbem.errors import Fault
+from pbem.wording import list_names, suggest
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pbem.case import parse_case
+from pbem.case.build import parse_model
 from pbem.errors import CaseError, Fault
-from pbem.model.build import build_model, parse_model
+from pbem.model.build import build_model
 from pbem.model.model import Model
 
 MATERIAL = """

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from pbem.geometry.curve import Curve, Leg
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
-from pbem.model.curve import Curve, Leg
 from pbem.model.material import Material
 from pbem.model.model import (
     Analysis,

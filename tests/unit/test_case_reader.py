@@ -8,9 +8,9 @@ import pydantic
 import pytest
 
 from pbem.case import json_schema, parse_case, read_case
-from pbem.case.places import find_line, find_lines, format_place
+from pbem.case.build import read_model
+from pbem.description.places import find_line, find_lines, format_place
 from pbem.errors import CaseError
-from pbem.model.build import read_model
 from tests.unit.case_sample import BLOCKS, SQUARE, build, change
 
 EVERYTHING = """

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.geometry.curve import Curve, Leg
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.curve import Curve, Leg
 from pbem.model.material import Material
 from pbem.model.model import (
     Analysis,

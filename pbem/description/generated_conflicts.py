@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pbem.case.finding import Finding, show
-from pbem.case.places import Loc
+from pbem.description.finding import Finding
+from pbem.description.places import Loc
+from pbem.wording import show
 
 _AREAS = ("density", "fraction", "box")
 # What only the other kind has.

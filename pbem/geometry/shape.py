@@ -1,77 +1,28 @@
-"""From the curves of the case file to chains of legs whose common ends are exactly equal."""
+"""The shapes of curves, polylines, circles, arcs and curves by expressions, as chains of legs with equal ends."""
 
 from __future__ import annotations
 
 import cmath
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from pbem.case import Case
-from pbem.case.schema import CurveTable
-from pbem.case.values import LARGEST, MOST_ELEMENTS
+from pbem.description.schema import CurveTable
+from pbem.description.values import LARGEST
 from pbem.errors import Fault
-from pbem.model.curve import Curve, Leg
-from pbem.model.expression import ExpressionError, evaluate_expression
-from pbem.model.intersection import extremes
-from pbem.model.roles import Roles
-from pbem.model.tolerance import Tolerance, join_points, make_tolerance
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.intersection import extremes
+from pbem.geometry.tolerance import Tolerance, join_points
 
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
 WIDEST_ARC = 45.0
-# Squares of lengths must not underflow.
-SMALLEST = 1e-100
 
 
-@dataclass(frozen=True)
-class Shapes:
-    """curves: in the order of the file, without those that have faults; tolerance: which points agree."""
-
-    curves: Mapping[str, Curve]
-    size: float
-    tolerance: Tolerance
-    faults: tuple[Fault, ...]
-
-
-def shape_curves(case: Case, roles: Roles) -> Shapes:
-    """Build every curve; joined ends are made exactly equal. Elements are counted per leg, nothing is graded yet."""
-    faults: list[Fault] = []
-    curves: dict[str, Curve] = {}
-    for name, table in case.curves.items():
-        legs = _shape_legs(table)
-        if isinstance(legs, Fault):
-            wrong = ("curves", name, *(["expression"] if table.expression else []))
-            faults.append(case.fault(wrong, legs.found, legs.expected))
-            continue
-        curves[name] = Curve(name, legs)
-    size, largest = _measure(curves)
-    tolerance = make_tolerance(curves, roles, largest)
-    if curves and not size > SMALLEST:
-        found = f"curves with an extent of {size:g}"
-        faults.append(case.fault(("curves",), found, f"a model larger than {SMALLEST:g}"))
-        return Shapes({}, size, tolerance, tuple(faults))
-    curves, short = _join(curves, tolerance)
-    for name, number in short:
-        loc = ("curves", name, "points", number) if case.curves[name].points else ("curves", name)
-        found = "a leg without length (the same point twice)"
-        if case.curves[name].expression:
-            found = f"element {number} without length (the same point twice)"
-        faults.append(case.fault(loc, found, "points that differ"))
-        del curves[name]
-    for name, curve in list(curves.items()):
-        total = sum(leg.elements for leg in curve.legs)
-        if total > MOST_ELEMENTS:
-            key = "size" if case.curves[name].size else "elements"
-            expected = f"at most {MOST_ELEMENTS} on one curve"
-            faults.append(case.fault(("curves", name, key), f"{total} elements", expected))
-            del curves[name]
-    return Shapes(curves, size, tolerance, tuple(faults))
-
-
-def _measure(curves: Mapping[str, Curve]) -> tuple[float, float]:
+def measure_extent(curves: Mapping[str, Curve]) -> tuple[float, float]:
     """Largest extent of all curves, and their largest coordinate."""
     if not curves:
         return 0.0, 0.0
@@ -107,7 +58,8 @@ def _count_elements(table: CurveTable, lengths: Sequence[float]) -> list[int]:
     return share(table.elements, lengths)
 
 
-def _shape_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
+def shape_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
+    """The legs of a curve, or what is wrong with it, without a place."""
     if table.expression is not None:
         return _expression_legs(table)
     return _circular_legs(table) if table.center is not None else _straight_legs(table)
@@ -184,7 +136,7 @@ def _point_on_circle(center: complex, radius: float, degrees: float) -> complex:
     return center + radius * direction
 
 
-def _join(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[str, Curve], list[tuple[str, int]]]:
+def join_ends(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[str, Curve], list[tuple[str, int]]]:
     """Replace every end by the first point of the file that is the same; also name legs that shrink to a point."""
     points = np.array([point for curve in curves.values() for leg in curve.legs for point in (leg.start, leg.end)])
     owners = [name for name, curve in curves.items() for _ in range(2 * len(curve.legs))]

@@ -12,18 +12,35 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
-from pbem.case.finding import list_names
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
-from pbem.model.junction import format_point
-from pbem.model.model import Loop, Side
-from pbem.model.tolerance import Tolerance
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
+from pbem.geometry.junction import format_point
+from pbem.geometry.tolerance import Tolerance
+from pbem.wording import list_names
+
+HalfEdge = tuple[str, bool]
+
+
+@dataclass(frozen=True)
+class Side:
+    """A curve as part of a loop; `forward` if the loop runs in the direction in which the curve was written."""
+
+    curve: str
+    forward: bool
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed chain of sides, travelled with the region on the left. `outer`: counter-clockwise, around the region."""
+
+    sides: tuple[Side, ...]
+    outer: bool
+
 
 Loops = dict[str, tuple[Loop, ...]]
-HalfEdge = tuple[str, bool]
 
 
 @dataclass(frozen=True)

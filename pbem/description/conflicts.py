@@ -7,10 +7,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from pbem.case.effects import NEEDED, OWN_KEYS
-from pbem.case.finding import Finding, show
-from pbem.case.generated_conflicts import check_generated
-from pbem.case.places import Loc
+from pbem.description.effects import NEEDED, OWN_KEYS
+from pbem.description.finding import Finding
+from pbem.description.generated_conflicts import check_generated
+from pbem.description.places import Loc
+from pbem.wording import show
 
 GLOBAL_KEYS = ("ux", "uy", "tx", "ty")
 LOCAL_KEYS = ("un", "us", "tn", "ts", "pressure")

@@ -6,10 +6,10 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from pbem.case.effects import NEEDED, OWN_KEYS
-from pbem.case.finding import Finding
-from pbem.case.places import Loc
-from pbem.case.translation import known_keys
+from pbem.description.effects import NEEDED, OWN_KEYS
+from pbem.description.finding import Finding
+from pbem.description.places import Loc
+from pbem.description.translation import known_keys
 
 # Values that stand in for wrong ones in a draft.
 _STAND_INS: Mapping[str, float] = {"young": 1.0, "poisson": 0.25}

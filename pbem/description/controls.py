@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pbem.case.finding import Finding
-from pbem.case.places import Loc
+from pbem.description.finding import Finding
+from pbem.description.places import Loc
 from pbem.errors import is_control
 
 # The deepest key of a case, stages[1].boundary.NAME.ux, has five parts, a point of a curve as many.

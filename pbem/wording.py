@@ -1,22 +1,11 @@
-"""A fault before it has its line number."""
+"""Values and names as messages show them."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
 
-from pbem.case.places import Loc
 from pbem.errors import printable
-
-
-@dataclass(frozen=True)
-class Finding:
-    """loc: path of the key (list entries from 0); found and expected as in `pbem.errors.Fault`."""
-
-    loc: Loc
-    found: str
-    expected: str
 
 
 def show(value: object) -> str:

@@ -11,9 +11,10 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from pbem.case.finding import Finding, list_names, show, suggest
-from pbem.case.places import Loc, format_place
-from pbem.case.schema import CaseFile, ExpressionTable
+from pbem.description.finding import Finding
+from pbem.description.places import Loc, format_place
+from pbem.description.schema import CaseFile, ExpressionTable
+from pbem.wording import list_names, show, suggest
 
 
 def find_schema_findings(raw: Mapping[str, Any]) -> list[Finding]:

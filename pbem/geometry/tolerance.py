@@ -11,9 +11,6 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pbem.model.curve import Curve
-from pbem.model.roles import Roles
-
 # Points nearer to each other than this part of the shorter of their curves are the same point.
 SAME_POINT = 1e-9
 # Far from the origin the coordinates themselves are rounded.
@@ -50,15 +47,6 @@ class Tolerance:
     def _are_apart(self, one: str, other: str) -> bool:
         first, second = self.regions.get(one, frozenset()), self.regions.get(other, frozenset())
         return not first & second and any(frozenset((a, b)) in self.contacts for a in first for b in second)
-
-
-def make_tolerance(curves: Mapping[str, Curve], roles: Roles, largest: float) -> Tolerance:
-    """largest: the largest coordinate of all curves."""
-    regions = {name: frozenset((region,)) for name, region in (*roles.outer.items(), *roles.cracks.items())}
-    regions |= {name: frozenset(pair) for name, pair in roles.shared.items()}
-    contacts = frozenset(frozenset((roles.outer[a], roles.outer[b])) for a, b in roles.contacts.values())
-    rounding = ROUNDINGS * float(np.finfo(float).eps) * largest
-    return Tolerance({name: curve.length for name, curve in curves.items()}, rounding, regions, contacts)
 
 
 def join_points(points: NDArray[np.complex128], owners: list[str], tolerance: Tolerance) -> NDArray[np.complex128]:

@@ -10,13 +10,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import coincide, meeting_points, project
-from pbem.model.shape import share
-from pbem.model.tolerance import Tolerance
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import coincide, meeting_points, project
+from pbem.geometry.shape import share
+from pbem.geometry.tolerance import Tolerance
 
 Places = Mapping[str, tuple[complex, ...]]
 

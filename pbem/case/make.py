@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pbem.case.reader import Case, parse_case
+from pbem.case.case import Case, parse_case
 from pbem.description.schema import CurveTable
 from pbem.wording import show
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pbem.description.places import Loc
+from pbem.errors import KeyPath
 
 
 @dataclass(frozen=True)
 class Finding:
     """loc: path of the key (list entries from 0); found and expected as in `pbem.errors.Fault`."""
 
-    loc: Loc
+    loc: KeyPath
     found: str
     expected: str

@@ -5,13 +5,11 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from pbem.description.schema import CurveTable
-from pbem.description.values import LARGEST
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.expression import ExpressionError, evaluate_expression
@@ -20,6 +18,8 @@ from pbem.geometry.tolerance import Tolerance, join_points
 
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
 WIDEST_ARC = 45.0
+# Squares of coordinates must not overflow.
+LARGEST = 1e100
 
 
 def measure_extent(curves: Mapping[str, Curve]) -> tuple[float, float]:
@@ -49,84 +49,96 @@ def share(total: int, lengths: Sequence[float]) -> list[int]:
     return counts
 
 
-def _count_elements(table: CurveTable, lengths: Sequence[float]) -> list[int]:
-    if table.size is not None:
-        return [max(1, math.ceil(min(length / table.size, 1e9) - 1e-9)) for length in lengths]
-    if isinstance(table.elements, tuple):
-        return list(table.elements)
-    assert table.elements is not None
-    return share(table.elements, lengths)
+@dataclass(frozen=True)
+class Division:
+    """How a curve is divided into elements.
+
+    elements: their number, or one for each leg; size: or a length that none exceeds. power: element ends lie at t^power
+    from a refined end; refine_start, refine_end: of curves by expressions, whose elements are their legs.
+    """
+
+    elements: int | tuple[int, ...] | None = None
+    size: float | None = None
+    power: float = 3.0
+    refine_start: bool = False
+    refine_end: bool = False
+
+    def count(self, lengths: Sequence[float]) -> list[int]:
+        """Numbers of elements on legs of these lengths."""
+        if self.size is not None:
+            return [max(1, math.ceil(min(length / self.size, 1e9) - 1e-9)) for length in lengths]
+        if isinstance(self.elements, tuple):
+            return list(self.elements)
+        assert self.elements is not None, "elements or size"
+        return share(self.elements, lengths)
 
 
-def shape_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
-    """The legs of a curve, or what is wrong with it, without a place."""
-    if table.expression is not None:
-        return _expression_legs(table)
-    return _circular_legs(table) if table.center is not None else _straight_legs(table)
-
-
-def _expression_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
-    """One straight leg for each element, between points of the curve; t is uniform unless the grading says more."""
-    assert table.expression is not None
-    count = table.elements[0] if isinstance(table.elements, tuple) else table.elements
-    assert count is not None
-    refine_start, refine_end = (table.grading in (end, "both") for end in ("start", "end"))
-    t = Leg(0j, 1 + 0j, count, refine_start, refine_end, table.power).element_fractions()
+def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Curve | Fault:
+    """A curve of x and y as functions of t from 0 to 1: one straight leg for each element, between points of the curve;
+    t is uniform unless the division says more."""
+    path = ("curves", name, "expression")
+    count = sum(division.count([1.0]))
+    t = Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
     try:
-        x, y = (evaluate_expression(text, t=t) for text in table.expression)
+        x, y = (evaluate_expression(text, t=t) for text in texts)
     except ExpressionError as error:
-        return Fault("", error.found, error.expected)
+        return Fault.at(path, error.found, error.expected)
     for axis, values in (("x", x), ("y", y)):
         wrong = ~(np.abs(values) <= LARGEST)
         if wrong.any():
             at = int(np.argmax(wrong))
-            return Fault("", f"{axis} = {values[at]:g} at t = {t[at]:g}", f"a number of at most {LARGEST:g} everywhere")
+            found = f"{axis} = {values[at]:g} at t = {t[at]:g}"
+            return Fault.at(path, found, f"a number of at most {LARGEST:g} everywhere")
     points = (x + 1j * y).tolist()
-    return tuple(Leg(a, b, 1) for a, b in pairwise(points))
+    return Curve(name, tuple(Leg(a, b, 1) for a, b in pairwise(points)))
 
 
-def _straight_legs(table: CurveTable) -> tuple[Leg, ...]:
-    assert table.points is not None
-    points = [complex(*point) for point in table.points]
+def draw_polyline(name: str, points: Sequence[complex], division: Division) -> Curve:
+    """Straight legs from point to point; legs without length are found when curves are joined."""
     lengths = [abs(b - a) for a, b in pairwise(points)]
     if sum(lengths) == 0:
-        return tuple(Leg(a, b, 1) for a, b in pairwise(points))
-    counts = _count_elements(table, lengths)
-    return tuple(
-        Leg(a, b, count, power=table.power)
+        return Curve(name, tuple(Leg(a, b, 1) for a, b in pairwise(points)))
+    counts = division.count(lengths)
+    return Curve(name, tuple(
+        Leg(a, b, count, power=division.power)
         for a, b, count in zip(points, points[1:], counts, strict=False)
-    )
+    ))
 
 
-def _circular_legs(table: CurveTable) -> tuple[Leg, ...] | Fault:
-    """An arc is one leg; a full circle four, cut between elements so that these are all equal (if eight or more)."""
-    assert table.center is not None and table.radius is not None
-    angles = table.angles or (0.0, 360.0)
-    center, begin, sweep = complex(*table.center), math.radians(angles[0]), math.radians(angles[1] - angles[0])
-    count = _count_elements(table, [table.radius * abs(sweep)])[0]
-    start = _point_on_circle(center, table.radius, angles[0])
-    if abs(abs(start - center) - table.radius) > 1e-3 * table.radius:
-        found = f"radius = {table.radius:g}, lost in the rounding of the center"
-        return Fault("", found, "a circle that is not so small against its distance from the origin")
-    turn = abs(angles[1] - angles[0])
+def draw_circle(
+    name: str, center: complex, radius: float, division: Division, angles: tuple[float, float] | None = None
+) -> Curve | Fault:
+    """A circle, or the arc between two angles (degrees), counter-clockwise if the second is larger.
+
+    An arc is one leg; a full circle four, cut between elements so that these are all equal (if eight or more).
+    """
+    path = ("curves", name)
+    first, last = angles or (0.0, 360.0)
+    begin, sweep = math.radians(first), math.radians(last - first)
+    count = division.count([radius * abs(sweep)])[0]
+    start = _point_on_circle(center, radius, first)
+    if abs(abs(start - center) - radius) > 1e-3 * radius:
+        found = f"radius = {radius:g}, lost in the rounding of the center"
+        return Fault.at(path, found, "a circle that is not so small against its distance from the origin")
+    turn = abs(last - first)
     needed = math.ceil(turn / WIDEST_ARC - 1e-9)
-    if table.size is not None:
+    if division.size is not None:
         count = max(needed, count)
     if count < needed:
         what = "a circle" if turn == 360 else f"an arc of {turn:g} degrees"
         found = f"{count} element{'s' if count > 1 else ''} around {what}"
-        return Fault("", found, f"at least {needed}: an element may turn by {WIDEST_ARC:g} degrees")
+        return Fault.at(path, found, f"at least {needed}: an element may turn by {WIDEST_ARC:g} degrees")
     if turn < 360:
-        end = _point_on_circle(center, table.radius, angles[1])
-        return (Leg(start, end, count, power=table.power, center=center, sweep=sweep),)
+        end = _point_on_circle(center, radius, last)
+        return Curve(name, (Leg(start, end, count, power=division.power, center=center, sweep=sweep),))
     legs, done, here = [], 0, start
     for number in share(count, [1.0] * 4):
         done += number
-        there = start if done == count else center + table.radius * cmath.exp(1j * (begin + sweep * done / count))
+        there = start if done == count else center + radius * cmath.exp(1j * (begin + sweep * done / count))
         part = sweep * number / count
-        legs.append(Leg(here, there, number, power=table.power, center=center, sweep=part))
+        legs.append(Leg(here, there, number, power=division.power, center=center, sweep=part))
         here = there
-    return tuple(legs)
+    return Curve(name, tuple(legs))
 
 
 def _point_on_circle(center: complex, radius: float, degrees: float) -> complex:

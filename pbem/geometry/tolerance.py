@@ -11,6 +11,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pbem.geometry.curve import Curve
+
 # Points nearer to each other than this part of the shorter of their curves are the same point.
 SAME_POINT = 1e-9
 # Far from the origin the coordinates themselves are rounded.
@@ -47,6 +49,15 @@ class Tolerance:
     def _are_apart(self, one: str, other: str) -> bool:
         first, second = self.regions.get(one, frozenset()), self.regions.get(other, frozenset())
         return not first & second and any(frozenset((a, b)) in self.contacts for a in first for b in second)
+
+
+def make_tolerance(
+    curves: Mapping[str, Curve], largest: float, regions: Mapping[str, frozenset[str]] | None = None,
+    contacts: frozenset[frozenset[str]] = frozenset(),
+) -> Tolerance:
+    """largest: the largest coordinate of all curves; regions, contacts: see Tolerance."""
+    rounding = ROUNDINGS * float(np.finfo(float).eps) * largest
+    return Tolerance({name: curve.length for name, curve in curves.items()}, rounding, regions or {}, contacts)
 
 
 def join_points(points: NDArray[np.complex128], owners: list[str], tolerance: Tolerance) -> NDArray[np.complex128]:

@@ -48,18 +48,18 @@ def fit_curves(
     ]
     sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order)
     if sizes.excess is not None:
-        return FittedCurves(curves, (), (), (_refuse(case, sizes.excess),))
+        return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     notes = [*_note_added(curves, sizes.curves), *_note_ties(ties), *_note_long(sizes.long)]
     return FittedCurves(sizes.curves, ties, tuple(notes), ())
 
 
-def _refuse(case: Case, excess: Excess) -> Fault:
+def _refuse(excess: Excess) -> Fault:
     found = (
         f"curves '{excess.curve}' and '{excess.other}' at a distance of {excess.distance:.3g}, which would need "
         f"elements of {excess.length:.3g} and far more of them than were asked for"
     )
-    return case.fault(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
+    return Fault.at(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
 
 
 def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list[str]:

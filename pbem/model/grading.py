@@ -86,7 +86,7 @@ def check_turning(case: Case, curves: Mapping[str, Curve]) -> list[Fault]:
             enough = f"at least {sum(counts)} elements" if key == "elements" else "smaller elements"
             found = f"an element that turns by {turn:.3g} degrees, as its curve is split or graded"
             expected = f"at most {WIDEST_ARC:g} degrees: {enough}, or less grading"
-            faults.append(case.fault(("curves", name, key), found, expected))
+            faults.append(Fault.at(("curves", name, key), found, expected))
     return faults
 
 

@@ -71,7 +71,7 @@ def find_overlaps(
         if found:
             expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
             text = f"region '{second.name}' overlapping region '{first.name}' ({found})"
-            faults.append(case.fault(("regions", second.name, "boundary"), text, expected))
+            faults.append(Fault.at(("regions", second.name, "boundary"), text, expected))
     return faults
 
 
@@ -140,7 +140,7 @@ def check_contacts(
             if depth > tolerance.of(curve):
                 found = f"curve '{curve}' inside region '{region}', {depth:.3g} deep at {format_point(point)}"
                 expected = "bodies that at most touch before they are loaded"
-                faults.append(case.fault(("contacts", name), found, expected))
+                faults.append(Fault.at(("contacts", name), found, expected))
                 break
     return faults
 

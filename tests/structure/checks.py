@@ -12,7 +12,7 @@ from pathlib import Path
 # The path of the data: a part imports those before it, never those after it.
 # The package itself comes last: it offers what they define.
 ORDER = (
-    "description", "geometry", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
+    "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
     "make", "bundled", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...

@@ -60,16 +60,25 @@ def test_modules_are_short(module: Module) -> None:
     expect_none(checks.check_length(module))
 
 
-def test_mechanics_and_results_load_no_mpi() -> None:
-    code = """
+# A model is made by calls as well as from a file: up to the mechanics nothing knows of files or processes.
+KNOW_NO_FILES = ("geometry", "description", "model", "mesh", "bem", "contact")
+WITHOUT_FILES = [name for name, module in MODULES.items() if module.part in KNOW_NO_FILES]
+
+
+@pytest.mark.parametrize(("names", "banned"), [
+    (WITHOUT_MPI, ("mpi4py", "petsc4py")),
+    (WITHOUT_FILES, ("mpi4py", "petsc4py", "h5py", "tomllib", "pbem.case")),
+], ids=["no MPI", "no files"])  # fmt: skip
+def test_what_is_loaded_on_the_way(names: list[str], banned: tuple[str, ...]) -> None:
+    code = f"""
 import importlib, sys
 for name in sys.argv[1:]:
     importlib.import_module(name)
-    for library in ("mpi4py", "petsc4py"):
+    for library in {banned}:
         if library in sys.modules:
-            sys.exit(f"{name} loads {library}")
+            sys.exit(f"{{name}} loads {{library}}")
 """
-    run = subprocess.run([sys.executable, "-c", code, *WITHOUT_MPI], capture_output=True, text=True, timeout=60)
+    run = subprocess.run([sys.executable, "-c", code, *names], capture_output=True, text=True, timeout=60)
     assert run.returncode == 0, run.stderr
 
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.material import Material
@@ -16,11 +17,9 @@ from pbem.model.model import (
     Condition,
     Interface,
     Law,
-    Loop,
     Model,
     Quantity,
     Region,
-    Side,
     SolverOptions,
     Stage,
 )

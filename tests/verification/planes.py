@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.material import Material
@@ -18,10 +19,8 @@ from pbem.model.model import (
     Condition,
     Interface,
     Law,
-    Loop,
     Model,
     Region,
-    Side,
     SolverOptions,
     Stage,
 )

@@ -58,7 +58,7 @@ class Fault:
     @classmethod
     def at(cls, path: KeyPath, found: str, expected: str) -> Fault:
         """A fault of an object and its field; who reads a file adds the line."""
-        return cls(format_path(path), found, expected, path)
+        return cls(format_path(path) or "the case", found, expected, path)
 
     def __str__(self) -> str:
         return printable(f"{self.place}: found {self.found}; expected {self.expected}")

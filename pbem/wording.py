@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from datetime import date, time
 
 from pbem.errors import printable
 
@@ -26,7 +27,11 @@ def show(value: object) -> str:
 def _show_plain(value: object) -> str:
     if isinstance(value, int) and abs(value) > 10**30:
         return "a number of more than 30 digits"
-    return str(value) if isinstance(value, (int, float)) else f"{value} (a date or time)"
+    if isinstance(value, (int, float)):
+        return str(value)
+    if isinstance(value, (date, time)):
+        return f"{value} (a date or time)"
+    return "None" if value is None else f"an object of type {type(value).__name__}"
 
 
 def suggest(name: str, known: Iterable[str]) -> str:

@@ -12,6 +12,7 @@ Inside the program a point or a vector of the plane is one complex number x + iy
 as (theory, 12): that is formula 12 of the page that `pbem help theory` prints.
 
     results = pbem.run("case.toml")              # solve a case; see pbem.driver.run
+    case = pbem.Case(materials={...}, ...)       # or a case made by calls, to be solved; see pbem.case.case.Case
     results = pbem.open_results("case.h5")       # read a result file; see pbem.results.reader.open_results
 """
 
@@ -31,16 +32,17 @@ from pbem.errors import (
 from pbem.version import __version__
 
 if TYPE_CHECKING:
+    from pbem.case.case import Case
     from pbem.driver import run
     from pbem.results.reader import open_results
 
 __all__ = [
-    "CaseError", "ConvergenceError", "LaunchError", "LawError", "PbemError", "ResultFileError", "StopError",
+    "Case", "CaseError", "ConvergenceError", "LaunchError", "LawError", "PbemError", "ResultFileError", "StopError",
     "StorageError", "__version__", "open_results", "run",
 ]
 
 # Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5.
-_AT_FIRST_USE = {"run": "pbem.driver", "open_results": "pbem.results.reader"}
+_AT_FIRST_USE = {"Case": "pbem.case.case", "run": "pbem.driver", "open_results": "pbem.results.reader"}
 
 
 def __getattr__(name: str) -> Any:

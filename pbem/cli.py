@@ -216,7 +216,7 @@ def _make(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from pbem.contact.strength import read_checked_model
+    from pbem.case.build import read_checked_model
     from pbem.mesh.generate import generate_mesh
     from pbem.results.describe import describe_model
     from pbem.results.output import check_picture_path

@@ -1,4 +1,4 @@
-"""A run from the case file to the finished results, on the ranks of the present MPI world."""
+"""A run from the case to the finished results, on the ranks of the present MPI world."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.contact.strength import read_checked_model
+from pbem.case.build import Source, find_file, make_checked_model
+from pbem.description.case import UNNAMED
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -40,7 +41,7 @@ from pbem.solve.watch import Watch
 
 
 def run(
-    case: str | os.PathLike[str],
+    case: Source,
     output: str | os.PathLike[str] | None = None,
     *,
     resume: bool = False,
@@ -49,14 +50,14 @@ def run(
     operator: Operator | None = None,
     reporter: Reporter | None = None,
 ) -> Results:
-    """Read a case file, solve it, and return its results.
+    """Solve a case, and return its results.
 
-    case: path of the TOML file. output: path of the result file; by default the case's name with .h5, in the working
-    directory. resume: go on after the last step that the file holds. force: replace results that are there; without
-    either, they are left alone. petsc: PETSc options without prefix, which win over the case's [petsc] table.
-    operator: "auto", "dense" or "hierarchical", in place of the case's solver.operator; the configuration in the result
-    file tells it. reporter: told of the progress, on the first rank only. Every rank of an MPI run calls this and gets
-    the results.
+    case: path of the TOML file, a pbem.Case, or its tables as a dictionary. output: path of the result file; by default
+    the name of the case's file with .h5 (case.h5 if it has none), in the working directory. resume: go on after the
+    last step that the file holds. force: replace results that are there; without either, they are left alone. petsc:
+    PETSc options without prefix, which win over the case's [petsc] table. operator: "auto", "dense" or "hierarchical",
+    in place of the case's solver.operator; the configuration in the result file tells it. reporter: told of the
+    progress, on the first rank only. Every rank of an MPI run calls this and gets the results.
 
     Raises LaunchError (ranks, libraries or threads that do not fit together), CaseError (all faults of the case),
     ResultFileError (the output cannot be written, is there already, or is another case's), ConvergenceError (the file
@@ -70,13 +71,14 @@ def run(
         with abort_if_unexpected(world, PbemError), StopSignals() as signals:
             placement = check_start(world)
             signals.at_once = world.size == 1
-            path = Path(case)
-            model = do_on_first(world, PbemError, lambda: _read(path, operator))
-            target = Path(output) if output is not None else Path(path.stem + ".h5")
-            inputs = [path, *map(Path, model.law_texts)]
+            path = find_file(case)
+            name = UNNAMED if path is None else str(path)
+            model = do_on_first(world, PbemError, lambda: _make_model(case, name, operator))
+            target = Path(output) if output is not None else Path("case.h5" if path is None else path.stem + ".h5")
+            inputs = [*([path] if path else []), *map(Path, model.law_texts)]
             do_on_first(world, PbemError, lambda: check_output_path(
                 target, resume=resume, force=force, source=model.source, inputs=inputs))
-            do_on_first(world, PbemError, lambda: check_options(str(path), model.solver.petsc, petsc or {}))
+            do_on_first(world, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
             watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)
             options = {**model.solver.petsc, **(petsc or {})}
             with petsc_options(options):
@@ -100,13 +102,13 @@ class _Target:
     force: bool
 
 
-def _read(path: Path, operator: Operator | None) -> Model:
-    model = read_checked_model(path)
+def _make_model(case: Source, name: str, operator: Operator | None) -> Model:
+    model = make_checked_model(case)
     if operator is None:
         return model
     if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
         found = f'"{model.solver.linear}" with operator = "hierarchical", which stores no matrix to factor'
-        raise CaseError(str(path), (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
+        raise CaseError(name, (Fault("solver.linear", found, '"auto" or "gmres", or another operator'),))
     return replace(model, solver=replace(model.solver, operator=operator))
 
 

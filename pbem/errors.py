@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from dataclasses import dataclass
 from typing import Any
@@ -24,17 +25,40 @@ def printable(text: str, keep: str = "") -> str:
     )
 
 
+# The object and its field: names of tables and keys, numbers of the entries of lists from 0.
+KeyPath = tuple[str | int, ...]
+_BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
+
+
+def format_path(path: KeyPath) -> str:
+    """The path as a user would write it, e.g. ``curves.wall.points[2]``; entries of lists count from 1."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part + 1}]"
+        else:
+            key = part if _BARE.match(part) else '"' + part.replace("\\", "\\\\").replace('"', '\\"') + '"'
+            text += f".{key}" if text else key
+    return text
+
+
 @dataclass(frozen=True)
 class Fault:
-    """One thing that is wrong with a case file.
+    """One thing that is wrong with a case.
 
-    place: where in the file, as the user wrote it, e.g. ``materials.soft.young`` or ``line 3, column 7``
-    found: what stands there; expected: what should stand there.
+    place: where, as the user wrote it, e.g. ``materials.soft.young``, in a file with its line, or ``line 3, column 7``
+    found: what stands there; expected: what should stand there; path: of the object and its field, if there is one.
     """
 
     place: str
     found: str
     expected: str
+    path: KeyPath = ()
+
+    @classmethod
+    def at(cls, path: KeyPath, found: str, expected: str) -> Fault:
+        """A fault of an object and its field; who reads a file adds the line."""
+        return cls(format_path(path) or "the case", found, expected, path)
 
     def __str__(self) -> str:
         return printable(f"{self.place}: found {self.found}; expected {self.expected}")

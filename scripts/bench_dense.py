@@ -24,8 +24,8 @@ import numpy as np
 from make_crack_field import scatter_cracks
 
 import pbem
+from pbem.case.build import read_model
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import read_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.step import Iteration, SilentReporter, Step

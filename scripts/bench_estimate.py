@@ -34,12 +34,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from pbem.contact.laws import collect_laws
 from pbem.driver import make_estimator
 from pbem.errors import ConvergenceError
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.shape import WIDEST_ARC
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.interpolation import interpolate, interpolate_tips
-from pbem.model.curve import Curve, Leg
 from pbem.model.model import Model
 from pbem.model.refinement import bisect_elements, count_elements
-from pbem.model.shape import WIDEST_ARC
 from pbem.results.accuracy import Pass, decide
 from pbem.results.estimates import Comparison, Relative
 from pbem.solve.beside import relate_meshes

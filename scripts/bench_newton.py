@@ -20,12 +20,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.case.build import read_model
 from pbem.contact.constraints import read_pair_unknowns
 from pbem.contact.laws import STICK, ModeState, PairState, evaluate_strength, start_memory
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import read_model
 from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem

@@ -116,8 +116,8 @@ def load_kernels(path: Path) -> ModuleType:
 def work(kernels: Path, records: Path, first: int, count: int, most_nodes: int) -> None:
     """On all ranks: so many pairs from a seed on; the first rank adds a line for each."""
     from pbem.bem import rows
+    from pbem.case.build import read_model
     from pbem.mesh.generate import generate_mesh
-    from pbem.model.build import read_model
     from pbem.parallel import world
     from scripts.torture.kinds import draw_sample
 

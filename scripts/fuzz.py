@@ -36,7 +36,7 @@ from pathlib import Path
 import numpy as np
 
 from pbem import cli
-from pbem.contact.strength import read_checked_model
+from pbem.case.build import read_checked_model
 from pbem.errors import CaseError, ConvergenceError, PbemError, is_control
 from pbem.mesh.generate import generate_mesh
 from pbem.results.describe import describe_model, describe_results

@@ -21,15 +21,15 @@ from unittest import mock
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.case.build import parse_model
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes
 from pbem.errors import ConvergenceError
+from pbem.geometry.nearness import WEDGE
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model import sliver
-from pbem.model.build import parse_model
-from pbem.model.nearness import WEDGE
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march

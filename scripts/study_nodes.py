@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbem.case.build import parse_model
 from pbem.mesh import shapes
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march

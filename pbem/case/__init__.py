@@ -1,6 +1,7 @@
-"""What the user writes: the case file's schema, its reader, and the faults it can have."""
+"""Case files: their reader, which says every fault with its line, and what writes them."""
 
-from pbem.case.reader import Case, Draft, parse_case, parse_draft, read_case, read_case_text
-from pbem.case.schema import json_schema
+from pbem.case.case import Case, parse_case, read_case
+from pbem.case.reader import FileDraft, parse_draft, read_case_text
+from pbem.description.schema import json_schema
 
-__all__ = ["Case", "Draft", "json_schema", "parse_case", "parse_draft", "read_case", "read_case_text"]
+__all__ = ["Case", "FileDraft", "json_schema", "parse_case", "parse_draft", "read_case", "read_case_text"]

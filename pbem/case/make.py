@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pbem.case.finding import show
-from pbem.case.reader import Case, parse_case
-from pbem.case.schema import CurveTable
+from pbem.case.case import Case, parse_case
+from pbem.description.schema import CurveTable
+from pbem.wording import show
 
 Value = float | int | str | Sequence[float]
 

@@ -2,93 +2,27 @@
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-from pydantic import PrivateAttr, ValidationError
-
-from pbem.case.conflicts import find_conflicts
-from pbem.case.controls import DEEPEST, find_controls, find_depth
-from pbem.case.finding import Finding
-from pbem.case.generation import Group, expand
-from pbem.case.places import Loc, find_line, find_lines, format_place
-from pbem.case.repair import repair
-from pbem.case.schema import CaseFile
-from pbem.case.translation import find_schema_findings
-from pbem.errors import CaseError, Fault
-
-
-class Case(CaseFile):
-    """A case file that was read and found valid. `text`: the whole file; `source`: its path, as given.
-
-    Curves, regions and laws of the tables [[generate]] are among those of the file, after them.
-    """
-
-    text: str
-    source: str
-    _lines: Mapping[Loc, int] = PrivateAttr(default_factory=dict)
-    _groups: tuple[Group, ...] = PrivateAttr(default=())
-    _origin: Mapping[str, int] = PrivateAttr(default_factory=dict)
-
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        """What the tables [[generate]] made."""
-        return self._groups
-
-    def fault(self, loc: Loc, found: str, expected: str) -> Fault:
-        """A fault with its place: `loc` is the path of a key, entries of lists from 0."""
-        place = self._find_written(loc)
-        return Fault(format_place(place, find_line(self._lines, place)), found, expected)
-
-    def _find_written(self, loc: Loc) -> Loc:
-        """The path itself, or of a curve, region or law that was generated, that of the key that it was made from."""
-        if len(loc) == 4 and loc[0] == "regions" and isinstance(loc[3], int):  # a name in a list
-            names = getattr(self.regions.get(str(loc[1])), str(loc[2]), ())
-            if loc[3] < len(names) and names[loc[3]] in self._origin:
-                return ("generate", self._origin[names[loc[3]]])
-        if loc[:2] in self._lines:
-            return loc
-        if len(loc) < 2 or loc[0] not in ("curves", "regions", "interfaces") or loc[1] not in self._origin:
-            return loc
-        place = ("generate", self._origin[str(loc[1])])
-        return (*place, loc[2]) if len(loc) > 2 and (*place, loc[2]) in self._lines else place
+from pbem.case.lines import find_line, find_lines, format_place
+from pbem.description.case import Draft, draft_case
+from pbem.description.controls import DEEPEST, find_depth
+from pbem.errors import CaseError, Fault, KeyPath
 
 
 @dataclass(frozen=True)
-class Draft:
-    """A case as far as it can be read.
+class FileDraft(Draft):
+    """A draft whose faults have their lines. lines: of every table and key, for the faults that follow."""
 
-    case: None if too much is wrong; otherwise what is wrong is left out or stands in with a harmless value, so that
-    the rest can be checked. conditions_known: no fault touches the conditions and laws.
-    """
-
-    case: Case | None
-    faults: tuple[Fault, ...]
-    conditions_known: bool = True
+    lines: Mapping[KeyPath, int] = field(default_factory=dict)
 
 
-def read_case(path: str | Path) -> Case:
-    """Read and validate a case file.
-
-    Raises CaseError with every fault of the file's tables and keys; what follows from the topology is checked by
-    `pbem.model.build.build_model`.
-    """
-    return parse_case(read_case_text(path), str(path))
-
-
-def parse_case(text: str, source: str = "case") -> Case:
-    """Validate the text of a case file; `source` names it in messages. Raises CaseError with every fault."""
-    draft = parse_draft(text, source)
-    if draft.faults or draft.case is None:
-        raise CaseError(source, draft.faults)
-    return draft.case
-
-
-def read_case_text(path: str | Path) -> str:
+def read_case_text(path: str | os.PathLike[str]) -> str:
     """The text of a case file. Raises CaseError if there is no such file, or it is no text in UTF-8."""
     expected = "the path of a case file (.toml)"
     try:
@@ -105,11 +39,11 @@ def read_case_text(path: str | Path) -> str:
     raise CaseError(str(path), (Fault("the file", found, expected),))
 
 
-def _refuse(place: str, found: str, expected: str) -> Draft:
-    return Draft(None, (Fault(place, found, expected),))
+def _refuse(place: str, found: str, expected: str) -> FileDraft:
+    return FileDraft(None, (Fault(place, found, expected),))
 
 
-def parse_draft(text: str, source: str = "case") -> Draft:
+def parse_draft(text: str, source: str = "case") -> FileDraft:
     """Validate a text as far as possible; never raises for what is wrong with it."""
     try:
         raw = tomllib.loads(text)
@@ -124,16 +58,20 @@ def parse_draft(text: str, source: str = "case") -> Draft:
     if deep is not None:
         return _refuse(format_place(deep[:4], find_line(lines, deep[:1])), f"tables and lists within each other more "
                        f"than {DEEPEST} deep", "the tables and keys of a case file")
-    findings = find_controls(raw) + find_conflicts(raw) + find_schema_findings(raw)
-    case, more = _compose_draft(raw, findings, text, source, lines)
-    findings = _order(findings + more, lines)
-    faults = tuple(
-        Fault(format_place(f.loc, find_line(lines, f.loc)), f.found, f.expected) for f in findings
-    )
-    return Draft(case, faults, not any(_concerns_loads(finding.loc) for finding in findings))
+    draft = draft_case(raw, source)
+    faults = _order(add_lines(draft.faults, lines), lines)
+    return FileDraft(draft.case, faults, draft.conditions_known, lines)
 
 
-def _refuse_syntax(message: str) -> Draft:
+def add_lines(faults: Iterable[Fault], lines: Mapping[KeyPath, int]) -> list[Fault]:
+    """The faults with the lines of what they are about in their places."""
+    return [
+        replace(fault, place=format_place(fault.path, find_line(lines, fault.path))) if fault.path else fault
+        for fault in faults
+    ]
+
+
+def _refuse_syntax(message: str) -> FileDraft:
     at = re.search(r"\(at (line (\d+), column (\d+)|end of document)\)", message)
     found = message[: at.start()].strip() if at else message
     place = at[1] if at else "the file"
@@ -141,45 +79,6 @@ def _refuse_syntax(message: str) -> Draft:
     return _refuse(place, found, "a TOML file (key = value, [table])")
 
 
-def _concerns_loads(loc: Loc) -> bool:
-    """Whether a fault here leaves open what holds and what loads the bodies."""
-    if loc and loc[0] == "materials":
-        return loc[-1] == "density"
-    return bool(loc) and (loc[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
-                          loc[0] not in CaseFile.model_fields)
-
-
-def _order(findings: list[Finding], lines: Mapping[Loc, int]) -> list[Finding]:
-    """By line, each once; tables that are missing in the order of the schema."""
-    tables = list(CaseFile.model_fields)
-
-    def find_rank(finding: Finding) -> tuple[int, int]:
-        line, table = find_line(lines, finding.loc) or 0, finding.loc[0] if finding.loc else ""
-        return line, tables.index(str(table)) if not line and table in tables else 0
-
-    return sorted(dict.fromkeys(findings), key=find_rank)
-
-
-def _compose_draft(
-    raw: Mapping[str, Any], findings: list[Finding], text: str, source: str, lines: Mapping[Loc, int]
-) -> tuple[Case | None, list[Finding]]:
-    """The case with what it generates, as far as it can be judged, and what is wrong with generating it."""
-    patched = repair(raw, findings)
-    if patched is None:
-        return None, []
-    try:
-        case = Case.model_validate({**patched, "text": text, "source": source})
-    except ValidationError:
-        return None, []
-    case._lines = lines
-    if not case.generate:
-        return case, []
-    expansion, wrong = expand(case)
-    if expansion is None:
-        return None, wrong
-    case = case.model_copy(update={
-        "curves": expansion.curves, "regions": expansion.regions, "interfaces": expansion.interfaces,
-        "stages": expansion.stages,
-    })
-    case._groups, case._origin = expansion.groups, expansion.origin
-    return case, []
+def _order(faults: list[Fault], lines: Mapping[KeyPath, int]) -> tuple[Fault, ...]:
+    """By line; tables that are missing as they were, in the order of the schema."""
+    return tuple(sorted(faults, key=lambda fault: find_line(lines, fault.path) or 0))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.background import Background
+from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
-from pbem.model.loop import loop_legs
 from pbem.model.model import Model, Region, Stage
 
 Real = NDArray[np.float64]

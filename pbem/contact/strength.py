@@ -11,8 +11,6 @@ far (>= 0), both arrays, in a Python file that the case names: law = "custom", f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +19,7 @@ from pbem.contact.custom import CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
 from pbem.contact.rate_and_state import RateAndState
 from pbem.contact.strength_type import Strength
-from pbem.errors import CaseError, Fault
-from pbem.model.build import read_model
+from pbem.errors import Fault
 from pbem.model.model import Law, Model
 
 Real = NDArray[np.float64]
@@ -128,15 +125,3 @@ def _try(law: Law) -> str:
         return function.fault.partition("; expected")[0]
     except Exception as error:  # a user's file may raise anything
         return f"a law that fails ({type(error).__name__}: {error})"
-
-
-def read_checked_model(path: Path) -> Model:
-    """Read a case and build its model, with the texts of its custom laws, which are tried.
-
-    Raises CaseError with its faults; those of laws come last.
-    """
-    _, model = read_model(path)
-    faults = check_custom_laws(model)
-    if faults:
-        raise CaseError(str(path), faults)
-    return replace(model, law_texts=read_law_texts(law.file for law in list_laws(model).values()))

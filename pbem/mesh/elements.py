@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.geometry.curve import Curve
 from pbem.mesh.shapes import integrate_shapes
-from pbem.model.curve import Curve
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pbem.case.finding import list_names
-from pbem.model.curve import Curve
+from pbem.geometry.curve import Curve
 from pbem.model.facing import Strip, find_strips
 from pbem.model.model import Model, Region
+from pbem.wording import list_names
 
 # Notes on inner loops of one region, beyond which there is one for all.
 MOST_NOTES = 6

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from pbem.case import Case
-from pbem.case.schema import GravityTable, StressTable
-from pbem.errors import Fault
+from pbem.description.case import Case
+from pbem.description.schema import GravityTable, StressTable
+from pbem.errors import Fault, KeyPath
 from pbem.model.roles import unknown_name
 
-Loc = tuple[str | int, ...]
 Stress = tuple[float, float, float]
 
 
@@ -50,33 +49,33 @@ def _update(values: list[float], table: StressTable | GravityTable | None, keys:
 def _check_remote(case: Case) -> Iterator[Fault]:
     if any(table.infinite for table in case.regions.values()):
         return
-    places: list[Loc] = [("remote",)] if case.remote else []
+    places: list[KeyPath] = [("remote",)] if case.remote else []
     places += [("stages", number, "remote") for number, stage in enumerate(case.stages) if stage.remote]
     for loc in places:
         expected = "infinite = true in a region, or no such table"
-        yield case.fault(loc, "remote stress without an infinite region", expected)
+        yield Fault.at(loc, "remote stress without an infinite region", expected)
 
 
 def _check_gravity(case: Case) -> Iterator[Fault]:
     """Gravity has to act on something, and the weight of an infinite region has no support."""
     used = {name: case.materials[table.material] for name, table in case.regions.items()
             if table.material in case.materials}
-    tables: list[tuple[Loc, GravityTable | None]] = [(("gravity",), case.gravity)]
+    tables: list[tuple[KeyPath, GravityTable | None]] = [(("gravity",), case.gravity)]
     tables += [(("stages", number, "gravity"), stage.gravity) for number, stage in enumerate(case.stages)]
     for loc, table in tables:
         if table is None or not (table.gx or table.gy) or not used:
             continue
         if not any(material.density for material in used.values()):
-            yield case.fault(loc, "gravity on regions without density", "a density > 0 in the material of a region")
+            yield Fault.at(loc, "gravity on regions without density", "a density > 0 in the material of a region")
         for name, material in used.items():
             if case.regions[name].infinite and material.density:
                 found = f"the weight of an infinite region ('{name}', density {material.density:g})"
                 table_name = f"[initial_stress.{case.regions[name].material}]"
                 expected = f"density = 0 there; its stress at rest goes into {table_name}"
-                yield case.fault(loc, found, expected)
+                yield Fault.at(loc, found, expected)
 
 
 def _check_materials(case: Case) -> Iterator[Fault]:
     for name in case.initial_stress:
         if name not in case.materials:
-            yield unknown_name(case, ("initial_stress", name), name, "material", case.materials)
+            yield unknown_name(("initial_stress", name), name, "material", case.materials)

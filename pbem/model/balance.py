@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pbem.model.junction import format_point
-from pbem.model.loop import loop_legs, side_legs
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import loop_legs, side_legs
+from pbem.geometry.sampling import leg_normals
 from pbem.model.model import Condition, Model, Region, Stage
-from pbem.model.sampling import leg_normals
 from pbem.model.support import FreeMotion
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.

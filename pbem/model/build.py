@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from pbem.case import Case, parse_draft, read_case_text
-from pbem.case.finding import list_names
+from pbem.description.case import Case
 from pbem.errors import CaseError, Fault
+from pbem.geometry.curve import Curve
+from pbem.geometry.junction import find_crossings, split_at_junctions
+from pbem.geometry.loop import Loops, find_loops
 from pbem.model.balance import describe_unbalance
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
@@ -20,22 +21,20 @@ from pbem.model.crack import (
     describe_near_misses,
     find_tips,
 )
-from pbem.model.curve import Curve
 from pbem.model.facing import check_facing, split_opposite_ends
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
-from pbem.model.junction import find_crossings, split_at_junctions
 from pbem.model.law import check_gap
 from pbem.model.loading import Loading, read_loading
-from pbem.model.loop import Loops, find_loops
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.roles import Roles, resolve_roles
-from pbem.model.shape import shape_curves
+from pbem.model.shaping import shape_curves
 from pbem.model.support import find_free_motions, find_least_stiffness, find_plane_translations
+from pbem.wording import list_names
 
 # Faults shown of what one table [[generate]] made.
 MOST_FAULTS = 5
@@ -55,28 +54,13 @@ class _Topology:
 
 def build_model(case: Case) -> Model:
     """Resolve and check a case. Raises CaseError with every fault of names, topology, laws, loads and support."""
-    model, faults = _examine(case, conditions_known=True)
+    model, faults = examine(case)
     if model is None or faults:
-        raise CaseError(case.source, _shorten(faults))
+        raise CaseError(case.source, shorten(faults))
     return model
 
 
-def read_model(path: str | Path) -> tuple[Case, Model]:
-    """Read a case file and build its model. Raises CaseError with the faults of file and topology together."""
-    return parse_model(read_case_text(path), str(path))
-
-
-def parse_model(text: str, source: str = "case") -> tuple[Case, Model]:
-    """`parse_case` and `build_model` in one: raises CaseError with the faults of both together."""
-    draft = parse_draft(text, source)
-    model, faults = _examine(draft.case, draft.conditions_known) if draft.case else (None, [])
-    faults = [*draft.faults, *faults]
-    if draft.case is None or model is None or faults:
-        raise CaseError(source, _shorten(faults))
-    return draft.case, model
-
-
-def _shorten(faults: list[Fault]) -> tuple[Fault, ...]:
+def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     """Each fault once; of many at the same table [[generate]] the first few, and how many more there are."""
     shown: list[Fault] = []
     counts: Counter[str] = Counter()
@@ -92,6 +76,12 @@ def _shorten(faults: list[Fault]) -> tuple[Fault, ...]:
     return tuple(shown)
 
 
+def examine(case: Case, conditions_known: bool = True) -> tuple[Model | None, list[Fault]]:
+    """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged."""
+    model, faults = _examine(case, conditions_known)
+    return model, [case.trace(fault) for fault in faults]
+
+
 def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:
     roles = resolve_roles(case)
     loading = read_loading(case, roles)
@@ -102,20 +92,20 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         return None, faults
     model, faults = _compose(case, roles, loading, topology)
     model = replace(model, interior_points=interior)
-    faults += [*check_turning(case, model.curves), *check_facing(case, model)]
+    faults += [*check_turning(case, model.curves), *check_facing(model)]
     gaps = [
         fault for name, interface in model.interfaces.items()
-        for fault in check_gap(case, ("interfaces", name), interface.law, model.curves[name])
+        for fault in check_gap(("interfaces", name), interface.law, model.curves[name])
     ]
     gaps += [
         fault for name, contact in model.contacts.items()
-        for fault in check_gap(case, ("contacts", name), contact.law, model.curves[contact.first])
+        for fault in check_gap(("contacts", name), contact.law, model.curves[contact.first])
     ]
     faults += gaps
     radii = {name: table.radius for name, table in case.curves.items() if table.radius is not None}
     model = move_to_own_origin(model, radii)
     if conditions_known and not gaps:
-        wrong, notes = _check_support(case, model)
+        wrong, notes = _check_support(model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
     return model, faults
@@ -131,17 +121,19 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     touching = {
         frozenset(pair) for pair in roles.contacts.values() if roles.outer[pair[0]] != roles.outer[pair[1]]
     }
-    crossings = find_crossings(case, curves, cracks, shapes.tolerance, touching)
-    loops, wrong = find_loops(case, curves, shapes.tolerance, check_nesting=not crossings)
+    crossings = find_crossings(curves, cracks, shapes.tolerance, touching)
+    boundaries = {name: table.boundary for name, table in case.regions.items()}
+    infinite = {name for name, table in case.regions.items() if table.infinite}
+    loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
     faults = [*shapes.faults, *crossings, *wrong]
     notes = list(split.notes)
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
-        faults += check_near_misses(case, curves, cracks)
-        faults += find_coincidences(case, curves, loops, roles)
-        closing, cuts = check_closing(case, curves, cracks, loops)
+        faults += check_near_misses(curves, cracks)
+        faults += find_coincidences(curves, loops, roles)
+        closing, cuts = check_closing(curves, cracks, loops)
         faults += closing
         notes += cuts
     if not faults:
@@ -183,7 +175,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         case, curves, regions, topology.tips, frozenset(loading.interfaces) | frozenset(roles.in_contact)
     )
     model = Model(
-        title=case.title, units_length=case.units.length, units_stress=case.units.stress, source=case.text,
+        title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",
         regions=regions, curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
         analysis=Analysis(
@@ -238,7 +230,7 @@ def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
                for stiffness in condition.stiffness)
 
 
-def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
+def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults, balanced = [], []
     regions = {region.name: region for region in model.regions}
@@ -251,7 +243,7 @@ def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
         soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
-        faults.append(case.fault(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+        faults.append(Fault.at(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
     notes = []
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
@@ -266,7 +258,7 @@ def _check_support(case: Case, model: Model) -> tuple[list[Fault], list[str]]:
             found = f"a net force on the infinite region '{name}': {unbalance}"
             expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "
                         "logarithm of the distance and has no value; or a finite region that is held")
-            faults.append(case.fault(("regions", name), found, expected))
+            faults.append(Fault.at(("regions", name), found, expected))
     sentence = "Nothing prevents: {}. The loads balance, and the mean displacement and rotation are set to zero."
     listed = [*balanced[:6], *([f"and {len(balanced) - 6} more"] if len(balanced) > 6 else [])]
     return faults, [*([sentence.format("; ".join(listed))] if balanced else []), *dict.fromkeys(notes)]

@@ -6,13 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pbem.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import project
-from pbem.model.junction import format_point
-from pbem.model.loop import Loops
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import project
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import Loops
 from pbem.model.roles import Roles
 
 # Faces nearer to each other than this part of the shorter of their legs are meant to be one.
@@ -22,7 +21,7 @@ BESIDE = 1e-2
 _FRACTIONS = np.linspace(0.0, 1.0, 9)
 
 
-def find_coincidences(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles) -> list[Fault]:
+def find_coincidences(curves: Mapping[str, Curve], loops: Loops, roles: Roles) -> list[Fault]:
     """A fault for every two curves that all but coincide on a part of their length, with their distance.
 
     Left alone are faces of bodies that have a contact with each other, whose clearance may be as small as is liked, and
@@ -45,7 +44,7 @@ def find_coincidences(case: Case, curves: Mapping[str, Curve], loops: Loops, rol
                 "one curve in both lists where they are joined or pressed, a contact between bodies that have a "
                 f"clearance, or at least {COINCIDENT * min(leg.length, second.length):.1g} between them"
             )
-            faults[one, other] = case.fault(("curves", other), found, expected)
+            faults[one, other] = Fault.at(("curves", other), found, expected)
     return list(faults.values())
 
 

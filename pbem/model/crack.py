@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points, project
-from pbem.model.junction import format_point
-from pbem.model.loop import Loops, is_inside, loop_legs
-from pbem.model.model import Loop
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import inner_points, project
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import Loop, Loops, is_inside, loop_legs
 
 # A tip nearer to another curve than this part of its crack's last leg is taken for a slip of the pen.
 NEAR_MISS = 1e-6
@@ -58,7 +57,7 @@ def check_tip_elements(
         if case.analysis.tips and all(ends) and sum(leg.elements for leg in curves[name].legs) < 2:
             key = "elements" if case.curves[name].elements is not None else "size"
             expected = "at least 2, one for each tip; or tips = false in [analysis]"
-            faults.append(case.fault(("curves", name, key), f"1 element on crack '{name}' with two tips", expected))
+            faults.append(Fault.at(("curves", name, key), f"1 element on crack '{name}' with two tips", expected))
     return faults
 
 
@@ -103,12 +102,12 @@ def _find_misses(
     return [found[which] for which in sorted(found)]
 
 
-def check_near_misses(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> list[Fault]:
+def check_near_misses(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> list[Fault]:
     """A fault for every tip so near to another curve that it must have been meant to lie on it."""
     reach = {name: NEAR_MISS * max(leg.length for leg in curves[name].legs) for name in cracks}
     expected = "an end on the curve, or clearly away from it"
     return [
-        case.fault(
+        Fault.at(
             ("curves", miss.crack),
             f"crack '{miss.crack}' ending at {format_point(miss.point)}, {miss.distance:.2g} off curve '{miss.other}'",
             expected,
@@ -156,7 +155,7 @@ def check_inside(case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, s
             name, point = names[number], complex(points[outside[first]])
             loc = ("regions", region, "cracks", case.regions[region].cracks.index(name))
             found = f"crack '{name}' outside region '{region}', at {format_point(point)}"
-            faults.append(case.fault(loc, found, "a crack inside its region, which it may touch with its ends"))
+            faults.append(Fault.at(loc, found, "a crack inside its region, which it may touch with its ends"))
     return faults
 
 
@@ -168,7 +167,7 @@ def _group_by_region(cracks: Mapping[str, str]) -> dict[str, list[str]]:
 
 
 def check_closing(
-    case: Case, curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops
+    curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops
 ) -> tuple[list[Fault], list[str]]:
     """Faults for cracks that enclose a part of their region, notes for those that cut it together with its boundary.
 
@@ -184,7 +183,7 @@ def check_closing(
             closing.add(name)
             found = f"crack '{name}' closing a ring of cracks, which cuts region '{region}' in two"
             expected = "cracks that enclose nothing: make the enclosed part a region, and the ring its interface"
-            faults.append(case.fault(("curves", name), found, expected))
+            faults.append(Fault.at(("curves", name), found, expected))
     of_region = _group_by_region(cracks)
     for region in loops:
         own = [name for name in of_region.get(region, []) if name not in closing]

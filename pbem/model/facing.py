@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points, measure_distances, project, surround
-from pbem.model.junction import format_point, split_leg
-from pbem.model.loop import Loops, side_legs
-from pbem.model.model import Contact, Model, Region, Side
-from pbem.model.sampling import leg_normals
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import inner_points, measure_distances, project, surround
+from pbem.geometry.junction import format_point, split_leg
+from pbem.geometry.loop import Loops, Side, side_legs
+from pbem.geometry.sampling import leg_normals
+from pbem.model.model import Contact, Model, Region
 
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
@@ -119,7 +118,7 @@ def _is_on_arc(leg: Leg, points: Complex) -> NDArray[np.bool_]:
     return np.asarray(angle % (2 * np.pi) <= abs(leg.sweep))
 
 
-def check_facing(case: Case, model: Model) -> list[Fault]:
+def check_facing(model: Model) -> list[Fault]:
     """A fault for every contact whose curves never face each other, with what is known of their distance."""
     sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
     faults = []
@@ -135,7 +134,7 @@ def check_facing(case: Case, model: Model) -> list[Fault]:
             f"(nearest at {format_point(complex(points[at]))}, {distances[at]:.3g} apart)"
         )
         expected = "two curves that the outward normals of one of them meet, with nothing in between"
-        faults.append(case.fault(("contacts", name), found, expected))
+        faults.append(Fault.at(("contacts", name), found, expected))
     return faults
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pbem.case import Case
-from pbem.case.finding import list_names
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.curve import Curve
-from pbem.model.junction import format_point
+from pbem.geometry.curve import Curve
+from pbem.geometry.junction import format_point
 from pbem.model.lengths import count_elements
 from pbem.model.model import Region
 from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
 from pbem.model.slot import Side
+from pbem.wording import list_names
 
 # Curves and corners that are named in one note.
 MOST_NAMED = 8
@@ -48,18 +48,18 @@ def fit_curves(
     ]
     sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order)
     if sizes.excess is not None:
-        return FittedCurves(curves, (), (), (_refuse(case, sizes.excess),))
+        return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     notes = [*_note_added(curves, sizes.curves), *_note_ties(ties), *_note_long(sizes.long)]
     return FittedCurves(sizes.curves, ties, tuple(notes), ())
 
 
-def _refuse(case: Case, excess: Excess) -> Fault:
+def _refuse(excess: Excess) -> Fault:
     found = (
         f"curves '{excess.curve}' and '{excess.other}' at a distance of {excess.distance:.3g}, which would need "
         f"elements of {excess.length:.3g} and far more of them than were asked for"
     )
-    return case.fault(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
+    return Fault.at(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
 
 
 def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list[str]:

@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbem.case import Case
-from pbem.case.finding import list_names
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.curve import Curve, Leg, turning_angle
-from pbem.model.junction import Places
-from pbem.model.shape import WIDEST_ARC, share
+from pbem.geometry.curve import Curve, Leg, turning_angle
+from pbem.geometry.junction import Places
+from pbem.geometry.shape import WIDEST_ARC, share
+from pbem.wording import list_names
 
 # A curve that turns by less than this goes on smoothly.
 SMOOTH = math.radians(1.0)
@@ -86,7 +86,7 @@ def check_turning(case: Case, curves: Mapping[str, Curve]) -> list[Fault]:
             enough = f"at least {sum(counts)} elements" if key == "elements" else "smaller elements"
             found = f"an element that turns by {turn:.3g} degrees, as its curve is split or graded"
             expected = f"at most {WIDEST_ARC:g} degrees: {enough}, or less grading"
-            faults.append(case.fault(("curves", name, key), found, expected))
+            faults.append(Fault.at(("curves", name, key), found, expected))
     return faults
 
 

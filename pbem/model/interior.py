@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
 
 MOST_POINTS = 10_000_000
@@ -21,11 +21,11 @@ def list_interior_points(case: Case) -> tuple[tuple[complex, ...], list[Fault]]:
     faults = []
     loc = ("output", "interior")
     if across * up > MOST_POINTS:
-        faults.append(case.fault((*loc, "shape"), f"{across * up} points", f"at most {MOST_POINTS}"))
+        faults.append(Fault.at((*loc, "shape"), f"{across * up} points", f"at most {MOST_POINTS}"))
     for side, low, high, count in (("width", x0, x1, across), ("height", y0, y1, up)):
         if low == high and count > 1:
             found = f"{count} points across a box without {side}"
-            faults.append(case.fault((*loc, "box"), found, "two opposite corners x0, y0, x1, y1 of a box"))
+            faults.append(Fault.at((*loc, "box"), found, "two opposite corners x0, y0, x1, y1 of a box"))
     if faults:
         return (), faults
     x, y = np.meshgrid(np.linspace(x0, x1, across), np.linspace(y0, y1, up))

@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve
-from pbem.model.nearness import Surroundings
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve
+from pbem.geometry.nearness import Surroundings
 from pbem.model.sliver import Wedges
 
 Integer = NDArray[np.int64]

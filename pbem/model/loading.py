@@ -6,16 +6,15 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pbem.case import Case
-from pbem.case.effects import TIMED
-from pbem.case.schema import LawTable, StageConditionTable
-from pbem.errors import Fault
+from pbem.description.case import Case
+from pbem.description.effects import TIMED
+from pbem.description.schema import LawTable, StageConditionTable
+from pbem.errors import Fault, KeyPath
 from pbem.model.background import Backgrounds, read_backgrounds
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage
 from pbem.model.roles import Roles, unknown_name
 
-Loc = tuple[str | int, ...]
 # Key to frame, direction and quantity.
 _KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {
     "ux": ("global", 0, "displacement"), "uy": ("global", 1, "displacement"),
@@ -80,9 +79,9 @@ def _given(table: StageConditionTable) -> dict[str, float]:
     return values
 
 
-def _tables(case: Case, curve: str) -> list[tuple[Loc, StageConditionTable]]:
+def _tables(case: Case, curve: str) -> list[tuple[KeyPath, StageConditionTable]]:
     """The condition tables of a curve in the order in which they act: base, then stages."""
-    tables: list[tuple[Loc, StageConditionTable]] = []
+    tables: list[tuple[KeyPath, StageConditionTable]] = []
     if curve in case.boundary:
         tables.append((("boundary", curve), case.boundary[curve]))
     for number, stage in enumerate(case.stages):
@@ -94,7 +93,7 @@ def _tables(case: Case, curve: str) -> list[tuple[Loc, StageConditionTable]]:
 def _check_names(case: Case, roles: Roles) -> list[Fault]:
     faults = []
     two_sided = [*roles.shared, *roles.cracks]
-    places: list[tuple[Loc, Iterable[str]]] = [((), case.boundary)]
+    places: list[tuple[KeyPath, Iterable[str]]] = [((), case.boundary)]
     places += [(("stages", number), stage.boundary) for number, stage in enumerate(case.stages)]
     for prefix, names in places:
         for name in names:
@@ -102,13 +101,13 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
             if name in two_sided:
                 kind = "an interface" if name in roles.shared else "a crack"
                 expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
-                faults.append(case.fault(loc, f"conditions on '{name}', {kind}", expected))
+                faults.append(Fault.at(loc, f"conditions on '{name}', {kind}", expected))
             elif name in roles.in_contact:
                 expected = f"conditions on other curves: what it does is told in [contacts.{roles.in_contact[name]}]"
                 found = f"conditions on '{name}', which is in contact '{roles.in_contact[name]}'"
-                faults.append(case.fault(loc, found, expected))
+                faults.append(Fault.at(loc, found, expected))
             elif name not in case.curves:
-                faults.append(unknown_name(case, loc, name, "curve", roles.outer or case.curves))
+                faults.append(unknown_name(loc, name, "curve", roles.outer or case.curves))
     places = [((), case.interfaces)]
     places += [(("stages", number), stage.interfaces) for number, stage in enumerate(case.stages)]
     for prefix, names in places:
@@ -116,12 +115,12 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
             loc = (*prefix, "interfaces", name)
             if name in roles.outer:
                 found = f"a law for '{name}', an outer curve of region '{roles.outer[name]}'"
-                faults.append(case.fault(loc, found, "a curve shared by two regions, or a crack"))
+                faults.append(Fault.at(loc, found, "a curve shared by two regions, or a crack"))
             elif name not in case.curves:
-                faults.append(unknown_name(case, loc, name, "interface or crack", two_sided))
+                faults.append(unknown_name(loc, name, "interface or crack", two_sided))
     for number, stage in enumerate(case.stages):
         faults += [
-            unknown_name(case, ("stages", number, "contacts", name), name, "contact", case.contacts)
+            unknown_name(("stages", number, "contacts", name), name, "contact", case.contacts)
             for name in stage.contacts if name not in case.contacts
         ]
     return faults
@@ -144,18 +143,18 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
             written = (*loc, "pressure" if table.pressure is not None and key in ("tn", "ts") else key)
             if frame not in (None, key_frame):
                 expected = f"{frame} components as before: one kind of components on a curve in all stages"
-                fault = case.fault(written, f"'{written[-1]}', a {key_frame} component", expected)
+                fault = Fault.at(written, f"'{written[-1]}', a {key_frame} component", expected)
                 faults.append(fault)
                 break
             frame = key_frame
             if known[direction] not in (None, quantity):
                 found = f"'{written[-1]}' where '{where[direction]}' was given before"
                 expected = f"the same kind of condition in all stages ({known[direction]} in this direction)"
-                faults.append(case.fault(written, found, expected))
+                faults.append(Fault.at(written, found, expected))
             elif quantity == "displacement" and known[direction] is None and _is_late(case, curve, order):
                 found = f"'{key}' for the first time in a later stage"
                 expected = f"its value in [boundary.{curve}] or in the first stage too (0 holds the curve)"
-                faults.append(case.fault(written, found, expected))
+                faults.append(Fault.at(written, found, expected))
             if known[direction] is None:
                 known[direction], where[direction] = quantity, str(written[-1])
     return Condition(curve, frame or "global", (known[0] or "traction", known[1] or "traction"), stiffness), faults
@@ -201,14 +200,14 @@ def _check_durations(case: Case, laws: Mapping[str, Law]) -> Iterator[Fault]:
     timed = next(((name, law.kind) for name, law in laws.items() if law.kind in TIMED), None)
     if timed is not None and not case.stages:
         found = f"no [[stages]], but the law of '{timed[0]}' is {timed[1]}, which depends on time"
-        yield case.fault(("analysis", "steps"), found, "[[stages]] with the duration of each")
+        yield Fault.at(("analysis", "steps"), found, "[[stages]] with the duration of each")
     for number, stage in enumerate(case.stages):
         if timed is not None and stage.duration is None:
             found = f"a stage without duration, but the law of '{timed[0]}' is {timed[1]}, which depends on time"
-            yield case.fault(("stages", number), found, "duration = the time that the stage takes")
+            yield Fault.at(("stages", number), found, "duration = the time that the stage takes")
         elif timed is None and stage.duration is not None:
             expected = f"a law that depends on time ({', '.join(TIMED)}) somewhere, or no such key: it has no effect"
-            yield case.fault(("stages", number, "duration"), f"duration = {stage.duration:g}", expected)
+            yield Fault.at(("stages", number, "duration"), f"duration = {stage.duration:g}", expected)
 
 
 def _update(values: list[float], table: StageConditionTable | None) -> None:

@@ -7,28 +7,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from pbem.case.generation import Group
-from pbem.model.curve import Curve, find_middle
+from pbem.description.generation import Group
+from pbem.geometry.curve import Curve, find_middle
+from pbem.geometry.loop import Loop
 from pbem.model.material import Material
 from pbem.model.sliver import Tie
 
 Quantity = Literal["displacement", "traction"]
-
-
-@dataclass(frozen=True)
-class Side:
-    """A curve as part of a loop; `forward` if the loop runs in the direction in which the curve was written."""
-
-    curve: str
-    forward: bool
-
-
-@dataclass(frozen=True)
-class Loop:
-    """A closed chain of sides, travelled with the region on the left. `outer`: counter-clockwise, around the region."""
-
-    sides: tuple[Side, ...]
-    outer: bool
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbem.model.curve import Leg
-from pbem.model.intersection import extremes
+from pbem.geometry.curve import Leg
+from pbem.geometry.intersection import extremes
 from pbem.model.model import Model
 
 # A model is moved if its middle is further away than so many times its size.

@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
+from pbem.description.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import (
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import (
     inner_points,
     measure_distances,
     meeting_points,
@@ -21,11 +21,10 @@ from pbem.model.intersection import (
     surround,
     winding_number,
 )
-from pbem.model.junction import format_point
-from pbem.model.loop import Loops, loop_legs
-from pbem.model.model import Loop
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import Loop, Loops, loop_legs
+from pbem.geometry.tolerance import Tolerance
 from pbem.model.roles import Roles
-from pbem.model.tolerance import Tolerance
 
 Complex = NDArray[np.complex128]
 
@@ -72,7 +71,7 @@ def find_overlaps(
         if found:
             expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
             text = f"region '{second.name}' overlapping region '{first.name}' ({found})"
-            faults.append(case.fault(("regions", second.name, "boundary"), text, expected))
+            faults.append(Fault.at(("regions", second.name, "boundary"), text, expected))
     return faults
 
 
@@ -141,7 +140,7 @@ def check_contacts(
             if depth > tolerance.of(curve):
                 found = f"curve '{curve}' inside region '{region}', {depth:.3g} deep at {format_point(point)}"
                 expected = "bodies that at most touch before they are loaded"
-                faults.append(case.fault(("contacts", name), found, expected))
+                faults.append(Fault.at(("contacts", name), found, expected))
                 break
     return faults
 

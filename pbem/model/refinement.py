@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Curve, Leg
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.shape import WIDEST_ARC
 from pbem.model.model import Model
-from pbem.model.shape import WIDEST_ARC
 
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]

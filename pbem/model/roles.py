@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from pbem.case import Case
-from pbem.case.finding import list_names, suggest
-from pbem.errors import Fault
+from pbem.description.case import Case
+from pbem.errors import Fault, KeyPath
+from pbem.wording import list_names, suggest
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Roles:
         return {curve: name for name, pair in self.contacts.items() for curve in pair}
 
 
-def unknown_name(case: Case, loc: tuple[str | int, ...], name: str, what: str, known: Iterable[str]) -> Fault:
+def unknown_name(loc: KeyPath, name: str, what: str, known: Iterable[str]) -> Fault:
     """A fault for a name that nothing in the file defines, with the nearest one that is defined."""
     names = list(known)
     expected = f"one of the {what}s: {list_names(names)}" if names else f"no name: the file has no such {what}"
-    return case.fault(loc, f"unknown {what} '{name}'{suggest(name, names)}", expected)
+    return Fault.at(loc, f"unknown {what} '{name}'{suggest(name, names)}", expected)
 
 
 def resolve_roles(case: Case) -> Roles:
@@ -45,23 +45,23 @@ def resolve_roles(case: Case) -> Roles:
     for region, table in case.regions.items():
         if table.material not in case.materials:
             loc = ("regions", region, "material")
-            faults.append(unknown_name(case, loc, table.material, "material", case.materials))
+            faults.append(unknown_name(loc, table.material, "material", case.materials))
         for key, names, uses in (("boundary", table.boundary, bounds), ("cracks", table.cracks, inside)):
             for index, name in enumerate(names):
                 loc_of_name = ("regions", region, key, index)
                 if name not in case.curves:
-                    faults.append(unknown_name(case, loc_of_name, name, "curve", case.curves))
+                    faults.append(unknown_name(loc_of_name, name, "curve", case.curves))
                 elif region in uses[name]:
-                    faults.append(case.fault(loc_of_name, f"curve '{name}' a second time", "each curve once"))
+                    faults.append(Fault.at(loc_of_name, f"curve '{name}' a second time", "each curve once"))
                 else:
                     uses[name].append(region)
     infinite = [region for region, table in case.regions.items() if table.infinite]
     for region in infinite[1:]:
         found = f"a second infinite region beside '{infinite[0]}'"
-        faults.append(case.fault(("regions", region, "infinite"), found, "at most one: they would overlap far away"))
+        faults.append(Fault.at(("regions", region, "infinite"), found, "at most one: they would overlap far away"))
     outer, shared, cracks = {}, {}, {}
     for name in case.curves:
-        fault = _check_use(case, name, bounds[name], inside[name])
+        fault = _check_use(name, bounds[name], inside[name])
         if fault:
             faults.append(fault)
         elif inside[name]:
@@ -85,19 +85,19 @@ def _resolve_contacts(
     for name, table in case.contacts.items():
         if name in kinds:
             found = f"the name '{name}', which is that of {kinds[name]}"
-            faults.append(case.fault(("contacts", name), found, "a name of its own, under which results are stored"))
+            faults.append(Fault.at(("contacts", name), found, "a name of its own, under which results are stored"))
         for index, curve in enumerate(table.between):
             loc = ("contacts", name, "between", index)
             if curve not in case.curves:
-                faults.append(unknown_name(case, loc, curve, "curve", outer or case.curves))
+                faults.append(unknown_name(loc, curve, "curve", outer or case.curves))
             elif curve in kinds:
                 expected = "curves that bound one region each; what touches along one curve is told in [interfaces]"
-                faults.append(case.fault(loc, f"curve '{curve}', {kinds[curve]}", expected))
+                faults.append(Fault.at(loc, f"curve '{curve}', {kinds[curve]}", expected))
             elif index and curve == table.between[0]:
-                faults.append(case.fault(loc, f"curve '{curve}' twice", "two different curves"))
+                faults.append(Fault.at(loc, f"curve '{curve}' twice", "two different curves"))
             elif curve in taken:
                 expected = "a curve in one contact only: split it where another body begins"
-                faults.append(case.fault(loc, f"curve '{curve}', which is in contact '{taken[curve]}' too", expected))
+                faults.append(Fault.at(loc, f"curve '{curve}', which is in contact '{taken[curve]}' too", expected))
             else:
                 taken[curve] = name
         if all(curve in outer and taken.get(curve) == name for curve in table.between):
@@ -105,18 +105,18 @@ def _resolve_contacts(
     return contacts, faults
 
 
-def _check_use(case: Case, name: str, bounds: list[str], inside: list[str]) -> Fault | None:
+def _check_use(name: str, bounds: list[str], inside: list[str]) -> Fault | None:
     loc = ("curves", name)
     if bounds and inside:
         found = f"curve '{name}' in the boundary of {list_names(bounds)} and as a crack in {list_names(inside)}"
-        return case.fault(loc, found, "either a boundary or a crack")
+        return Fault.at(loc, found, "either a boundary or a crack")
     if len(bounds) > 2:
         found = f"curve '{name}' in the boundary of {len(bounds)} regions ({list_names(bounds)})"
-        return case.fault(loc, found, "one region, or two that share it: split the curve where a third region begins")
+        return Fault.at(loc, found, "one region, or two that share it: split the curve where a third region begins")
     if len(inside) > 1:
         found = f"crack '{name}' in {len(inside)} regions ({list_names(inside)})"
-        return case.fault(loc, found, "a crack inside one region: split it where it meets their interface")
+        return Fault.at(loc, found, "a crack inside one region: split it where it meets their interface")
     if not bounds and not inside:
         expected = "a use in the `boundary` or `cracks` of a region, or no such curve"
-        return case.fault(loc, f"curve '{name}', which no region uses", expected)
+        return Fault.at(loc, f"curve '{name}', which no region uses", expected)
     return None

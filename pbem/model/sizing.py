@@ -19,9 +19,9 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Curve, Leg
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.nearness import Surroundings
 from pbem.model.lengths import Cells, LengthField
-from pbem.model.nearness import Surroundings
 from pbem.model.sliver import Wedges, find_wedges
 from pbem.model.slot import Side, divide_alike, find_slots
 

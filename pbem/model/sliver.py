@@ -24,8 +24,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Leg
-from pbem.model.nearness import Corner, Surroundings
+from pbem.geometry.curve import Leg
+from pbem.geometry.nearness import Corner, Surroundings
 
 Real = NDArray[np.float64]
 

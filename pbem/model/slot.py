@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbem.model.curve import Leg
+from pbem.geometry.curve import Leg
 
 # A slot is narrow if its faces are nearer than this part of the mean length of their elements.
 NARROW = 0.5

@@ -10,12 +10,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case.finding import list_names
-from pbem.model.junction import format_point
-from pbem.model.model import Contact, Interface, Law, Model, Region, Side
+from pbem.geometry.junction import format_point
+from pbem.geometry.loop import Side
+from pbem.geometry.sampling import sample_side
+from pbem.model.model import Contact, Interface, Law, Model, Region
 from pbem.model.rigid import GROUND, Link, find_moving_bodies
-from pbem.model.sampling import sample_side
 from pbem.model.touching import measure_opening
+from pbem.wording import list_names
 
 Tie = Literal["both", "normal", "none"]
 

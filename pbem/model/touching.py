@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Curve, Leg
-from pbem.model.expression import evaluate_expression
-from pbem.model.intersection import measure_distances, project
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.expression import evaluate_expression
+from pbem.geometry.intersection import measure_distances, project
 from pbem.model.model import Contact, Interface, Law, Model
 
 Complex = NDArray[np.complex128]

@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pbem.case.schema import LawTable, json_schema
+from pbem.description.schema import LawTable, json_schema
 
 Schema = Mapping[str, Any]
 

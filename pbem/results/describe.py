@@ -7,9 +7,9 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from pbem.bem.choice import estimate_dense_memory, estimate_hierarchical_memory, is_hierarchical
-from pbem.case.generation import Group
+from pbem.description.generation import Group
+from pbem.geometry.curve import Curve
 from pbem.mesh.mesh import Mesh
-from pbem.model.curve import Curve
 from pbem.model.model import Condition, Law, Model, Region
 from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips

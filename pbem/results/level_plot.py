@@ -9,11 +9,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from pbem.case.build import parse_model
 from pbem.errors import ResultFileError
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import parse_model
 from pbem.model.model import Model
 from pbem.model.refinement import count_levels, impose_fractions
 from pbem.results.outline import choose_points, to_columns, trace_elements

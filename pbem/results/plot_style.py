@@ -11,7 +11,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 
-from pbem.case.generation import Group
+from pbem.description.generation import Group
 from pbem.results.reader import Results
 from pbem.solve.step import OPEN, SLIP, STICK
 

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case.generation import Group
+from pbem.description.generation import Group
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance

@@ -7,8 +7,8 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case.finding import list_names
 from pbem.results.reader import Results
+from pbem.wording import list_names
 
 # K and J follow from different integrals of the same jumps. On meshes whose K is right to 3e-3 they agree within 1 %.
 AGREEMENT = 0.02

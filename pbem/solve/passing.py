@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.geometry.boxes import Boxes
 from pbem.mesh.mesh import Mesh
-from pbem.model.boxes import Boxes
 from pbem.model.model import Model
 
 Real = NDArray[np.float64]

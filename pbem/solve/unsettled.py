@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
-from pbem.model.junction import format_point
+from pbem.geometry.junction import format_point
 from pbem.solve.problem import Problem
 
 Integer = NDArray[np.int64]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import pbem
-from pbem.contact.strength import read_checked_model
+from pbem.case.build import read_checked_model
 from pbem.errors import CaseError, ConvergenceError, PbemError
 from pbem.model.sliver import Tie
 from pbem.parallel import world

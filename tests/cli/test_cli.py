@@ -18,8 +18,8 @@ import pytest
 import pbem
 from pbem import bundled
 from pbem.bundled import find_case, list_bundled_cases
-from pbem.case.schema import SolverTable
 from pbem.cli import OPERATORS, main, split_petsc_options
+from pbem.description.schema import SolverTable
 from pbem.errors import CaseError, ConvergenceError
 from pbem.model.model import Operator
 from pbem.results.reader import open_results

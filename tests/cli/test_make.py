@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pbem.case import Case, read_case
-from pbem.case.schema import CurveTable
 from pbem.cli import main
+from pbem.description.schema import CurveTable
 
 Capture = pytest.CaptureFixture[str]
 

@@ -15,8 +15,8 @@ import pytest
 from pydantic import BaseModel
 
 import pbem
-from pbem.case.schema import CaseFile, ExpressionTable, LawTable, Table
 from pbem.cli import COMMANDS, main
+from pbem.description.schema import CaseFile, ExpressionTable, LawTable, Table
 from pbem.pages import FOLDER, TOPICS, find_topic, lay_out, read_page
 from pbem.pages.keys import write_key_page
 from tests.cli.cli_sample import BLOCKS

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.operator import assemble_rows
+from pbem.case.build import parse_model
 from pbem.exact import PlaneField
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import parse_model
 from pbem.model.material import Material
 from pbem.model.model import Model
 

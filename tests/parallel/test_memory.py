@@ -16,7 +16,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy import sparse
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import read_model
+from pbem.case.build import read_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.contact.laws import start_memory

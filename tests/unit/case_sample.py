@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from pbem.case import parse_case
+from pbem.case.build import parse_model
 from pbem.errors import CaseError, Fault
-from pbem.model.build import build_model, parse_model
 from pbem.model.model import Model
 
 MATERIAL = """
@@ -74,7 +73,7 @@ def add_curves(text: str, curves: str, uses: str = "") -> str:
 
 def build(text: str) -> Model:
     """The model of a right file."""
-    return build_model(parse_case(text))
+    return parse_model(text)[1]
 
 
 def find_faults(text: str) -> tuple[Fault, ...]:

@@ -14,9 +14,9 @@ from pbem.bem import hierarchical
 from pbem.bem.farfield import SourceTree
 from pbem.bem.hierarchical import Sorted, choose_terms, prepare_sources, sort_elements
 from pbem.bem.operator import RowOperator, assemble_rows
+from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import parse_model
 from pbem.model.material import Material
 from pbem.model.model import Model
 from tests.cases.bundled import CASES

@@ -7,20 +7,19 @@ from itertools import pairwise
 
 import numpy as np
 
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
-from pbem.model.curve import Curve, Leg
 from pbem.model.material import Material
 from pbem.model.model import (
     Analysis,
     Condition,
     Interface,
     Law,
-    Loop,
     Model,
     Quantity,
     Region,
-    Side,
     SolverOptions,
     Stage,
 )

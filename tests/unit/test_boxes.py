@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Leg
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Leg
 
 
 def make_boxes(seed: int, count: int) -> Boxes:

@@ -10,8 +10,8 @@ from types import ModuleType
 import pytest
 
 from pbem.case import parse_case
+from pbem.case.build import read_checked_model
 from pbem.cli import main
-from pbem.contact.strength import read_checked_model
 from pbem.errors import CaseError, Fault, ResultFileError, is_control, printable
 from pbem.mesh.generate import generate_mesh
 from pbem.progress import LogReporter

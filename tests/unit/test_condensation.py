@@ -9,12 +9,12 @@ import pytest
 from numpy.typing import NDArray
 
 import pbem.solve.condensed as condensed
+from pbem.case.build import parse_model
 from pbem.contact.laws import OPEN, STICK, ModeState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.condensation import PairBases, Split, solve_pairs

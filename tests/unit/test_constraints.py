@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.operator import assemble_rows
+from pbem.case.build import parse_model
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.loads import collect_outer_nodes, evaluate_load, find_needed_columns
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import parse_model
 from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbem.case.build import read_checked_model
 from pbem.contact.custom import CustomLaw, find_fault
-from pbem.contact.strength import coulomb, read_checked_model
+from pbem.contact.strength import coulomb
 from pbem.errors import CaseError
 from tests.unit.case_sample import BLOCKS, change
 

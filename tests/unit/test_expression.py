@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pbem.model.expression import CONSTANTS, FUNCTIONS, FUNCTIONS_OF_TWO, ExpressionError, evaluate_expression
+from pbem.geometry.expression import CONSTANTS, FUNCTIONS, FUNCTIONS_OF_TWO, ExpressionError, evaluate_expression
 
 VALUES = {
     "2*t": 1.4,

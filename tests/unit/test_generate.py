@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pbem.case import parse_case
-from pbem.case.placement import Body, draw_sizes, find_area, make_ground, measure_distance, place_bodies
-from pbem.case.schema import GenerateTable
+from pbem.description.placement import Body, draw_sizes, find_area, make_ground, measure_distance, place_bodies
+from pbem.description.schema import GenerateTable
 from tests.unit.case_sample import build, change, find_faults, find_only_fault
 
 ROCK = """

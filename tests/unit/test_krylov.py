@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.reader import Results

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
-from pbem.model.build import parse_model
 from pbem.model.model import Model
 from tests.identities.bodies import ROCK, Body, mesh_body
 

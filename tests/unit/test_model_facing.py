@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
+from pbem.geometry.curve import Leg
 from pbem.mesh.equations import choose_equations
 from pbem.mesh.generate import generate_mesh
-from pbem.model.curve import Leg
 from pbem.model.facing import Surroundings
 from pbem.model.support import find_free_motions
 from pbem.results.coverage import describe_sparse_contacts

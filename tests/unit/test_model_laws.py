@@ -51,7 +51,7 @@ def test_friction_of_an_angle_may_fall_to_itself() -> None:
 
 
 def build_file(folder: Path, lines: str) -> Model:
-    from pbem.model.build import read_model
+    from pbem.case.build import read_model
 
     path = folder / "case.toml"
     path.write_text(with_law(lines), encoding="utf-8")
@@ -74,7 +74,7 @@ def test_faces_under_a_custom_law_hold_until_they_are_computed(tmp_path: Path) -
     (tmp_path / "law.py").write_text("", encoding="utf-8")
     lines = 'law = "custom"\nfile = "law.py"'
     text = change(with_law(lines), ("[boundary.top]\nux = 0.001\nuy = -0.001", "[boundary.top]\nty = -1"))
-    from pbem.model.build import parse_model
+    from pbem.case.build import parse_model
 
     assert find_free_motions(parse_model(text, str(tmp_path / "case.toml"))[1]) == ()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pbem.model.build import parse_model
+from pbem.case.build import parse_model
 from tests.unit.case_sample import BLOCKS, change
 
 CRACK = """\

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.contact.laws import collect_laws
 from pbem.contact.rate_and_state import RateAndState
 from pbem.contact.strength import LAWS
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.model.support import find_free_motions
 from pbem.results.describe import describe_law
 from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only_fault

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.case.build import parse_model
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import Parts, find_parts
-from pbem.model.build import parse_model
 
 PLATE = """
 materials.m = {{ young = 1000.0, poisson = 0.2 }}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.solve.passing import Passing, describe_passing, find_passing
 
 BLOCKS = """

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
+from pbem.geometry.curve import Curve, Leg
 from pbem.mesh.carry import carry_nodes, list_curve_elements
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.interpolation import locate_nodes
-from pbem.model.build import parse_model
-from pbem.model.curve import Curve, Leg
 from pbem.model.model import Model
 from pbem.model.refinement import (
     bisect_elements,

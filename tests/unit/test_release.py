@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.support import find_support, find_ties
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.model.support import find_free_motions
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem

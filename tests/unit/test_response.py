@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.modes import linearise
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.krylov import KrylovTangent, make_tangent

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.contact.laws import collect_laws
 from pbem.errors import CaseError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.model.model import Model
 
 PLANE = """

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbem.case.build import parse_model
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.local_laws import solve_laws
 from pbem.contact.modes import linearise, propose_modes
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve import groups, sweeps
 from pbem.solve.assembly import assemble_problem

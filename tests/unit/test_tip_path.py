@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.geometry.curve import Leg
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.curve import Leg
 from pbem.results.tip_path import TipPaths, trace_paths
 from tests.verification.planes import make_arc, make_plane, make_straight
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.model.curve import Leg
-from pbem.model.intersection import enclosed_angle, enclosed_area, meeting_points, project
-from pbem.model.loop import loop_legs
+from pbem.geometry.curve import Leg
+from pbem.geometry.intersection import enclosed_angle, enclosed_area, meeting_points, project
+from pbem.geometry.loop import loop_legs
+from pbem.geometry.shape import share
 from pbem.model.model import Model, Region
-from pbem.model.shape import share
 from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, add_curves, build, change, find_faults, find_only_fault
 
 HOLE = ('"left"]', '"left", "hole"]')

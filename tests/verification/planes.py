@@ -9,19 +9,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.curve import Curve, Leg
 from pbem.model.material import Material
 from pbem.model.model import (
     Analysis,
     Condition,
     Interface,
     Law,
-    Loop,
     Model,
     Region,
-    Side,
     SolverOptions,
     Stage,
 )

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march

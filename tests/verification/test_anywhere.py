@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.case.build import parse_model
 from pbem.errors import CaseError, ConvergenceError
+from pbem.geometry.curve import Curve, Leg, find_middle
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import list_faces
-from pbem.model.build import parse_model
-from pbem.model.curve import Curve, Leg, find_middle
 from pbem.model.model import Model
 from pbem.model.origin import move_back
 from pbem.results.reader import Results

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.case.build import parse_model
 from pbem.contact.laws import ModeState
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve.assembly import assemble_problem

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pbem.model.build import parse_model
+from pbem.case.build import parse_model
 from pbem.model.model import Model
 from pbem.solve.step import SLIP, STICK
 from tests.verification.proofs.proof import Complex, Solved, line, solve_model, write_case

@@ -17,7 +17,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.exact import exponential_field
-from pbem.model.curve import Curve
+from pbem.geometry.curve import Curve
 from pbem.model.model import Model
 from tests.identities.bodies import ROCK, Body, sample_field
 from tests.identities.solving import solve_for_field

@@ -12,19 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, STICK, PairLaws, collect_laws
+from pbem.geometry.curve import Curve
+from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
-from pbem.model.curve import Curve
 from pbem.model.material import Material
 from pbem.model.model import (
     Analysis,
     Condition,
     Interface,
     Law,
-    Loop,
     Model,
     Quantity,
     Region,
-    Side,
     SolverOptions,
     Stage,
 )

@@ -18,11 +18,12 @@ from pbem.bem.location import NEAR_END, locate_points
 from pbem.driver import store_steps
 from pbem.errors import ConvergenceError
 from pbem.exact import PlaneField, griffith_field, kirsch_field, polynomial_field, uniform_field
+from pbem.geometry.curve import Curve
+from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
-from pbem.model.curve import Curve
 from pbem.model.material import Material
-from pbem.model.model import Analysis, Condition, Loop, Model, Region, Side, SolverOptions, Stage
+from pbem.model.model import Analysis, Condition, Model, Region, SolverOptions, Stage
 from pbem.parallel import world
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter

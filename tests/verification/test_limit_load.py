@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.contact.laws import start_memory
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve import march
 from pbem.solve.assembly import assemble_problem

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbem.case.build import parse_model
 from pbem.exact import PlaneField, uniform_field
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
-from pbem.model.build import parse_model
 from pbem.model.material import Material
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem

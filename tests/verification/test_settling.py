@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pbem.case.build import parse_model
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.march import march

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.exact import arc_crack_intensity, arc_crack_parallel_stress
+from pbem.geometry.curve import Leg
 from pbem.model.crack import find_tips
-from pbem.model.curve import Leg
 from pbem.model.material import Material
 from pbem.model.model import Model
 from pbem.results.tips import collect_tip_rules

@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
+from pbem.case.build import parse_model
 from pbem.contact import laws
 from pbem.errors import ConvergenceError
-from pbem.model.build import parse_model
 from pbem.solve import newton, search
 from pbem.solve.step import OPEN, SLIP, STICK, ContactState
 from tests.verification.proofs.proof import (

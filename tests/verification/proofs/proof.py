@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.hoop import evaluate_hoop_stress
+from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.build import parse_model
 from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.energy import Energy, EnergyBalance

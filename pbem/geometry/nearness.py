@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
 
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Leg
+from pbem.geometry.curve import Leg
 
 # Legs that share an end are not searched for another meeting point nearer to it than this part of the shorter leg:
 # the second root of a tangential contact (a fillet) is uncertain by the square root of the rounding.

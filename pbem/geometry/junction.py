@@ -10,13 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import coincide, meeting_points, project
-from pbem.model.shape import share
-from pbem.model.tolerance import Tolerance
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import coincide, meeting_points, project
+from pbem.geometry.shape import share
+from pbem.geometry.tolerance import Tolerance
 
 Places = Mapping[str, tuple[complex, ...]]
 
@@ -81,7 +80,6 @@ def split_leg(leg: Leg, points: Mapping[complex, float]) -> list[Leg]:
 
 
 def find_crossings(
-    case: Case,
     curves: Mapping[str, Curve],
     cracks: Mapping[str, str],
     tolerance: Tolerance,
@@ -100,15 +98,15 @@ def find_crossings(
             continue
         same = tolerance.between(name, other)
         if coincide(leg, other_leg, same):
-            found[name, other] = _overlap(case, name, other, leg)
+            found[name, other] = _overlap(name, other, leg)
             continue
         points = meeting_points(leg, other_leg, same) or _touching_ends(leg, other_leg, same)
         if points:
-            found[name, other] = _crossing(case, name, other, points[0], cracks)
+            found[name, other] = _crossing(name, other, points[0], cracks)
     for pair, point in _meeting_vertices(curves, cracks).items():
         if frozenset(pair) in touching:
             continue
-        found.setdefault(pair, _crossing(case, *pair, point, cracks))
+        found.setdefault(pair, _crossing(*pair, point, cracks))
     return list(found.values())
 
 
@@ -149,23 +147,23 @@ def _meeting_vertices(curves: Mapping[str, Curve], cracks: Mapping[str, str]) ->
     return pairs
 
 
-def _overlap(case: Case, name: str, other: str, leg: Leg) -> Fault:
+def _overlap(name: str, other: str, leg: Leg) -> Fault:
     found = f"curve '{other}' running over curve '{name}' from {format_point(leg.start)} to {format_point(leg.end)}"
     if name == other:
         found = f"a curve that runs over itself from {format_point(leg.start)} to {format_point(leg.end)}"
     expected = "each piece once: a piece that two regions share is one curve, named in the boundary of both"
-    return case.fault(("curves", other), found, expected)
+    return Fault.at(("curves", other), found, expected)
 
 
-def _crossing(case: Case, name: str, other: str, point: complex, cracks: Mapping[str, str]) -> Fault:
+def _crossing(name: str, other: str, point: complex, cracks: Mapping[str, str]) -> Fault:
     if name == other:
         found = f"a curve that crosses or touches itself at {format_point(point)}"
         expected = "a curve without crossings: split it into curves that meet at a point"
-        return case.fault(("curves", name), found, expected)
+        return Fault.at(("curves", name), found, expected)
     kinds = ["crack" if one in cracks else "curve" for one in (name, other)]
     found = f"{kinds[1]} '{other}' crossing or touching {kinds[0]} '{name}' at {format_point(point)}"
     if any(one in cracks for one in (name, other)):
         expected = "cracks that meet others only with their ends: split into curves that meet at a point"
     else:
         expected = "boundaries that meet only at ends: split into curves that meet at a point, or move them apart"
-    return case.fault(("curves", other), found, expected)
+    return Fault.at(("curves", other), found, expected)

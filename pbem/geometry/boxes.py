@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Leg
-from pbem.model.intersection import extremes
+from pbem.geometry.curve import Leg
+from pbem.geometry.intersection import extremes
 
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]

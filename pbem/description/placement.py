@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from random import Random
 from statistics import NormalDist
 
-from pbem.case.schema import GenerateTable
+from pbem.description.schema import GenerateTable
 
 # A place is given up after this many trials for one body, and after so many for each body on average.
 MOST_TRIALS = 5000

@@ -1,22 +1,12 @@
-"""A fault before it has its line number."""
+"""Values and names as messages show them."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from datetime import date, time
 
-from pbem.case.places import Loc
 from pbem.errors import printable
-
-
-@dataclass(frozen=True)
-class Finding:
-    """loc: path of the key (list entries from 0); found and expected as in `pbem.errors.Fault`."""
-
-    loc: Loc
-    found: str
-    expected: str
 
 
 def show(value: object) -> str:
@@ -37,7 +27,11 @@ def show(value: object) -> str:
 def _show_plain(value: object) -> str:
     if isinstance(value, int) and abs(value) > 10**30:
         return "a number of more than 30 digits"
-    return str(value) if isinstance(value, (int, float)) else f"{value} (a date or time)"
+    if isinstance(value, (int, float)):
+        return str(value)
+    if isinstance(value, (date, time)):
+        return f"{value} (a date or time)"
+    return "None" if value is None else f"an object of type {type(value).__name__}"
 
 
 def suggest(name: str, known: Iterable[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pbem.case.schema import LawTable
+from pbem.description.schema import LawTable
 
 Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "custom"]
 

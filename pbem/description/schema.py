@@ -1,7 +1,8 @@
 """The tables and keys of a case file, with their types, ranges and defaults (the meaning is in the descriptions).
 
 What involves several keys at once (two conditions in one direction, friction and friction_angle, ...) is checked on
-the file's own tables in `pbem.case.conflicts`, so that one wrong value does not hide other faults of the same table.
+the file's own tables in `pbem.description.conflicts`, so that one wrong value does not hide other faults of the same
+table.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from pbem.case.values import (
+from pbem.description.values import (
     MOST_ELEMENTS,
     MOST_GENERATED,
     Angle,

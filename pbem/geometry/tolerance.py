@@ -11,8 +11,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from pbem.model.curve import Curve
-from pbem.model.roles import Roles
+from pbem.geometry.curve import Curve
 
 # Points nearer to each other than this part of the shorter of their curves are the same point.
 SAME_POINT = 1e-9
@@ -52,13 +51,13 @@ class Tolerance:
         return not first & second and any(frozenset((a, b)) in self.contacts for a in first for b in second)
 
 
-def make_tolerance(curves: Mapping[str, Curve], roles: Roles, largest: float) -> Tolerance:
-    """largest: the largest coordinate of all curves."""
-    regions = {name: frozenset((region,)) for name, region in (*roles.outer.items(), *roles.cracks.items())}
-    regions |= {name: frozenset(pair) for name, pair in roles.shared.items()}
-    contacts = frozenset(frozenset((roles.outer[a], roles.outer[b])) for a, b in roles.contacts.values())
+def make_tolerance(
+    curves: Mapping[str, Curve], largest: float, regions: Mapping[str, frozenset[str]] | None = None,
+    contacts: frozenset[frozenset[str]] = frozenset(),
+) -> Tolerance:
+    """largest: the largest coordinate of all curves; regions, contacts: see Tolerance."""
     rounding = ROUNDINGS * float(np.finfo(float).eps) * largest
-    return Tolerance({name: curve.length for name, curve in curves.items()}, rounding, regions, contacts)
+    return Tolerance({name: curve.length for name, curve in curves.items()}, rounding, regions or {}, contacts)
 
 
 def join_points(points: NDArray[np.complex128], owners: list[str], tolerance: Tolerance) -> NDArray[np.complex128]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pbem.case.effects import combine_laws
-from pbem.case.finding import Finding, list_names, suggest
-from pbem.case.placement import Area, Body, make_ground, place_bodies
-from pbem.case.schema import CaseFile, CurveTable, GenerateTable, LawTable, RegionTable, StageTable
+from pbem.description.effects import combine_laws
+from pbem.description.finding import Finding
+from pbem.description.placement import Area, Body, make_ground, place_bodies
+from pbem.description.schema import CaseFile, CurveTable, GenerateTable, LawTable, RegionTable, StageTable
+from pbem.wording import list_names, suggest
 
 # From so many on, sides make no difference to how much room there is.
 MANY = 1000

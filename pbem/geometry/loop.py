@@ -5,25 +5,41 @@ from __future__ import annotations
 import cmath
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.case import Case
-from pbem.case.finding import list_names
 from pbem.errors import Fault
-from pbem.model.boxes import Boxes
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
-from pbem.model.junction import format_point
-from pbem.model.model import Loop, Side
-from pbem.model.tolerance import Tolerance
+from pbem.geometry.boxes import Boxes
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import enclosed_area, inner_points, meeting_points, project, surround, winding_number
+from pbem.geometry.junction import format_point
+from pbem.geometry.tolerance import Tolerance
+from pbem.wording import list_names
+
+HalfEdge = tuple[str, bool]
+
+
+@dataclass(frozen=True)
+class Side:
+    """A curve as part of a loop; `forward` if the loop runs in the direction in which the curve was written."""
+
+    curve: str
+    forward: bool
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed chain of sides, travelled with the region on the left. `outer`: counter-clockwise, around the region."""
+
+    sides: tuple[Side, ...]
+    outer: bool
+
 
 Loops = dict[str, tuple[Loop, ...]]
-HalfEdge = tuple[str, bool]
 
 
 @dataclass(frozen=True)
@@ -69,23 +85,25 @@ def wind_around(loops: Sequence[list[Leg]], points: NDArray[np.complex128]) -> N
 
 
 def find_loops(
-    case: Case, curves: Mapping[str, Curve], tolerance: Tolerance, check_nesting: bool
+    boundaries: Mapping[str, Sequence[str]], infinite: Container[str], curves: Mapping[str, Curve],
+    tolerance: Tolerance, check_nesting: bool = True,
 ) -> tuple[Loops, list[Fault]]:
     """Loops of every region all of whose curves are known; regions with faults are left out, the whole plane has none.
 
-    check_nesting: False if curves cross, when it is not settled which loop lies in which.
+    boundaries: names of the curves around each region, in any order and direction; infinite: the regions that are the
+    outside of theirs. check_nesting: False if curves cross, when it is not settled which loop lies in which.
     """
     result: Loops = {}
     faults: list[Fault] = []
-    for region, table in case.regions.items():
-        names = list(dict.fromkeys(table.boundary))
-        if not names and table.infinite:
+    for region, boundary in boundaries.items():
+        names = list(dict.fromkeys(boundary))
+        if not names and region in infinite:
             result[region] = ()
         if not names or any(name not in curves for name in names):
             continue
-        chains, wrong = _chain(case, region, {name: curves[name] for name in names}, tolerance)
+        chains, wrong = _chain(region, {name: curves[name] for name in names}, tolerance)
         if not wrong:
-            loops, wrong = _nest(case, region, chains, table.infinite)
+            loops, wrong = _nest(region, chains, region in infinite)
             wrong = wrong if check_nesting else []
         if wrong:
             faults += wrong
@@ -95,7 +113,7 @@ def find_loops(
 
 
 def _chain(
-    case: Case, region: str, curves: Mapping[str, Curve], tolerance: Tolerance
+    region: str, curves: Mapping[str, Curve], tolerance: Tolerance
 ) -> tuple[list[_Chain], list[Fault]]:
     """Walk from end to end; where more than two ends meet, take the turn that keeps one sector of the region."""
     leaving: dict[complex, list[HalfEdge]] = defaultdict(list)
@@ -104,7 +122,7 @@ def _chain(
             leaving[curve.start].append((name, True))
             leaving[curve.end].append((name, False))
     faults = [
-        _open_end(case, region, point, edges, curves, tolerance)
+        _open_end(region, point, edges, curves, tolerance)
         for point, edges in leaving.items() if len(edges) % 2
     ]
     if faults:
@@ -116,7 +134,7 @@ def _chain(
         if pairs is None:
             found = f"{len(edges)} curve ends that touch at {format_point(point)}, and which go together is unclear"
             expected = "loops that touch at most at single points, under angles that differ"
-            faults.append(case.fault(("regions", region, "boundary"), found, expected))
+            faults.append(Fault.at(("regions", region, "boundary"), found, expected))
             continue
         for one, two in pairs:  # arriving against `one` one leaves along `two`, and the other way round
             following[one[0], not one[1]] = two
@@ -138,7 +156,7 @@ def _chain(
 
 
 def _open_end(
-    case: Case, region: str, point: complex, edges: list[HalfEdge], curves: Mapping[str, Curve], tolerance: Tolerance
+    region: str, point: complex, edges: list[HalfEdge], curves: Mapping[str, Curve], tolerance: Tolerance
 ) -> Fault:
     """Name the curve, the end without a partner, and what is nearest to it."""
     names = list(dict.fromkeys(name for name, _ in edges))
@@ -156,7 +174,7 @@ def _open_end(
         expected += f" (the point lies on curve '{touched[0]}': split that one there)"
     elif near:
         expected += f" (the nearest end is that of '{near[1]}' at {format_point(near[2])}, {near[0]:.3g} away)"
-    return case.fault(("regions", region, "boundary"), found, expected)
+    return Fault.at(("regions", region, "boundary"), found, expected)
 
 
 def _nearest_end(point: complex, own: list[str], curves: Mapping[str, Curve]) -> tuple[float, str, complex] | None:
@@ -201,7 +219,7 @@ def _is_enclosed_oddly(legs: list[Leg], points: NDArray[np.complex128]) -> list[
 
 
 def _nest(
-    case: Case, region: str, chains: list[_Chain], infinite: bool
+    region: str, chains: list[_Chain], infinite: bool
 ) -> tuple[tuple[Loop, ...], list[Fault]]:
     """The loop of the largest area is outer, counter-clockwise; all others lie in it side by side, clockwise.
 
@@ -233,9 +251,9 @@ def _nest(
             if j == outer and not inside.all():
                 found = f"the loop of {names} outside the loop of {around}"
                 expected = "one connected region inside one outer loop: make separate parts separate regions"
-                faults.append(case.fault(loc, found, expected))
+                faults.append(Fault.at(loc, found, expected))
             elif j != outer and inside.any():
                 found = f"the loop of {names} inside the inner loop of {around}"
                 expected = "inner loops side by side: what lies inside a hole is another region"
-                faults.append(case.fault(loc, found, expected))
+                faults.append(Fault.at(loc, found, expected))
     return tuple(Loop(chain.sides, i == outer) for i, chain in enumerate(turned)), faults

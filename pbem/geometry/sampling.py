@@ -8,10 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.model.curve import Curve, Leg
-from pbem.model.intersection import inner_points
-from pbem.model.loop import side_legs
-from pbem.model.model import Side
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import inner_points
+from pbem.geometry.loop import Side, side_legs
 
 Complex = NDArray[np.complex128]
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pbem.case.finding import Finding
-from pbem.case.places import Loc
-from pbem.errors import is_control
+from pbem.description.finding import Finding
+from pbem.errors import KeyPath, is_control
 
 # The deepest key of a case, stages[1].boundary.NAME.ux, has five parts, a point of a curve as many.
 DEEPEST = 12
 
 
-def find_depth(raw: Mapping[str, Any]) -> Loc | None:
+def find_depth(raw: Mapping[str, Any]) -> KeyPath | None:
     """The path of a value that lies deeper than any key of a case; None if there is none."""
     return next((loc for loc, _ in _walk(raw) if len(loc) > DEEPEST), None)
 
@@ -34,9 +33,9 @@ def find_controls(raw: Mapping[str, Any]) -> list[Finding]:
     return findings
 
 
-def _walk(raw: Mapping[str, Any]) -> Iterator[tuple[Loc, Any]]:
-    """Path and value of all tables, lists and values, without recursion, not deeper than needed."""
-    waiting: list[tuple[Loc, Any]] = [((key,), value) for key, value in raw.items()]
+def _walk(raw: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Any]]:
+    """KeyPath and value of all tables, lists and values, without recursion, not deeper than needed."""
+    waiting: list[tuple[KeyPath, Any]] = [((key,), value) for key, value in raw.items()]
     while waiting:
         loc, value = waiting.pop()
         yield loc, value

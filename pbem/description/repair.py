@@ -6,10 +6,10 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from pbem.case.effects import NEEDED, OWN_KEYS
-from pbem.case.finding import Finding
-from pbem.case.places import Loc
-from pbem.case.translation import known_keys
+from pbem.description.effects import NEEDED, OWN_KEYS
+from pbem.description.finding import Finding
+from pbem.description.translation import known_keys
+from pbem.errors import KeyPath
 
 # Values that stand in for wrong ones in a draft.
 _STAND_INS: Mapping[str, float] = {"young": 1.0, "poisson": 0.25}
@@ -29,7 +29,7 @@ def repair(raw: Mapping[str, Any], findings: list[Finding]) -> dict[str, Any] | 
     return patched if all([_patch(patched, finding.loc) for finding in findings]) else None
 
 
-def _patch(raw: dict[str, Any], loc: Loc) -> bool:
+def _patch(raw: dict[str, Any], loc: KeyPath) -> bool:
     """Take the wrong value out; False if the rest cannot be judged without it."""
     if not loc or loc in (("materials",), ("curves",), ("regions",)) or loc[0] == "generate":
         return False
@@ -84,7 +84,7 @@ def _patch(raw: dict[str, Any], loc: Loc) -> bool:
     return _delete(raw, loc)
 
 
-def _patch_elements(raw: dict[str, Any], loc: Loc) -> bool:
+def _patch_elements(raw: dict[str, Any], loc: KeyPath) -> bool:
     """Any sufficient number of elements: topology does not depend on it."""
     curve = raw["curves"].get(loc[1])
     if not isinstance(curve, dict) or len({"points", "center", "expression"} & set(curve)) != 1:
@@ -97,7 +97,7 @@ def _patch_elements(raw: dict[str, Any], loc: Loc) -> bool:
     return True
 
 
-def _delete(raw: dict[str, Any], loc: Loc) -> bool:
+def _delete(raw: dict[str, Any], loc: KeyPath) -> bool:
     """Remove the key, or the list around a list's entry."""
     while isinstance(loc[-1], int) and len(loc) > 1:
         loc = loc[:-1]

@@ -7,10 +7,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from pbem.case.effects import NEEDED, OWN_KEYS
-from pbem.case.finding import Finding, show
-from pbem.case.generated_conflicts import check_generated
-from pbem.case.places import Loc
+from pbem.description.effects import NEEDED, OWN_KEYS
+from pbem.description.finding import Finding
+from pbem.description.generated_conflicts import check_generated
+from pbem.errors import KeyPath
+from pbem.wording import show
 
 GLOBAL_KEYS = ("ux", "uy", "tx", "ty")
 LOCAL_KEYS = ("un", "us", "tn", "ts", "pressure")
@@ -43,7 +44,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
     return findings
 
 
-def _tables(parent: Mapping[str, Any], loc: Loc) -> Iterator[tuple[Loc, Mapping[str, Any]]]:
+def _tables(parent: Mapping[str, Any], loc: KeyPath) -> Iterator[tuple[KeyPath, Mapping[str, Any]]]:
     """The tables of a table of tables, past anything that is none (the schema reports that)."""
     entries = parent.get(str(loc[-1]))
     if isinstance(entries, dict):
@@ -52,7 +53,7 @@ def _tables(parent: Mapping[str, Any], loc: Loc) -> Iterator[tuple[Loc, Mapping[
                 yield (*loc, name), table
 
 
-def _check_name(loc: Loc, name: str) -> list[Finding]:
+def _check_name(loc: KeyPath, name: str) -> list[Finding]:
     if name.strip() == name and name not in ("", ".", "..") and "/" not in name and name.isprintable():
         return []
     expected = "a name of printable characters without '/' and without spaces around it"
@@ -63,7 +64,7 @@ def _check_name(loc: Loc, name: str) -> list[Finding]:
 ROUNDING = 1e-12
 
 
-def _check_roundness(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_roundness(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     """A radius that is lost in the rounding of the center's coordinates makes no circle."""
     center, radius = table.get("center"), table.get("radius")
     if not isinstance(center, list) or not isinstance(radius, int | float):
@@ -77,7 +78,7 @@ def _check_roundness(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     return [Finding((*loc, "radius"), found, f"more than {ROUNDING:g} of the center's coordinates")]
 
 
-def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_curve(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     shapes = "points, or center and radius (with angles for an arc), or expression"
     given = [key for key in ("points", "center", "expression") if key in table]
@@ -106,7 +107,7 @@ def _check_curve(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     return findings + _check_shape(loc, table)
 
 
-def _check_shape(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_shape(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     points, elements, angles = table.get("points"), table.get("elements"), table.get("angles")
     if isinstance(elements, list) and elements:
@@ -131,14 +132,14 @@ def _check_shape(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     return findings
 
 
-def _check_region(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_region(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     if table.get("infinite") is True or table.get("boundary"):
         return []
     expected = "boundary = [...], the names of the curves around the region"
     return [Finding((*loc, "boundary") if "boundary" in table else loc, "no boundary", expected)]
 
 
-def _check_condition(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_condition(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     findings = [
         Finding((*loc, second), f"both {first} and {second}", "one condition in one direction")
         for first, second in EXCLUSIVE if first in table and second in table
@@ -150,7 +151,7 @@ def _check_condition(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     return findings + _check_spring(loc, table, in_axes)
 
 
-def _check_spring(loc: Loc, table: Mapping[str, Any], in_axes: Sequence[str]) -> list[Finding]:
+def _check_spring(loc: KeyPath, table: Mapping[str, Any], in_axes: Sequence[str]) -> list[Finding]:
     """A spring acts along the normal and the curve, where nothing else says what moves."""
     spring = table.get("spring")
     if not isinstance(spring, dict):
@@ -167,7 +168,7 @@ def _check_spring(loc: Loc, table: Mapping[str, Any], in_axes: Sequence[str]) ->
     return findings
 
 
-def _check_law(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_law(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     if "friction" in table and "friction_angle" in table:
         findings.append(Finding((*loc, "friction_angle"), "both friction and friction_angle", "only one of them"))

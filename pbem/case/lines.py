@@ -1,16 +1,15 @@
-"""Where a key stands in a TOML text: dotted paths and line numbers."""
+"""Where a key stands in a TOML text: the lines of paths."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 
-Loc = tuple[str | int, ...]
+from pbem.errors import KeyPath, format_path
 
 # Keys of more parts are faults, whose line is that of their first parts.
 DEEP = 20
 
-_BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
 _KEY = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
 _DOTTED = rf"{_KEY}(?:\s*\.\s*{_KEY})*"
 _HEADER = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]\]?\s*(?:#.*)?\Z")
@@ -18,24 +17,17 @@ _ASSIGNMENT = re.compile(rf"\s*({_DOTTED})\s*=")
 _TOKEN = re.compile(r'"""|\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}]', re.S)
 
 
-def format_place(loc: Loc, line: int | None = None) -> str:
-    """The path as a user would write it, e.g. ``curves.wall.points[2] (line 9)``; entries of lists count from 1."""
-    text = ""
-    for part in loc:
-        if isinstance(part, int):
-            text += f"[{part + 1}]"
-        else:
-            key = part if _BARE.match(part) else '"' + part.replace("\\", "\\\\").replace('"', '\\"') + '"'
-            text += f".{key}" if text else key
-    text = text or "the file"
+def format_place(path: KeyPath, line: int | None = None) -> str:
+    """The path as a user would write it, with its line, e.g. ``curves.wall.points[2] (line 9)``."""
+    text = format_path(path) or "the file"
     return text if line is None else f"{text} (line {line})"
 
 
-def find_lines(text: str) -> Mapping[Loc, int]:
+def find_lines(text: str) -> Mapping[KeyPath, int]:
     """Line number of every table header and of every key at the start of a line (not of those in inline tables)."""
-    lines: dict[Loc, int] = {}
-    table: Loc = ()
-    counts: dict[Loc, int] = {}
+    lines: dict[KeyPath, int] = {}
+    table: KeyPath = ()
+    counts: dict[KeyPath, int] = {}
     depth, quote = 0, ""
     for number, line in enumerate(text.splitlines(), start=1):
         if depth == 0 and not quote:
@@ -53,7 +45,7 @@ def find_lines(text: str) -> Mapping[Loc, int]:
     return lines
 
 
-def find_line(lines: Mapping[Loc, int], loc: Loc) -> int | None:
+def find_line(lines: Mapping[KeyPath, int], loc: KeyPath) -> int | None:
     """Line of the key itself, or of the nearest table or key around it."""
     for length in range(len(loc), 0, -1):
         if loc[:length] in lines:
@@ -61,18 +53,18 @@ def find_line(lines: Mapping[Loc, int], loc: Loc) -> int | None:
     return None
 
 
-def _record(lines: dict[Loc, int], table: Loc, loc: Loc, number: int) -> None:
+def _record(lines: dict[KeyPath, int], table: KeyPath, loc: KeyPath, number: int) -> None:
     for length in range(len(table) + 1, min(len(loc), DEEP) + 1):
         lines.setdefault(loc[:length], number)
 
 
-def _split(dotted: str) -> Loc:
+def _split(dotted: str) -> KeyPath:
     return tuple(key.strip("\"'") for key in re.findall(_KEY, dotted))
 
 
-def _resolve(path: Loc, counts: Mapping[Loc, int]) -> Loc:
+def _resolve(path: KeyPath, counts: Mapping[KeyPath, int]) -> KeyPath:
     """Insert the index of the newest entry after the name of a list of tables, but not at the end of the path."""
-    resolved: Loc = ()
+    resolved: KeyPath = ()
     for position, key in enumerate(path):
         resolved = (*resolved, key)
         if resolved in counts and position < len(path) - 1:

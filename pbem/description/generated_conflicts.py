@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pbem.case.finding import Finding, show
-from pbem.case.places import Loc
+from pbem.description.finding import Finding
+from pbem.errors import KeyPath
+from pbem.wording import show
 
 _AREAS = ("density", "fraction", "box")
 # What only the other kind has.
@@ -17,7 +18,7 @@ _FOREIGN: Mapping[str, tuple[str, ...]] = {
 _SIZE: Mapping[str, str] = {"cracks": "half_length", "inclusions": "radius"}
 
 
-def check_generated(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def check_generated(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     """Every rule broken by keys that are each right by themselves."""
     kind = table.get("kind")
     findings = [*_check_area(loc, table), *_check_distribution(loc, table)]
@@ -38,7 +39,7 @@ def check_generated(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     return findings
 
 
-def _check_area(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_area(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     given = [key for key in _AREAS if key in table]
     expected = "one of density, fraction (of inclusions) and box"
     if not given:
@@ -57,7 +58,7 @@ def _check_area(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
     return findings
 
 
-def _check_distribution(loc: Loc, table: Mapping[str, Any]) -> list[Finding]:
+def _check_distribution(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     findings = []
     distribution = table.get("distribution", "uniform")
     spread, power = table.get("spread"), distribution == "power"

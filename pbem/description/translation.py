@@ -11,9 +11,10 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from pbem.case.finding import Finding, list_names, show, suggest
-from pbem.case.places import Loc, format_place
-from pbem.case.schema import CaseFile, ExpressionTable
+from pbem.description.finding import Finding
+from pbem.description.schema import CaseFile, ExpressionTable
+from pbem.errors import KeyPath, format_path
+from pbem.wording import list_names, show, suggest
 
 
 def find_schema_findings(raw: Mapping[str, Any]) -> list[Finding]:
@@ -56,20 +57,20 @@ _BOUNDS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", ">="), "les
 
 
 def _translate(details: ErrorDetails) -> Finding:
-    loc: Loc = tuple(details["loc"])
+    loc: KeyPath = tuple(details["loc"])
     kind, context, value = details["type"], details.get("ctx", {}), details.get("input")
     if kind == "extra_forbidden":
         known = known_keys(loc[:-1])
         found = f"unknown key '{loc[-1]}'{suggest(str(loc[-1]), known)}"
         expected = f"one of: {list_names(sorted(known), 40)}"
         if loc[0] == "stages" and str(loc[-1]) in known_keys(loc[2:-1]):
-            expected += f" ({loc[-1]} cannot change: it is told in [{format_place(loc[2:-1])}])"
+            expected += f" ({loc[-1]} cannot change: it is told in [{format_path(loc[2:-1])}])"
         return Finding(loc, found, expected)
     if kind == "missing":
         if isinstance(loc[-1], int):
             return Finding(loc[:-1], show(value), f"at least {loc[-1] + 1} entries")
         what = "[table]" if len(loc) == 1 else "key"
-        return Finding(loc, f"no {loc[-1]}", f"the {what} `{format_place(loc)}`")
+        return Finding(loc, f"no {loc[-1]}", f"the {what} `{format_path(loc)}`")
     if kind in _BOUNDS:
         key, sign = _BOUNDS[kind]
         return Finding(loc, show(value), f"a number {sign} {context[key]:g}{_other_bound(loc)}")
@@ -83,12 +84,12 @@ def _translate(details: ErrorDetails) -> Finding:
     return Finding(loc, show(value), _KINDS.get(kind, context.get("expected", details["msg"])))
 
 
-def _other_bound(loc: Loc) -> str:
+def _other_bound(loc: KeyPath) -> str:
     """Ranges with two ends, in words, so that one message tells both."""
     return {"poisson": " (-1 < poisson < 0.5)", "order": " (0, 1, 2 or 3)"}.get(str(loc[-1]), "")
 
 
-def known_keys(loc: Loc) -> set[str]:
+def known_keys(loc: KeyPath) -> set[str]:
     """Keys of the table at `loc` (none if it has no fixed keys), found by walking down the schema."""
     table: Any = CaseFile
     for part in loc:

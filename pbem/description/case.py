@@ -1,0 +1,187 @@
+"""A case: everything that a model is made from, as a user says it, by calls or in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+from pydantic import ValidationError
+
+from pbem.description.conflicts import find_conflicts
+from pbem.description.controls import DEEPEST, find_controls, find_depth
+from pbem.description.finding import Finding
+from pbem.description.generation import Expansion, Group, expand
+from pbem.description.plain import make_plain
+from pbem.description.repair import repair
+from pbem.description.schema import (
+    AnalysisTable,
+    CaseFile,
+    ConditionTable,
+    ContactTable,
+    CurveTable,
+    GenerateTable,
+    GravityTable,
+    LawTable,
+    MaterialTable,
+    OutputTable,
+    RegionTable,
+    SolverTable,
+    StageTable,
+    StressTable,
+    UnitsTable,
+)
+from pbem.description.translation import find_schema_findings
+from pbem.errors import CaseError, Fault, KeyPath
+
+# What messages call a case that no file has.
+UNNAMED = "the case"
+
+
+@dataclass(frozen=True, init=False, repr=False, eq=False)
+class Case:
+    """A valid case, with the tables and keys of a case file (`pbem help keys`) as attributes.
+
+        Case(materials={"rock": {"young": 1000.0, "poisson": 0.2}}, curves={...}, regions={...})
+
+    Curves, regions and laws of the tables [[generate]] are among the others, after them; groups: what each table made.
+    given: the tables as they were given, without what was generated and without defaults; source: the file's path, as
+    it was given. What follows from the geometry is checked by `pbem.model.build.build_model`.
+    """
+
+    title: str
+    units: UnitsTable
+    materials: Mapping[str, MaterialTable]
+    curves: Mapping[str, CurveTable]
+    regions: Mapping[str, RegionTable]
+    generate: tuple[GenerateTable, ...]
+    boundary: Mapping[str, ConditionTable]
+    interfaces: Mapping[str, LawTable]
+    contacts: Mapping[str, ContactTable]
+    remote: StressTable | None
+    gravity: GravityTable | None
+    initial_stress: Mapping[str, StressTable]
+    analysis: AnalysisTable
+    stages: tuple[StageTable, ...]
+    solver: SolverTable
+    petsc: Mapping[str, str]
+    output: OutputTable
+    given: Mapping[str, Any]
+    source: str
+    groups: tuple[Group, ...]
+    origin: Mapping[str, int]
+
+    def __init__(self, /, **tables: Any) -> None:
+        """Tables and keys of a case file; tuples and arrays may stand for lists, None for a key that is not given.
+
+        Raises CaseError with every fault of tables and keys, each of which names the object and its field.
+        """
+        draft = draft_case(tables)
+        if draft.case is None or draft.faults:
+            raise CaseError(UNNAMED, draft.faults)
+        self._take(vars(draft.case))
+
+    @classmethod
+    def compose(cls, tables: CaseFile, expansion: Expansion | None, given: Mapping[str, Any], source: str) -> Self:
+        """The case of tables that were checked, and of what they generate."""
+        values: dict[str, Any] = {name: getattr(tables, name) for name in CaseFile.model_fields}
+        values |= {"given": given, "source": source, "groups": (), "origin": {}}
+        if expansion is not None:
+            values |= {field.name: getattr(expansion, field.name) for field in fields(Expansion)}
+        case = cls.__new__(cls)
+        case._take(values)
+        return case
+
+    def _take(self, values: Mapping[str, Any]) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the same tables were given."""
+        return isinstance(other, Case) and self.given == other.given
+
+    def __repr__(self) -> str:
+        parts = ("materials", "curves", "regions", "interfaces", "contacts", "stages")
+        counts = [f"{len(getattr(self, part))} {part}" for part in parts if getattr(self, part)]
+        return f"<Case {self.title!r}: {', '.join(counts)}>"
+
+    def trace(self, fault: Fault) -> Fault:
+        """The fault at what was given: of a curve, region or law that was generated, at the key it was made from."""
+        path = self._find_given(fault.path)
+        return fault if path == fault.path else Fault.at(path, fault.found, fault.expected)
+
+    def _find_given(self, path: KeyPath) -> KeyPath:
+        if len(path) == 4 and path[0] == "regions" and isinstance(path[3], int):  # a name in a list
+            names = getattr(self.regions.get(str(path[1])), str(path[2]), ())
+            if path[3] < len(names) and names[path[3]] in self.origin:
+                return ("generate", self.origin[names[path[3]]])
+        if len(path) < 2 or path[0] not in ("curves", "regions", "interfaces") or path[1] not in self.origin:
+            return path
+        if path[1] in self.given.get(str(path[0]), ()):
+            return path
+        number = self.origin[str(path[1])]
+        place = ("generate", number)
+        return (*place, path[2]) if len(path) > 2 and path[2] in self.generate[number].model_fields_set else place
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A case as far as it can be judged.
+
+    case: None if too much is wrong; otherwise what is wrong is left out or stands in with a harmless value, so that
+    the rest can be checked. conditions_known: no fault touches the conditions and laws.
+    """
+
+    case: Case | None
+    faults: tuple[Fault, ...]
+    conditions_known: bool = True
+
+
+def draft_case(tables: Mapping[str, Any], source: str = UNNAMED) -> Draft:
+    """A case of the tables as far as possible, with all their faults in the order of the schema; never raises for what
+    is wrong with them."""
+    raw, faults = make_plain(tables)
+    deep = find_depth(raw)
+    if deep is not None:
+        found = f"tables and lists within each other more than {DEEPEST} deep"
+        return Draft(None, (Fault.at(deep[:4], found, "the tables and keys of a case"),))
+    findings = find_controls(raw) + find_conflicts(raw) + find_schema_findings(raw)
+    case, more = _compose(raw, findings, source)
+    faults += [Fault.at(finding.loc, finding.found, finding.expected) for finding in (*findings, *more)]
+    return Draft(case, _order(faults), not any(_concerns_loads(fault.path) for fault in faults))
+
+
+def _compose(
+    raw: Mapping[str, Any], findings: list[Finding], source: str
+) -> tuple[Case | None, list[Finding]]:
+    """The case with what it generates, as far as it can be judged, and what is wrong with generating it."""
+    patched = repair(raw, findings)
+    if patched is None:
+        return None, []
+    try:
+        tables = CaseFile.model_validate(patched)
+    except ValidationError:
+        return None, []
+    if not tables.generate:
+        return Case.compose(tables, None, raw, source), []
+    expansion, wrong = expand(tables)
+    if expansion is None:
+        return None, wrong
+    return Case.compose(tables, expansion, raw, source), []
+
+
+def _order(faults: Sequence[Fault]) -> tuple[Fault, ...]:
+    """In the order of the schema, each once; unknown tables first."""
+    tables = list(CaseFile.model_fields)
+    ranks = {name: number for number, name in enumerate(tables)}
+    return tuple(sorted(
+        dict.fromkeys(faults), key=lambda fault: ranks.get(str(fault.path[0]), 0) if fault.path else 0
+    ))
+
+
+def _concerns_loads(path: KeyPath) -> bool:
+    """Whether a fault here leaves open what holds and what loads the bodies."""
+    if path and path[0] == "materials":
+        return path[-1] == "density"
+    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
+                           path[0] not in CaseFile.model_fields)

@@ -1,0 +1,1 @@
+"""Curves of straight and circular legs: their shapes, loops, crossings and distances."""

@@ -1,0 +1,167 @@
+"""The shapes of curves, polylines, circles, arcs and curves by expressions, as chains of legs with equal ends."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from pbem.errors import Fault
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.intersection import extremes
+from pbem.geometry.tolerance import Tolerance, join_points
+
+# Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
+WIDEST_ARC = 45.0
+# Squares of coordinates must not overflow.
+LARGEST = 1e100
+
+
+def measure_extent(curves: Mapping[str, Curve]) -> tuple[float, float]:
+    """Largest extent of all curves, and their largest coordinate."""
+    if not curves:
+        return 0.0, 0.0
+    points = np.concatenate([extremes(leg) for curve in curves.values() for leg in curve.legs])
+    extents = points.real.max() - points.real.min(), points.imag.max() - points.imag.min()
+    return float(max(extents)), float(np.abs(points).max())
+
+
+def share(total: int, lengths: Sequence[float]) -> list[int]:
+    """Split a number of elements in proportion to lengths, at least one each (more than the total only for that).
+
+    Of lengths that are equal but for rounding, which the units and the place of a model decide, the first gets more.
+    """
+    whole = sum(lengths)
+    wanted = [total * length / whole for length in lengths]
+    counts = [max(1, math.floor(want + 1e-9)) for want in wanted]
+    while sum(counts) < total:
+        worst = max(range(len(counts)), key=lambda i: (round(wanted[i] - counts[i], 9), -i))
+        counts[worst] += 1
+    while sum(counts) > max(total, len(counts)):
+        several = (i for i in range(len(counts)) if counts[i] > 1)
+        worst = max(several, key=lambda i: (round(counts[i] - wanted[i], 9), i))
+        counts[worst] -= 1
+    return counts
+
+
+@dataclass(frozen=True)
+class Division:
+    """How a curve is divided into elements.
+
+    elements: their number, or one for each leg; size: or a length that none exceeds. power: element ends lie at t^power
+    from a refined end; refine_start, refine_end: of curves by expressions, whose elements are their legs.
+    """
+
+    elements: int | tuple[int, ...] | None = None
+    size: float | None = None
+    power: float = 3.0
+    refine_start: bool = False
+    refine_end: bool = False
+
+    def count(self, lengths: Sequence[float]) -> list[int]:
+        """Numbers of elements on legs of these lengths."""
+        if self.size is not None:
+            return [max(1, math.ceil(min(length / self.size, 1e9) - 1e-9)) for length in lengths]
+        if isinstance(self.elements, tuple):
+            return list(self.elements)
+        assert self.elements is not None, "elements or size"
+        return share(self.elements, lengths)
+
+
+def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Curve | Fault:
+    """A curve of x and y as functions of t from 0 to 1: one straight leg for each element, between points of the curve;
+    t is uniform unless the division says more."""
+    path = ("curves", name, "expression")
+    count = sum(division.count([1.0]))
+    t = Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
+    try:
+        x, y = (evaluate_expression(text, t=t) for text in texts)
+    except ExpressionError as error:
+        return Fault.at(path, error.found, error.expected)
+    for axis, values in (("x", x), ("y", y)):
+        wrong = ~(np.abs(values) <= LARGEST)
+        if wrong.any():
+            at = int(np.argmax(wrong))
+            found = f"{axis} = {values[at]:g} at t = {t[at]:g}"
+            return Fault.at(path, found, f"a number of at most {LARGEST:g} everywhere")
+    points = (x + 1j * y).tolist()
+    return Curve(name, tuple(Leg(a, b, 1) for a, b in pairwise(points)))
+
+
+def draw_polyline(name: str, points: Sequence[complex], division: Division) -> Curve:
+    """Straight legs from point to point; legs without length are found when curves are joined."""
+    lengths = [abs(b - a) for a, b in pairwise(points)]
+    if sum(lengths) == 0:
+        return Curve(name, tuple(Leg(a, b, 1) for a, b in pairwise(points)))
+    counts = division.count(lengths)
+    return Curve(name, tuple(
+        Leg(a, b, count, power=division.power)
+        for a, b, count in zip(points, points[1:], counts, strict=False)
+    ))
+
+
+def draw_circle(
+    name: str, center: complex, radius: float, division: Division, angles: tuple[float, float] | None = None
+) -> Curve | Fault:
+    """A circle, or the arc between two angles (degrees), counter-clockwise if the second is larger.
+
+    An arc is one leg; a full circle four, cut between elements so that these are all equal (if eight or more).
+    """
+    path = ("curves", name)
+    first, last = angles or (0.0, 360.0)
+    begin, sweep = math.radians(first), math.radians(last - first)
+    count = division.count([radius * abs(sweep)])[0]
+    start = _point_on_circle(center, radius, first)
+    if abs(abs(start - center) - radius) > 1e-3 * radius:
+        found = f"radius = {radius:g}, lost in the rounding of the center"
+        return Fault.at(path, found, "a circle that is not so small against its distance from the origin")
+    turn = abs(last - first)
+    needed = math.ceil(turn / WIDEST_ARC - 1e-9)
+    if division.size is not None:
+        count = max(needed, count)
+    if count < needed:
+        what = "a circle" if turn == 360 else f"an arc of {turn:g} degrees"
+        found = f"{count} element{'s' if count > 1 else ''} around {what}"
+        return Fault.at(path, found, f"at least {needed}: an element may turn by {WIDEST_ARC:g} degrees")
+    if turn < 360:
+        end = _point_on_circle(center, radius, last)
+        return Curve(name, (Leg(start, end, count, power=division.power, center=center, sweep=sweep),))
+    legs, done, here = [], 0, start
+    for number in share(count, [1.0] * 4):
+        done += number
+        there = start if done == count else center + radius * cmath.exp(1j * (begin + sweep * done / count))
+        part = sweep * number / count
+        legs.append(Leg(here, there, number, power=division.power, center=center, sweep=part))
+        here = there
+    return Curve(name, tuple(legs))
+
+
+def _point_on_circle(center: complex, radius: float, degrees: float) -> complex:
+    """Exact at multiples of 90 degrees, where users write the same point by hand."""
+    quarter, rest = divmod(degrees, 90.0)
+    direction = (1, 1j, -1, -1j)[int(quarter) % 4] * cmath.exp(1j * math.radians(rest))
+    return center + radius * direction
+
+
+def join_ends(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[str, Curve], list[tuple[str, int]]]:
+    """Replace every end by the first point of the file that is the same; also name legs that shrink to a point."""
+    points = np.array([point for curve in curves.values() for leg in curve.legs for point in (leg.start, leg.end)])
+    owners = [name for name, curve in curves.items() for _ in range(2 * len(curve.legs))]
+    joined, number = join_points(points, owners, tolerance) if len(points) else points, 0
+    result, short = {}, []
+    for name, curve in curves.items():
+        legs = []
+        for index, leg in enumerate(curve.legs):
+            start, end = complex(joined[number]), complex(joined[number + 1])
+            number += 2
+            whole = leg.center is not None and abs(leg.sweep) > math.pi
+            if start == end and not whole:
+                short.append((name, index + 1))
+            legs.append(replace(leg, start=start, end=end))
+        result[name] = Curve(name, tuple(legs))
+    return result, list({name: (name, index) for name, index in reversed(short)}.values())

@@ -1,0 +1,89 @@
+"""From the curves of a case to chains of legs whose common ends are exactly equal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pbem.description.case import Case
+from pbem.description.schema import CurveTable
+from pbem.description.values import MOST_ELEMENTS
+from pbem.errors import Fault
+from pbem.geometry.curve import Curve
+from pbem.geometry.shape import (
+    Division,
+    draw_circle,
+    draw_expression,
+    draw_polyline,
+    join_ends,
+    measure_extent,
+)
+from pbem.geometry.tolerance import Tolerance, make_tolerance
+from pbem.model.roles import Roles
+
+# Squares of lengths must not underflow.
+SMALLEST = 1e-100
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """curves: in the order of the file, without those that have faults; tolerance: which points agree."""
+
+    curves: Mapping[str, Curve]
+    size: float
+    tolerance: Tolerance
+    faults: tuple[Fault, ...]
+
+
+def shape_curves(case: Case, roles: Roles) -> Shapes:
+    """Build every curve; joined ends are made exactly equal. Elements are counted per leg, nothing is graded yet."""
+    faults: list[Fault] = []
+    curves: dict[str, Curve] = {}
+    for name, table in case.curves.items():
+        curve = _draw(name, table)
+        if isinstance(curve, Fault):
+            faults.append(curve)
+        else:
+            curves[name] = curve
+    size, largest = measure_extent(curves)
+    tolerance = _find_tolerance(curves, roles, largest)
+    if curves and not size > SMALLEST:
+        found = f"curves with an extent of {size:g}"
+        faults.append(Fault.at(("curves",), found, f"a model larger than {SMALLEST:g}"))
+        return Shapes({}, size, tolerance, tuple(faults))
+    curves, short = join_ends(curves, tolerance)
+    for name, number in short:
+        loc = ("curves", name, "points", number) if case.curves[name].points else ("curves", name)
+        found = "a leg without length (the same point twice)"
+        if case.curves[name].expression:
+            found = f"element {number} without length (the same point twice)"
+        faults.append(Fault.at(loc, found, "points that differ"))
+        del curves[name]
+    for name, curve in list(curves.items()):
+        total = sum(leg.elements for leg in curve.legs)
+        if total > MOST_ELEMENTS:
+            key = "size" if case.curves[name].size else "elements"
+            expected = f"at most {MOST_ELEMENTS} on one curve"
+            faults.append(Fault.at(("curves", name, key), f"{total} elements", expected))
+            del curves[name]
+    return Shapes(curves, size, tolerance, tuple(faults))
+
+
+def _find_tolerance(curves: Mapping[str, Curve], roles: Roles, largest: float) -> Tolerance:
+    """largest: the largest coordinate of all curves."""
+    regions = {name: frozenset((region,)) for name, region in (*roles.outer.items(), *roles.cracks.items())}
+    regions |= {name: frozenset(pair) for name, pair in roles.shared.items()}
+    contacts = frozenset(frozenset((roles.outer[a], roles.outer[b])) for a, b in roles.contacts.values())
+    return make_tolerance(curves, largest, regions, contacts)
+
+
+def _draw(name: str, table: CurveTable) -> Curve | Fault:
+    refine_start, refine_end = (table.grading in (end, "both") for end in ("start", "end"))
+    division = Division(table.elements, table.size, table.power, refine_start, refine_end)
+    if table.expression is not None:
+        return draw_expression(name, table.expression, division)
+    if table.center is not None:
+        assert table.radius is not None
+        return draw_circle(name, complex(*table.center), table.radius, division, table.angles)
+    assert table.points is not None
+    return draw_polyline(name, [complex(*point) for point in table.points], division)

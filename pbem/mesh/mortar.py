@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 from pbem.mesh.projection import find_hidden, project_nodes
 from pbem.mesh.shapes import interpolate_shapes
 
@@ -116,7 +116,7 @@ def measure_contrast(coupling: Coupling, slave: Elements, master: Elements) -> t
 def _divide_element(single: Elements, other: Elements) -> tuple[Real, Real]:
     """Gauss points and weights on [-1, 1], cut where the normal passes the ends of the other curve's elements."""
     ends = np.unique(np.concatenate([other.start, other.end]))
-    cuts = single.locate(ends)
+    cuts = single.locate(ends)[0]
     inside = np.sort(cuts[np.abs(cuts) < 1 - 1e-12])
     borders = np.concatenate([[-1.0], inside, [1.0]])
     half, middle = 0.5 * np.diff(borders)[:, None], 0.5 * (borders[1:] + borders[:-1])[:, None]

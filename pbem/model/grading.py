@@ -92,12 +92,10 @@ def check_turning(case: Case, curves: Mapping[str, Curve]) -> list[Fault]:
 
 def _widest_turn(leg: Leg, elements: int | None = None) -> float:
     """Largest angle (degrees) that an element of the leg turns by, with the given number of elements if any."""
-    if leg.center is None:
-        return 0.0
     fractions = leg.element_fractions()
     if elements is not None:
         fractions = leg.divide(elements, leg.refine_start, leg.refine_end)
-    return math.degrees(abs(leg.sweep)) * float(np.diff(fractions).max())
+    return math.degrees(abs(leg.turn)) * float(np.diff(fractions).max())
 
 
 def _collect(curves: Mapping[str, Curve]) -> dict[complex, list[_LegEnd]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,10 +16,12 @@ Real = NDArray[np.float64]
 
 def divide_curve(curve: Curve) -> Elements:
     """The elements of a curve in its own direction; neighbours share exactly the same point."""
-    ends = [leg.element_fractions() for leg in curve.legs]
-    first, last = np.concatenate([t[:-1] for t in ends]), np.concatenate([t[1:] for t in ends])
-    leg = np.repeat(np.arange(len(ends)), [len(t) - 1 for t in ends])
-    return Elements.collect(curve.legs).select(leg).cut(first, last)
+    fractions, ends = [leg.element_fractions() for leg in curve.legs], [leg.element_ends() for leg in curve.legs]
+    leg = np.repeat(np.arange(len(ends)), [len(points) - 1 for points in ends])
+    first, last = (np.concatenate([t[part] for t in fractions]) for part in (slice(None, -1), slice(1, None)))
+    pieces = Elements.collect(curve.legs).select(leg).cut(first, last)
+    start, end = (np.concatenate([points[part] for points in ends]) for part in (slice(None, -1), slice(1, None)))
+    return replace(pieces, start=start, end=end)
 
 
 def weigh_nodes(elements: Elements, local: Real) -> Real:

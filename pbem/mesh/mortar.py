@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.geometry.elements import Elements
+from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.projection import find_hidden, project_nodes
 from pbem.mesh.shapes import interpolate_shapes
 
@@ -64,7 +65,7 @@ def couple_curves(slave: Elements, master: Elements, local: Real, others: Elemen
     shapes = interpolate_shapes(local)
     count = len(local)
     cover, distance = np.zeros(slave.count * count), np.zeros(slave.count * count)
-    own_weight, own_length, length = slave.weights(local), slave.lengths, master.lengths
+    own_weight, own_length, length = weigh_nodes(slave, local), slave.lengths, master.lengths
     nodes: list[Integer] = []
     faces: list[Integer] = []
     product: list[Real] = []

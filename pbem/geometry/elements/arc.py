@@ -18,8 +18,7 @@ class Arc(Kind):
     """A point of an arc is at apex (1 + i q s)/(1 - i q s) from the centre, q = tan(sweep/4), the apex being the middle
     of the arc: a map under which the kernels' integrals are closed (theory, 16, 17).
 
-    From the middle of the chord it is at half the chord times (s - i q)/(1 - i q s), which is exact at both ends; so
-    places and slopes are taken from the chord. Directions are taken from the centre: short chords have lost digits.
+    From the middle of the chord it is at half the chord times (s - i q)/(1 - i q s): `sample`, and inverted `preimage`.
     """
 
     degree = float("inf")
@@ -29,24 +28,33 @@ class Arc(Kind):
         return e.sweep != 0
 
     def place(self, e: Shape, s: Any) -> Any:
+        return e.center + _radius(e, s)
+
+    def sample(self, e: Shape, s: Any) -> Any:
         q = 1j * _tangent(e)
         return 0.5 * (e.end + e.start) + 0.5 * (e.end - e.start) * (s - q) / (1 - q * s)
 
     def slope(self, e: Shape, s: Any) -> Any:
         q = _tangent(e)
-        return 0.5 * (e.end - e.start) * (1 + q**2) / (1 - 1j * q * s) ** 2
+        return _apex(e) * 2j * q / (1 - 1j * q * s) ** 2
 
     def stretch(self, e: Shape, s: Any) -> Any:
-        q = _tangent(e)
-        return 0.5 * abs(e.end - e.start) * (1 + q**2) / (1 + (q * s) ** 2)
+        return 2 * abs(e.start - e.center) * abs(_tangent(e)) / self.crowding(e, s)
+
+    def crowding(self, e: Shape, s: Any) -> Any:
+        return 1 + (_tangent(e) * s) ** 2
 
     def normal(self, e: Shape, s: Any) -> Any:
-        turn = 1j * _tangent(e) * s
-        return self.normal_at(e, e.center + _apex(e) * (1 + turn) / (1 - turn))
+        radius = _radius(e, s)
+        return np.sign(e.sweep) * radius / abs(radius)
 
     def normal_at(self, e: Shape, z: Any) -> Any:
         radius = z - e.center
         return np.sign(e.sweep) * radius / abs(radius)
+
+    def directions(self, e: Shape) -> tuple[Any, Any]:
+        chord = e.end - e.start
+        return chord * np.exp(-0.5j * e.sweep), chord * np.exp(0.5j * e.sweep)
 
     def curvature(self, e: Shape, s: Any) -> Any:
         return np.sign(e.sweep) / abs(e.start - e.center)
@@ -54,6 +62,9 @@ class Arc(Kind):
     def preimage(self, e: Shape, z: Any) -> Any:
         q, w = 1j * _tangent(e), CHORD.preimage(e, z)
         return (w + q) / (1 + q * w)
+
+    def locate(self, e: Shape, z: Any) -> Any:
+        return np.tan(0.5 * np.angle((z - e.center) / _apex(e))) / _tangent(e)
 
     def length(self, e: Shape) -> Any:
         return abs(e.start - e.center) * abs(e.sweep)
@@ -68,14 +79,15 @@ class Arc(Kind):
         return e.center + (e.start - e.center) * np.exp(1j * e.sweep * t)
 
     def cut(self, e: Shape, first: Any, last: Any) -> Piece:
-        ends = (self.place_fraction(e, t) for t in (first, last))
-        return Piece(*ends, e.center, e.sweep * (last - first))
+        start, end = (self.place_fraction(e, t) for t in (first, last))
+        return Piece(start, end, e.center, e.sweep * (last - first))
 
     def reverse(self, e: Shape) -> Piece:
         return Piece(e.end, e.start, e.center, -e.sweep)
 
     def move(self, e: Shape, origin: Any, factor: Any) -> Piece:
-        return Piece(*((z - origin) * factor for z in (e.start, e.end, e.center)), e.sweep)
+        start, end, center = ((z - origin) * factor for z in (e.start, e.end, e.center))
+        return Piece(start, end, center, e.sweep)
 
     def project(self, e: Shape, z: Any) -> Any:
         sweep, whole = abs(e.sweep), 2 * np.pi
@@ -138,6 +150,12 @@ class Arc(Kind):
 def _tangent(e: Shape) -> Any:
     """q of the map."""
     return np.tan(0.25 * e.sweep)
+
+
+def _radius(e: Shape, s: Any) -> Any:
+    """From the centre to the points at s."""
+    turn = 1j * _tangent(e) * s
+    return _apex(e) * (1 + turn) / (1 - turn)
 
 
 def _apex(e: Shape) -> Any:

@@ -45,8 +45,11 @@ class Elements:
     @classmethod
     def collect(cls, shapes: Sequence[Shape]) -> Elements:
         """Of single shapes, such as legs."""
-        numbers = ([getattr(shape, name) or 0.0 for shape in shapes] for name in cls.__dataclass_fields__)
-        return cls(*(np.array(each, dtype=kind) for each, kind in zip(numbers, (complex, complex, complex, float), strict=True)))
+        start, end, center = (
+            np.array([getattr(shape, name) or 0j for shape in shapes], dtype=complex)
+            for name in ("start", "end", "center")
+        )
+        return cls(start, end, center, np.array([shape.sweep for shape in shapes], dtype=float))
 
     @classmethod
     def by_ends(cls, start: Complex, end: Complex, sweep: Real) -> Elements:
@@ -143,6 +146,10 @@ class Elements:
         """Points at s (theory, 16)."""
         return self._at("place", local)
 
+    def sample(self, local: Real) -> Complex:
+        """Points at s for pictures."""
+        return self._at("sample", local)
+
     def slope(self, local: Real) -> Complex:
         """Derivatives of the points by s (theory, 17)."""
         return self._at("slope", local)
@@ -150,6 +157,10 @@ class Elements:
     def stretch(self, local: Real) -> Real:
         """Length of the element per unit of s (theory, 17)."""
         return self._at("stretch", local)
+
+    def crowding(self, local: Real) -> Real:
+        """Stretch in the middle of each by that at s (theory, 18)."""
+        return self._at("crowding", local)
 
     def normals(self, local: Real) -> Complex:
         """Unit outward normals: to the right of travel."""
@@ -164,10 +175,11 @@ class Elements:
         return self._at("curvature", local)
 
     def directions(self) -> tuple[Complex, Complex]:
-        """Unit tangents (m,) where they leave their start and arrive at their end."""
-        slope = self.slope(np.array([-1.0, 1.0]))
-        unit = slope / np.abs(slope)
-        return unit[..., 0], unit[..., 1]
+        """Tangents (m,) where each leaves its start and arrives at its end, as long as the chord."""
+        leaves, arrives = np.empty_like(self.start), np.empty_like(self.start)
+        for kind, own in self._groups:
+            leaves[own], arrives[own] = kind.directions(self.select(own))
+        return leaves, arrives
 
     def preimage(self, points: Complex) -> Complex:
         """The complex s that the map of each takes to the points; of points on the element it is real."""
@@ -175,7 +187,7 @@ class Elements:
 
     def locate(self, points: Complex) -> Real:
         """s at which the normal of each passes the points."""
-        return self._at("coordinate", self._at("project", points))
+        return self._at("locate", points)
 
     def fractions(self, local: Real) -> Real:
         """Fraction of each element's length that lies before s."""

@@ -71,12 +71,20 @@ class Kind(ABC):
         """Points at s."""
 
     @abstractmethod
+    def sample(self, e: Shape, s: Any) -> Any:
+        """The same from the ends and the angle alone: for pictures, and near to an end at 0."""
+
+    @abstractmethod
     def slope(self, e: Shape, s: Any) -> Any:
         """Derivative of the place by s (complex)."""
 
     def stretch(self, e: Shape, s: Any) -> Any:
         """Length per unit of s: the modulus of the slope."""
         return abs(self.slope(e, s))
+
+    @abstractmethod
+    def crowding(self, e: Shape, s: Any) -> Any:
+        """Stretch in the middle by that at s: the kernels' tractions are polynomials of s times this (theory, 18)."""
 
     @abstractmethod
     def normal(self, e: Shape, s: Any) -> Any:
@@ -87,12 +95,20 @@ class Kind(ABC):
         """At points on the element."""
 
     @abstractmethod
+    def directions(self, e: Shape) -> tuple[Any, Any]:
+        """Tangents where each leaves its start and arrives at its end, as long as the chord."""
+
+    @abstractmethod
     def curvature(self, e: Shape, s: Any) -> Any:
         """Angle that the tangent turns through per length, at s."""
 
     @abstractmethod
     def preimage(self, e: Shape, z: Any) -> Any:
         """The complex s that the map takes to z; its real part is the coordinate of a point on the element."""
+
+    @abstractmethod
+    def locate(self, e: Shape, z: Any) -> Any:
+        """s at which the normal of the carrier, the element's line or circle, passes z; beyond an end not in [-1, 1]."""
 
     @abstractmethod
     def length(self, e: Shape) -> Any:
@@ -128,7 +144,7 @@ class Kind(ABC):
 
     @abstractmethod
     def project(self, e: Shape, z: Any) -> Any:
-        """t at which the normal of the element's carrier, its line or circle, passes z; beyond an end not in [0, 1]."""
+        """As `locate`, but t; beyond an end of an arc it belongs to the nearer of both ends."""
 
     @abstractmethod
     def distance(self, e: Shape, z: Any) -> Any:

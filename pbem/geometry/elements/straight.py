@@ -21,8 +21,14 @@ class Straight(Kind):
     def place(self, e: Shape, s: Any) -> Any:
         return 0.5 * (e.end + e.start) + 0.5 * (e.end - e.start) * s
 
+    def sample(self, e: Shape, s: Any) -> Any:
+        return self.place(e, s)
+
     def slope(self, e: Shape, s: Any) -> Any:
         return 0.5 * (e.end - e.start)
+
+    def crowding(self, e: Shape, s: Any) -> Any:
+        return 1.0
 
     def normal(self, e: Shape, s: Any) -> Any:
         return -1j * ((e.end - e.start) / abs(e.end - e.start))
@@ -30,11 +36,17 @@ class Straight(Kind):
     def normal_at(self, e: Shape, z: Any) -> Any:
         return self.normal(e, 0.0)
 
+    def directions(self, e: Shape) -> tuple[Any, Any]:
+        return e.end - e.start, e.end - e.start
+
     def curvature(self, e: Shape, s: Any) -> Any:
         return 0.0 * abs(e.end - e.start)
 
     def preimage(self, e: Shape, z: Any) -> Any:
         return (z - 0.5 * (e.end + e.start)) / (0.5 * (e.end - e.start))
+
+    def locate(self, e: Shape, z: Any) -> Any:
+        return self.preimage(e, z).real
 
     def length(self, e: Shape) -> Any:
         return abs(e.end - e.start)

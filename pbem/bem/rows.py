@@ -55,9 +55,7 @@ class Sources:
     @cached_property
     def geometry(self) -> Elements:
         """The elements by themselves, none of their numbers missing."""
-        center = np.zeros(self.count, dtype=complex) if self.center is None else self.center
-        sweep = np.zeros(self.count) if self.sweep is None else self.sweep
-        return Elements(self.start, self.end, center, sweep)
+        return Elements.complete(self.start, self.end, self.center, self.sweep)
 
     @cached_property
     def elements(self) -> tuple[Complex, Complex, Complex, Real, NDArray[np.int8], Real]:
@@ -73,13 +71,10 @@ class Sources:
 
     def select(self, indices: Integer) -> Sources:
         """Some of the elements, in the given order, e.g. a block of a hierarchical operator; in microseconds."""
+        chosen = self.geometry.select(indices)
         selected = replace(
-            self,
-            start=self.start[indices],
-            end=self.end[indices],
+            self, start=chosen.start, end=chosen.end, center=chosen.center, sweep=chosen.sweep,
             family=self.family[indices],
-            center=None if self.center is None else self.center[indices],
-            sweep=None if self.sweep is None else self.sweep[indices],
         )
         vars(selected)["shape"] = self.shape  # the same nodes
         return selected

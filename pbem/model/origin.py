@@ -49,10 +49,9 @@ def _list_rounded(model: Model, radii: Mapping[str, float], origin: complex) -> 
     places: dict[complex, complex] = {}
     for name, curve in model.curves.items():
         for leg in curve.legs if name in radii else ():
-            assert leg.center is not None
-            for end in (leg.start, leg.end):
-                center, local = leg.center - origin, end - origin
-                on_circle = center + radii[name] * (local - center) / abs(local - center)
+            moved = leg.kind.move(leg, origin, 1.0)
+            for end, local in ((leg.start, moved.start), (leg.end, moved.end)):
+                on_circle = leg.kind.restore(moved, local, radii[name])
                 if abs(on_circle - local) <= most:
                     places.setdefault(end, on_circle)
     return places

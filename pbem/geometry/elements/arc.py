@@ -28,6 +28,7 @@ class Arc(Kind):
         return e.sweep != 0
 
     def place(self, e: Shape, s: Any) -> Any:
+        """From the centre (theory, 16)."""
         return e.center + _radius(e, s)
 
     def sample(self, e: Shape, s: Any) -> Any:
@@ -35,13 +36,16 @@ class Arc(Kind):
         return 0.5 * (e.end + e.start) + 0.5 * (e.end - e.start) * (s - q) / (1 - q * s)
 
     def slope(self, e: Shape, s: Any) -> Any:
+        """Of the map from the centre (theory, 17)."""
         q = _tangent(e)
         return _apex(e) * 2j * q / (1 - 1j * q * s) ** 2
 
     def stretch(self, e: Shape, s: Any) -> Any:
+        """The modulus of the slope (theory, 17)."""
         return 2 * abs(e.start - e.center) * abs(_tangent(e)) / self.crowding(e, s)
 
     def crowding(self, e: Shape, s: Any) -> Any:
+        """The factor 1 + q^2 s^2 of tractions (theory, 18)."""
         return 1 + (_tangent(e) * s) ** 2
 
     def normal(self, e: Shape, s: Any) -> Any:
@@ -89,6 +93,9 @@ class Arc(Kind):
         start, end, center = ((z - origin) * factor for z in (e.start, e.end, e.center))
         return Piece(start, end, center, e.sweep)
 
+    def restore(self, e: Shape, z: Any, radius: Any) -> Any:
+        return e.center + radius * (z - e.center) / abs(z - e.center)
+
     def project(self, e: Shape, z: Any) -> Any:
         sweep, whole = abs(e.sweep), 2 * np.pi
         angle = np.angle((z - e.center) / (e.start - e.center)) * np.sign(e.sweep) % whole
@@ -118,6 +125,7 @@ class Arc(Kind):
         return crossings
 
     def subtend(self, e: Shape, z: Any) -> Any:
+        """The chord's angle, and a full turn between the chord and the arc (theory, 80)."""
         if np.any(abs(e.sweep) > WIDEST):
             return sum(self.subtend(self.cut(e, 0.5 * k, 0.5 * k + 0.5), z) for k in (0, 1))
         # Between the chord and the arc the chord passes on the other side of the point.

@@ -59,6 +59,12 @@ class Elements:
         return cls(start, end, np.where(curved, 0.5 * (start + end) + across, 0), sweep)
 
     @classmethod
+    def complete(cls, start: Complex, end: Complex, center: Complex | None, sweep: Real | None) -> Elements:
+        """Straight ones if their centres and angles are not given."""
+        none = np.zeros(len(start))
+        return cls(start, end, none.astype(complex) if center is None else center, none if sweep is None else sweep)
+
+    @classmethod
     def join(cls, parts: Sequence[Elements]) -> Elements:
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in cls.__dataclass_fields__))
 

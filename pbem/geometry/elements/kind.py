@@ -108,7 +108,7 @@ class Kind(ABC):
 
     @abstractmethod
     def locate(self, e: Shape, z: Any) -> Any:
-        """s at which the normal of the carrier, the element's line or circle, passes z; beyond an end not in [-1, 1]."""
+        """s at which the normal of the carrier, the line or circle, passes z; beyond an end not in [-1, 1]."""
 
     @abstractmethod
     def length(self, e: Shape) -> Any:
@@ -141,6 +141,10 @@ class Kind(ABC):
     @abstractmethod
     def move(self, e: Shape, origin: Any, factor: Any) -> Piece:
         """In other coordinates, (z - origin) factor: moved, turned, enlarged."""
+
+    @abstractmethod
+    def restore(self, e: Shape, z: Any, radius: Any) -> Any:
+        """Points z on the element put back on a circle of the radius that was written, which rounding took them off."""
 
     @abstractmethod
     def project(self, e: Shape, z: Any) -> Any:

@@ -19,6 +19,7 @@ class Straight(Kind):
         return e.sweep == 0
 
     def place(self, e: Shape, s: Any) -> Any:
+        """From the middle along the half chord (theory, 16)."""
         return 0.5 * (e.end + e.start) + 0.5 * (e.end - e.start) * s
 
     def sample(self, e: Shape, s: Any) -> Any:
@@ -68,6 +69,9 @@ class Straight(Kind):
 
     def move(self, e: Shape, origin: Any, factor: Any) -> Piece:
         return Piece((e.start - origin) * factor, (e.end - origin) * factor, e.center, e.sweep)
+
+    def restore(self, e: Shape, z: Any, radius: Any) -> Any:
+        return z
 
     def project(self, e: Shape, z: Any) -> Any:
         along = e.end - e.start

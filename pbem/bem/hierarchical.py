@@ -94,10 +94,9 @@ def choose_terms(tolerance: float) -> int:
 
 def sort_elements(mesh: Mesh, materials: Sequence[Material], terms: int) -> Sorted:
     """Cluster trees of all regions' elements."""
-    bulge = np.where(mesh.sweep == 0, 0.0, 0.5 * np.abs(mesh.end - mesh.start))
     counts = np.bincount(mesh.region, minlength=len(materials))
     most = np.where(counts <= SMALL_REGION, SMALL_REGION, LEAF_ELEMENTS)
-    forest = build_forest(mesh.start, mesh.end, bulge, mesh.region, most)
+    forest = build_forest(mesh.start, mesh.end, mesh.geometry.bulges, mesh.region, most)
     return Sorted(mesh, tuple(materials), tuple(collect_sources(mesh, materials)), forest, terms)
 
 

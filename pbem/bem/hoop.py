@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.background import Background
-from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_nodes, split_faces, stretch_elements
+from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_nodes, split_faces
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
 Complex = NDArray[np.complex128]
@@ -78,7 +78,7 @@ def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Comple
     if with_tips and len(tips):
         shapes[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
     by_local = np.einsum("epj,ej->ep", shapes, values.reshape(mesh.elements, -1))
-    derivative = by_local / stretch_elements(mesh, np.arange(mesh.elements), local)
+    derivative = by_local / mesh.geometry.stretch(local)
     if not with_tips:
         inner, derivatives = _differentiate_patches(mesh, values)
         derivative[inner] = derivatives
@@ -93,14 +93,9 @@ def _differentiate_patches(mesh: Mesh, values: Complex) -> tuple[Integer, Comple
     before[following[following >= 0]] = np.flatnonzero(following >= 0)
     inner = np.flatnonzero((following >= 0) & (before >= 0))
     former, latter = before[inner], following[inner]
-    # Lengths from the start: on an arc the integral of `stretch_elements`.
-    half, quarter = 0.5 * np.abs(mesh.end - mesh.start), np.tan(0.25 * mesh.sweep)
-    arc = quarter != 0
-    by = np.where(arc, quarter, 1.0)
-    length = np.where(arc, 2 * half * (1 + by**2) * np.arctan(by) / by, 2 * half)
-    s = locate_nodes(mesh)
-    turned = np.where(arc[:, None], np.arctan(by[:, None] * s) / np.where(arc, np.arctan(by), 1.0)[:, None], s)
-    along = 0.5 * (turned + 1) * length[:, None]
+    # Lengths from the start.
+    length = mesh.geometry.lengths
+    along = mesh.geometry.fractions(locate_nodes(mesh)) * length[:, None]
     places = np.concatenate([along[former, -1:] - length[former, None], along[inner],
                              along[latter, :1] + length[inner, None]], axis=1) / length[inner, None]
     nodal = values.reshape(mesh.elements, -1)
@@ -117,10 +112,10 @@ def _find_smooth_joints(mesh: Mesh) -> Integer:
     firsts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
     following = numbers + 1
     following[np.concatenate([firsts[1:] - 1, [mesh.elements - 1]])] = firsts  # closed curves go on where they began
-    chord = (mesh.end - mesh.start) / np.abs(mesh.end - mesh.start)
-    leaves, arrives = chord * np.exp(0.5j * mesh.sweep), chord * np.exp(-0.5j * mesh.sweep)
+    begin, end = (each / np.abs(each) for each in mesh.geometry.directions())
+    turns = mesh.geometry.turns
     smooth = (mesh.start[following] == mesh.end) & (following != numbers)
-    smooth &= (np.abs(leaves - arrives[following]) < SMOOTH) & (mesh.sweep[following] * mesh.sweep >= 0)
+    smooth &= (np.abs(end - begin[following]) < SMOOTH) & (turns[following] * turns >= 0)
     return np.where(smooth, following, -1)
 
 

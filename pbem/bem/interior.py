@@ -123,7 +123,8 @@ def evaluate_limits(
         half_jump = 0.5 * (first - opposite)[nodes[tips]]
         moved[at[tips]] += ((rooted - shapes[tips]) * half_jump).sum(axis=1)
     carried, along = (shapes * traction[nodes]).sum(axis=1), (shapes * hoop_stress[nodes]).sum(axis=1)
-    stress[at] = _turn_stress(_find_normals(mesh, element, points[at]), carried, along)
+    normal = mesh.geometry.select(element).normals_at(points[at, None])[:, 0]
+    stress[at] = _turn_stress(normal, carried, along)
     return Values(moved, stress)
 
 
@@ -133,13 +134,6 @@ def _evaluate(sources: Sources, points: Complex, normal: complex | None) -> Real
     normals = None if normal is None else np.full(len(points), normal, dtype=complex)
     parts = evaluate_rows(sources, points, on, normals)
     return np.concatenate([part for part in parts if part is not None], axis=1)
-
-
-def _find_normals(mesh: Mesh, element: Integer, points: Complex) -> Complex:
-    """Outward normals at points on elements."""
-    sweep, chord = mesh.sweep[element], (mesh.end - mesh.start)[element]
-    outward = np.where(sweep == 0, -1j * chord, np.sign(sweep) * (points - mesh.center[element]))
-    return outward / np.abs(outward)
 
 
 def _turn_stress(normal: Complex, traction: Complex, hoop_stress: Real) -> Real:

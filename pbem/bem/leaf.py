@@ -101,22 +101,7 @@ def _place_points(sources: Sources, terms: int) -> tuple[Complex, Complex, Real]
         2: (1 - 2 * root**2, 4 * root * half, root[:, None] ** (2 * power + 1) @ tips[1]),
     }
     local, weights, shapes = (np.stack([rules[int(family)][k] for family in sources.family]) for k in range(3))
-    point, slope = trace_elements(sources, local)
-    return point, slope * weights, shapes
-
-
-def trace_elements(sources: Sources, local: Real) -> tuple[Complex, Complex]:
-    """Points and d zeta/ds at the coordinates s (e, q) of elements (theory, 17)."""
-    half, middle = 0.5 * (sources.end - sources.start)[:, None], 0.5 * (sources.end + sources.start)[:, None]
-    point, slope = middle + half * local, half + 0 * local
-    if sources.sweep is not None and sources.center is not None and sources.sweep.any():
-        bent = sources.sweep != 0
-        center, tangent = sources.center[bent, None], np.tan(0.25 * sources.sweep[bent])[:, None]
-        apex = (sources.start[bent] - sources.center[bent])[:, None] * np.exp(0.5j * sources.sweep[bent])[:, None]
-        turn = 1j * tangent * local[bent]
-        point[bent] = center + apex * (1 + turn) / (1 - turn)
-        slope[bent] = apex * 2j * tangent / (1 - turn) ** 2
-    return point, slope
+    return sources.geometry.place(local), sources.geometry.slope(local) * weights, shapes
 
 
 def _traction_density(sources: Sources, terms: int) -> Real:
@@ -124,8 +109,7 @@ def _traction_density(sources: Sources, terms: int) -> Real:
     s, _ = _gauss_points(terms + 4)
     local = sources.local
     shapes = s[:, None] ** np.arange(len(local)) @ interpolate_shapes(local)
-    tangent = np.zeros(sources.count) if sources.sweep is None else np.tan(0.25 * sources.sweep)
-    stretched = (1 + (tangent[:, None] * s) ** 2)[:, :, None] / (1 + (tangent[:, None] * local) ** 2)[:, None, :]
+    stretched = sources.geometry.crowding(s)[:, :, None] / sources.geometry.crowding(local)[:, None, :]
     density: Real = stretched * shapes * (sources.family == 0)[:, None, None]
     return density
 

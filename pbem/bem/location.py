@@ -48,17 +48,15 @@ def locate_points(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> Loca
 
 
 def _locate_chunk(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> tuple[Integer, Integer, Real]:
-    half, middle = 0.5 * (mesh.end - mesh.start), 0.5 * (mesh.end + mesh.start)
-    w = (points[:, None] - middle) / half  # the chord from -1 to 1
-    quarter = np.tan(0.25 * mesh.sweep)
-    straight = np.divide(w + 1j * quarter, 1 + 1j * quarter * w)  # the element itself from -1 to 1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        straight = mesh.geometry.preimage(points).T  # each element from -1 to 1
     off = np.maximum(np.abs(straight.imag), np.abs(straight.real) - 1)
     off = np.where(np.isfinite(off), off, np.inf)
     nearest = np.argmin(off, axis=1)
     row = np.arange(len(points))
     touches = off[row, nearest] < TOUCHING
     s = np.clip(straight.real[row, nearest], -1, 1)
-    turns = _add_angles(mesh, points, w, len(infinite))
+    turns = _add_angles(mesh, points, len(infinite))
     inside = turns + np.array(infinite) == 1
     region = np.where(inside.any(axis=1), np.argmax(inside, axis=1), -1)
     region = np.where(touches, mesh.region[nearest], region)
@@ -71,14 +69,10 @@ def _locate_chunk(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> tupl
     return region, element, np.where(element >= 0, s, 0.0)
 
 
-def _add_angles(mesh: Mesh, points: Complex, w: Complex, regions: int) -> Integer:
+def _add_angles(mesh: Mesh, points: Complex, regions: int) -> Integer:
     """Winding numbers (q, regions) of the regions' loops about the points (theory, 80)."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        angle = np.angle((w - 1) / (w + 1))
-    # A point between an arc and its chord, which lies on the left of the arc and on the right of the chord.
-    bulging = np.where(mesh.sweep > 0, w.imag < 0, w.imag > 0)
-    between = (np.abs(points[:, None] - mesh.center) < np.abs(mesh.start - mesh.center)) & bulging & (mesh.sweep != 0)
-    angle = np.where(mesh.crack, 0.0, angle + 2 * np.pi * np.where(between, np.sign(mesh.sweep), 0.0))
+        angle = np.where(mesh.crack, 0.0, mesh.geometry.subtend(points).T)
     # Elements follow each other region by region; a region may have none.
     first = np.searchsorted(mesh.region, np.arange(regions + 1))
     there = np.flatnonzero(np.diff(first))

@@ -58,7 +58,7 @@ def find_rigid_motions(mesh: Mesh, finite: Sequence[int], needed: Bool) -> tuple
 
 def interpolates_rotation(mesh: Mesh, region: int) -> bool:
     """Whether the elements of a region represent its rotation only up to their discretisation error."""
-    return mesh.order == 0 or bool(mesh.sweep[mesh.region == region].any())
+    return mesh.order < mesh.geometry.select(mesh.region == region).degree
 
 
 def need_rotations(mesh: Mesh, finite: Sequence[int], needed: Bool) -> Bool:

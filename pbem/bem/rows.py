@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem import _kernels
+from pbem.geometry.elements import Elements
 from pbem.mesh.shapes import interpolate_shapes, tip_shapes
 
 Complex = NDArray[np.complex128]
@@ -52,28 +53,28 @@ class Sources:
         return np.stack([interpolate_shapes(self.local), *tips, interpolate_shapes(on_crack)])
 
     @cached_property
+    def geometry(self) -> Elements:
+        """The elements by themselves, none of their numbers missing."""
+        return Elements.complete(self.start, self.end, self.center, self.sweep)
+
+    @cached_property
     def elements(self) -> tuple[Complex, Complex, Complex, Real, NDArray[np.int8], Real]:
         """start, end, center, sweep, family, local as the kernels read them: contiguous, none missing."""
-        center = np.zeros(self.count, dtype=complex) if self.center is None else self.center
-        sweep = np.zeros(self.count) if self.sweep is None else self.sweep
         return (
             np.ascontiguousarray(self.start, dtype=complex),
             np.ascontiguousarray(self.end, dtype=complex),
-            np.ascontiguousarray(center, dtype=complex),
-            np.ascontiguousarray(sweep, dtype=float),
+            np.ascontiguousarray(self.geometry.center, dtype=complex),
+            np.ascontiguousarray(self.geometry.sweep, dtype=float),
             np.ascontiguousarray(self.family, dtype=np.int8),
             np.ascontiguousarray(self.local, dtype=float),
         )
 
     def select(self, indices: Integer) -> Sources:
         """Some of the elements, in the given order, e.g. a block of a hierarchical operator; in microseconds."""
+        chosen = self.geometry.select(indices)
         selected = replace(
-            self,
-            start=self.start[indices],
-            end=self.end[indices],
+            self, start=chosen.start, end=chosen.end, center=chosen.center, sweep=chosen.sweep,
             family=self.family[indices],
-            center=None if self.center is None else self.center[indices],
-            sweep=None if self.sweep is None else self.sweep[indices],
         )
         vars(selected)["shape"] = self.shape  # the same nodes
         return selected

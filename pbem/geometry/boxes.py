@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.geometry.curve import Leg
-from pbem.geometry.intersection import extremes
+from pbem.geometry.elements import Elements
 
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -37,14 +37,7 @@ class Boxes:
         """The boxes of legs, wider by the tolerance on every side."""
         if not legs:
             return cls(np.zeros((0, 2)), np.zeros((0, 2)))
-        start, end = np.array([leg.start for leg in legs]), np.array([leg.end for leg in legs])
-        low = np.stack([np.minimum(start.real, end.real), np.minimum(start.imag, end.imag)], axis=1)
-        high = np.stack([np.maximum(start.real, end.real), np.maximum(start.imag, end.imag)], axis=1)
-        for number, leg in enumerate(legs):
-            if leg.center is not None:
-                points = extremes(leg)
-                low[number] = points.real.min(), points.imag.min()
-                high[number] = points.real.max(), points.imag.max()
+        low, high = Elements.collect(legs).bounds()
         return cls(low - tolerance, high + tolerance)
 
     @classmethod

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import cmath
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pbem.geometry.elements import Kind, choose_kind
 
 
 @dataclass(frozen=True)
@@ -35,29 +37,37 @@ class Leg:
 
     @property
     def length(self) -> float:
-        if self.center is None:
-            return abs(self.end - self.start)
-        return abs(self.start - self.center) * abs(self.sweep)
+        return float(self.kind.length(self))
+
+    @cached_property
+    def kind(self) -> Kind:
+        """Its geometry: what pbem.geometry.elements knows of straight or circular ones."""
+        return choose_kind(self)
+
+    @property
+    def turn(self) -> float:
+        """Signed angle (radians) that it turns through."""
+        return float(self.kind.turn(self))
 
     def point(self, t: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Points at the fractions t (any shape) of the leg's length, as complex numbers."""
-        if self.center is None:
-            points = self.start + (self.end - self.start) * t
-        else:
-            points = self.center + (self.start - self.center) * np.exp(1j * self.sweep * t)
-        return np.where(t == 0.0, self.start, np.where(t == 1.0, self.end, points))
+        return np.asarray(self.kind.place_fraction(self, t))
 
     def tangent(self, at_end: bool) -> complex:
         """Unit tangent in the direction of travel at the start or the end."""
-        if self.center is None:
-            return (self.end - self.start) / abs(self.end - self.start)
-        radius = (self.end if at_end else self.start) - self.center
-        turn = 1j if self.sweep > 0 else -1j
-        return turn * radius / abs(radius)
+        return complex(1j * self.kind.normal_at(self, self.end if at_end else self.start))
+
+    def normals(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Unit normals to the right of travel, outward of a region on the left, at points of the leg."""
+        return np.broadcast_to(self.kind.normal_at(self, points), points.shape)
+
+    def project(self, point: complex) -> float:
+        """Fraction of the length at which the normal passes the point; not in [0, 1] beyond the ends."""
+        return float(self.kind.project(self, point))
 
     def reverse(self) -> Leg:
         return replace(
-            self, start=self.end, end=self.start, sweep=-self.sweep,
+            self, **self.kind.reverse(self)._asdict(),
             refine_start=self.refine_end, refine_end=self.refine_start,
             singular_start=self.singular_end, singular_end=self.singular_start,
             fractions=None if self.fractions is None else tuple(1.0 - t for t in reversed(self.fractions)),
@@ -65,15 +75,16 @@ class Leg:
 
     def split(self, t: float, elements: tuple[int, int]) -> tuple[Leg, Leg]:
         """Two legs that meet smoothly at the fraction t, with the given numbers of elements, not refined there."""
-        middle, whole = complex(self.point(np.array(t))), replace(self, fractions=None)
-        first = replace(
-            whole, end=middle, elements=elements[0], sweep=self.sweep * t, refine_end=False, singular_end=False
-        )
-        second = replace(
-            whole, start=middle, elements=elements[1], sweep=self.sweep * (1 - t), refine_start=False,
-            singular_start=False,
-        )
+        whole = replace(self, fractions=None)
+        middle = complex(self.point(np.array(t)))
+        first = replace(whole.cut(0.0, t, self.start, middle, elements[0]), refine_end=False, singular_end=False)
+        second = replace(whole.cut(t, 1.0, middle, self.end, elements[1]), refine_start=False, singular_start=False)
         return first, second
+
+    def cut(self, first: float, last: float, start: complex, end: complex, elements: int) -> Leg:
+        """The piece between two fractions, from start to end, which are its ends but for rounding."""
+        piece = self.kind.cut(self, first, last)
+        return replace(self, **piece._replace(start=start, end=end)._asdict(), elements=elements)
 
     def element_fractions(self) -> NDArray[np.float64]:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
@@ -140,8 +151,4 @@ def find_middle(curves: Mapping[str, Curve]) -> complex:
 
 
 def _find_centroid(leg: Leg) -> complex:
-    if leg.center is None:
-        return leg.start + 0.5 * (leg.end - leg.start)
-    half = 0.5 * leg.sweep
-    apex = complex(leg.point(np.array(0.5))) - leg.center
-    return leg.center + apex * math.sin(half) / half
+    return complex(leg.kind.centroid(leg))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -74,7 +74,7 @@ def split_leg(leg: Leg, points: Mapping[complex, float]) -> list[Leg]:
     parts = [b - a for a, b in pairwise(fractions)]
     counts = share(leg.elements, parts)
     return [
-        replace(leg, start=ends[i], end=ends[i + 1], elements=counts[i], sweep=leg.sweep * parts[i])
+        leg.cut(fractions[i], fractions[i + 1], ends[i], ends[i + 1], counts[i])
         for i in range(len(parts))
     ]
 

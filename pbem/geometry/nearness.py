@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.elements import Elements
 
 Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -25,66 +26,38 @@ WIDEST_PIECE = math.radians(60.0)
 
 @dataclass(frozen=True)
 class Pieces:
-    """Straight and circular pieces (n,) of legs: ends, centre and signed angle (zeros if straight), number of the leg,
-    and number of the piece on its leg."""
+    """Pieces (n,) of legs: their geometry, number of the leg, and number of the piece on its leg."""
 
-    start: Complex
-    end: Complex
-    center: Complex
-    sweep: Real
+    shapes: Elements
     leg: Integer
     number: Integer
 
     def select(self, numbers: Integer) -> Pieces:
-        return Pieces(*(getattr(self, name)[numbers] for name in self.__dataclass_fields__))
+        return Pieces(self.shapes.select(numbers), self.leg[numbers], self.number[numbers])
 
 
-def cut_legs(legs: Sequence[Leg]) -> Pieces:
+def cut_legs(legs: Elements) -> Pieces:
     """The pieces of legs."""
-    start: list[complex] = []
-    end: list[complex] = []
-    center: list[complex] = []
-    sweep: list[float] = []
-    number: list[int] = []
-    order: list[int] = []
-    for at, leg in enumerate(legs):
-        count = count_pieces(leg)
-        ends = leg.point(np.linspace(0.0, 1.0, count + 1))
-        start += ends[:-1].tolist()
-        end += ends[1:].tolist()
-        center += [leg.center or 0j] * count
-        sweep += [leg.sweep / count] * count
-        number += [at] * count
-        order += range(count)
-    return Pieces(
-        np.array(start, dtype=complex), np.array(end, dtype=complex), np.array(center, dtype=complex),
-        np.array(sweep, dtype=float), np.array(number, dtype=np.int64), np.array(order, dtype=np.int64),
-    )  # fmt: skip
+    counts = count_pieces(legs)
+    leg = np.repeat(np.arange(legs.count), counts)
+    number = np.arange(len(leg)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return Pieces(legs.select(leg).cut(number / counts[leg], (number + 1) / counts[leg]), leg, number)
 
 
-def count_pieces(leg: Leg) -> int:
-    """Number of pieces of one leg."""
-    return max(1, math.ceil(abs(leg.sweep) / WIDEST_PIECE - 1e-9)) if leg.center is not None else 1
+def count_pieces(legs: Elements) -> Integer:
+    """Number of pieces (legs,) of each leg."""
+    return np.maximum(1, np.ceil(np.abs(legs.turns) / WIDEST_PIECE - 1e-9)).astype(np.int64)
 
 
 def measure_nearness(points: Complex, pieces: Pieces) -> Real:
     """Distance of each point (k,) from the piece (k,) with the same number."""
-    ends = np.minimum(np.abs(points - pieces.start), np.abs(points - pieces.end))
-    curved = pieces.sweep != 0
-    along = np.where(curved, 1.0, pieces.end - pieces.start)
-    local = (points - pieces.start) / along
-    beside = np.where((local.real > 0) & (local.real < 1), np.abs(local.imag * along), ends)
-    radius = np.where(curved, pieces.start - pieces.center, 1.0)
-    angle = np.angle((points - pieces.center) / radius) * np.sign(pieces.sweep)
-    off_circle = np.abs(np.abs(points - pieces.center) - np.abs(radius))
-    around = np.where(angle % (2 * np.pi) < np.abs(pieces.sweep), off_circle, ends)
-    return np.minimum(np.where(curved, around, beside), ends)
+    return pieces.shapes.distances(points[:, None])[:, 0]
 
 
 class Surroundings:
     """The faces of all regions, and which of them a leg does not see: itself, and those that it meets at a corner.
 
-    legs: of all curves, one after the other; regions: names of the curves of every region;
+    legs: of all curves, one after the other; shapes: their geometry; regions: names of the curves of every region;
     blind: further pairs of legs (numbers) that do not see each other; cracks: names of the curves that are cracks.
     """
 
@@ -92,8 +65,8 @@ class Surroundings:
                  blind: Sequence[tuple[int, int]] = (), cracks: frozenset[str] = frozenset()) -> None:
         self.legs: list[Leg] = [leg for curve in curves.values() for leg in curve.legs]
         self.curve = [name for name, curve in curves.items() for _ in curve.legs]
-        self.pieces = cut_legs(self.legs)
-        self._counts = np.array([count_pieces(leg) for leg in self.legs], dtype=np.int64)
+        self.shapes = Elements.collect(self.legs)
+        self.pieces, self._counts = cut_legs(self.shapes), count_pieces(self.shapes)
         first: dict[str, int] = {}
         for number, name in enumerate(self.curve):
             first.setdefault(name, number)
@@ -139,10 +112,10 @@ class Surroundings:
 
 
 def _surround(pieces: Pieces) -> Boxes:
-    """Boxes around pieces; of arcs, around the chord and as much more on all sides as the arc rises above it."""
-    rise = 0.5 * np.abs(pieces.end - pieces.start) * np.tan(0.25 * np.abs(pieces.sweep))
-    low = np.stack([np.minimum(pieces.start.real, pieces.end.real), np.minimum(pieces.start.imag, pieces.end.imag)], 1)
-    high = np.stack([np.maximum(pieces.start.real, pieces.end.real), np.maximum(pieces.start.imag, pieces.end.imag)], 1)
+    """Boxes around pieces; around the chord and as much more on all sides as the piece rises above it."""
+    start, end, rise = pieces.shapes.start, pieces.shapes.end, pieces.shapes.rises()
+    low = np.stack([np.minimum(start.real, end.real), np.minimum(start.imag, end.imag)], 1)
+    high = np.stack([np.maximum(start.real, end.real), np.maximum(start.imag, end.imag)], 1)
     return Boxes(low - rise[:, None], high + rise[:, None])
 
 

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.curve import Curve
 from pbem.geometry.intersection import inner_points
 from pbem.geometry.loop import Side, side_legs
 
 Complex = NDArray[np.complex128]
-
-
-def leg_normals(leg: Leg, points: Complex) -> Complex:
-    """Unit normals to the right of travel, outward of a region on the left, at points of the leg."""
-    if leg.center is None:
-        return np.full(points.shape, -1j * leg.tangent(at_end=False))
-    radii = points - leg.center
-    return radii / np.abs(radii) * math.copysign(1.0, leg.sweep)
 
 
 def sample_side(curves: Mapping[str, Curve], side: Side) -> tuple[Complex, Complex]:
@@ -29,5 +20,5 @@ def sample_side(curves: Mapping[str, Curve], side: Side) -> tuple[Complex, Compl
     for leg in side_legs(curves, side):
         at = np.concatenate([[leg.start], inner_points(leg, 5), [leg.end]])
         points.append(at)
-        normals.append(leg_normals(leg, at))
+        normals.append(leg.normals(at))
     return np.concatenate(points), np.concatenate(normals)

@@ -12,8 +12,8 @@ import numpy as np
 
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.elements import Elements
 from pbem.geometry.expression import ExpressionError, evaluate_expression
-from pbem.geometry.intersection import extremes
 from pbem.geometry.tolerance import Tolerance, join_points
 
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
@@ -26,7 +26,7 @@ def measure_extent(curves: Mapping[str, Curve]) -> tuple[float, float]:
     """Largest extent of all curves, and their largest coordinate."""
     if not curves:
         return 0.0, 0.0
-    points = np.concatenate([extremes(leg) for curve in curves.values() for leg in curve.legs])
+    points = Elements.collect([leg for curve in curves.values() for leg in curve.legs]).extremes()
     extents = points.real.max() - points.real.min(), points.imag.max() - points.imag.min()
     return float(max(extents)), float(np.abs(points).max())
 
@@ -159,8 +159,7 @@ def join_ends(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[s
         for index, leg in enumerate(curve.legs):
             start, end = complex(joined[number]), complex(joined[number + 1])
             number += 2
-            whole = leg.center is not None and abs(leg.sweep) > math.pi
-            if start == end and not whole:
+            if start == end and not abs(leg.turn) > math.pi:
                 short.append((name, index + 1))
             legs.append(replace(leg, start=start, end=end))
         result[name] = Curve(name, tuple(legs))

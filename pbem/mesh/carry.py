@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from pbem.mesh.elements import divide_curve
-from pbem.mesh.interpolation import find_coordinates, interpolate, interpolate_tips, locate_nodes
+from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import group_elements
@@ -62,7 +62,7 @@ def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh
         for offset in range(int(np.diff(first).max())):
             at = np.flatnonzero(first[:-1] + offset < first[1:])
             source, target = own[first[:-1][at] + offset], others[at]
-            s = find_coordinates(fine.start[source], fine.end[source], fine.sweep[source], points[target])
+            s = fine.geometry.select(source).preimage(points[target]).real
             better = np.abs(s) < np.abs(local[target])
             local[target] = np.where(better, s, local[target])
             element[target] = np.where(better, source[:, None], element[target])

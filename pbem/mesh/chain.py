@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
 
 Real = NDArray[np.float64]

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.geometry.elements import Elements
 from pbem.mesh.chain import Chain
-from pbem.mesh.elements import Elements
+from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.mortar import LEAST_COVER, OVERLAP, Coupling, couple_curves, measure_contrast
 from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
@@ -37,7 +38,7 @@ def place_pairs(chain: Chain) -> Columns:
         "position": elements.place(local).ravel(),
         "normal": outward.ravel(),
         "arc_length": elements.arc_lengths(local).ravel(),
-        "weight": elements.weights(local).ravel(),
+        "weight": weigh_nodes(elements, local).ravel(),
         "distance": np.zeros(len(nodes)),
         "crack": np.full(len(nodes), chain.crack),
     }
@@ -54,10 +55,10 @@ def pair_contact(
     first in it is the slave, so that the results do not depend on which curve the contact names first.
     """
     both = sorted((chains[joint.first], chains[joint.second]), key=lambda chain: order.index(chain.curve))
-    others = _join([chain.elements for chain in chains.values()])
+    others = Elements.join([chain.elements for chain in chains.values()])
     slave, master, seen = _choose_slave(both[0], both[1], others)
     met = seen.cover > LEAST_COVER
-    own_weight, other_weight = (chain.elements.weights(chain.local).ravel() for chain in (slave, master))
+    own_weight, other_weight = (weigh_nodes(chain.elements, chain.local).ravel() for chain in (slave, master))
     used = met[seen.slave]
     own, other, product = seen.slave[used], seen.master[used], seen.product[used]
 
@@ -120,7 +121,7 @@ def _choose_slave(one: Chain, other: Chain, others: Elements) -> tuple[Chain, Ch
 def _carried(chosen: tuple[Chain, Chain, Coupling]) -> float:
     """Length of the slave's nodes that are pairs, as far as it faces the master."""
     slave, _, seen = chosen
-    weight = slave.elements.weights(slave.local).ravel()
+    weight = weigh_nodes(slave.elements, slave.local).ravel()
     return float((weight * seen.cover)[seen.cover > LEAST_COVER].sum())
 
 
@@ -153,13 +154,4 @@ def _place_on_first(slave: Chain, master: Chain, nodes: Integer, slave_first: bo
 
 def _rounding(*sides: Elements) -> float:
     """Below this length a distance between the elements is nothing but rounding of their coordinates."""
-    largest = max(
-        float(np.abs(np.concatenate([side.start, side.end, side.center])).max(initial=0.0)) for side in sides
-    )
-    return ROUNDINGS * float(np.finfo(float).eps) * largest
-
-
-def _join(parts: Sequence[Elements]) -> Elements:
-    return Elements(
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "end", "center", "sweep"))
-    )
+    return ROUNDINGS * float(np.finfo(float).eps) * max(side.extent for side in sides)

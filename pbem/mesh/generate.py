@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.mesh.chain import Chain
-from pbem.mesh.elements import divide_curve
+from pbem.mesh.elements import divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
 from pbem.mesh.facing import describe_sparse_meshes
 from pbem.mesh.mesh import Links, Mesh, Pairs
@@ -48,7 +48,7 @@ def generate_mesh(model: Model) -> Mesh:
         tip=np.concatenate([_mark_tips(model, chain) for chain in chains]),
         position=join(lambda chain: chain.elements.place(chain.local)),
         normal=join(lambda chain: chain.elements.normals(chain.local)),
-        weight=join(lambda chain: chain.elements.weights(chain.local)),
+        weight=join(lambda chain: weigh_nodes(chain.elements, chain.local)),
         traction_equation=np.repeat(join(lambda chain: chain.traction) & ~faces_nothing, order + 1),
         pairs=pairs,
         links=links,

@@ -8,31 +8,12 @@ from numpy.typing import NDArray
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
 Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 Real = NDArray[np.float64]
-
-
-def find_coordinates(start: Complex, end: Complex, sweep: Real, points: Complex) -> Real:
-    """The coordinates s (e, p), from -1 at the start to 1 at the end, of points (e, p) on straight elements and arcs.
-
-    Seen from the middle of its chord an arc is a fractional-linear map of the straight element.
-    """
-    middle, half = 0.5 * (start + end)[:, None], 0.5 * (end - start)[:, None]
-    quarter = np.tan(0.25 * sweep)[:, None]
-    w = (points - middle) / half
-    return np.asarray(((w + 1j * quarter) / (1 + 1j * quarter * w)).real)
 
 
 def locate_nodes(mesh: Mesh) -> Real:
     """The coordinates s (e, p + 1) of all nodes on their elements."""
-    return find_coordinates(mesh.start, mesh.end, mesh.sweep, mesh.position.reshape(mesh.elements, -1))
-
-
-def stretch_elements(mesh: Mesh, elements: Integer, s: Real) -> Real:
-    """Length per unit of s (k, p) at the coordinates s (k, p) of some elements (k,)."""
-    half = 0.5 * np.abs(mesh.end - mesh.start)[elements, None]
-    quarter = np.tan(0.25 * mesh.sweep)[elements, None]
-    return half * (1 + quarter**2) / (1 + (quarter * s) ** 2)
+    return mesh.geometry.preimage(mesh.position.reshape(mesh.elements, -1)).real
 
 
 def interpolate(local: Real, s: Real) -> Real:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pbem.geometry.elements import Elements
 
 Complex = NDArray[np.complex128]
 Integer = NDArray[np.int64]
@@ -107,6 +110,11 @@ class Mesh:
     def elements(self) -> int:
         return len(self.start)
 
+    @cached_property
+    def geometry(self) -> Elements:
+        """The elements by themselves: their places, directions and lengths."""
+        return Elements(self.start, self.end, self.center, self.sweep)
+
     @property
     def family(self) -> NDArray[np.int8]:
         """What the nodal values of an element mean to the kernels (e,): see bem.rows.Sources."""
@@ -139,7 +147,7 @@ class Faces:
     """The nodes as results show them: all nodes of the mesh, then the second faces of the cracks.
 
     position, normal (complex), region, curve, element, weight: per node (n,); normal is outward of the region.
-    start, end: per element (e,) complex, in the direction of travel with the region on the left.
+    start, end: per element (e,) complex, in the direction of travel with the region on the left; sweep (e,): as Mesh.
     """
 
     position: Complex
@@ -150,6 +158,7 @@ class Faces:
     weight: Real
     start: Complex
     end: Complex
+    sweep: Real
 
 
 def list_faces(mesh: Mesh) -> Faces:
@@ -157,6 +166,7 @@ def list_faces(mesh: Mesh) -> Faces:
     per_element = mesh.order + 1
     crack = np.flatnonzero(mesh.crack)
     nodes = second_face_nodes(mesh)
+    faces = Elements.join([mesh.geometry, mesh.geometry.select(crack).turn_back()])
     return Faces(
         position=np.concatenate([mesh.position, mesh.position[nodes]]),
         normal=np.concatenate([mesh.normal, -mesh.normal[nodes]]),
@@ -166,8 +176,9 @@ def list_faces(mesh: Mesh) -> Faces:
             [mesh.node_element, np.repeat(mesh.elements + np.arange(len(crack)), per_element)]
         ),
         weight=np.concatenate([mesh.weight, mesh.weight[nodes]]),
-        start=np.concatenate([mesh.start, mesh.end[crack]]),
-        end=np.concatenate([mesh.end, mesh.start[crack]]),
+        start=faces.start,
+        end=faces.end,
+        sweep=faces.sweep,
     )
 
 

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
+from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.projection import find_hidden, project_nodes
 from pbem.mesh.shapes import interpolate_shapes
 
@@ -64,7 +65,7 @@ def couple_curves(slave: Elements, master: Elements, local: Real, others: Elemen
     shapes = interpolate_shapes(local)
     count = len(local)
     cover, distance = np.zeros(slave.count * count), np.zeros(slave.count * count)
-    own_weight, own_length, length = slave.weights(local), slave.lengths, master.lengths
+    own_weight, own_length, length = weigh_nodes(slave, local), slave.lengths, master.lengths
     nodes: list[Integer] = []
     faces: list[Integer] = []
     product: list[Real] = []
@@ -116,7 +117,7 @@ def measure_contrast(coupling: Coupling, slave: Elements, master: Elements) -> t
 def _divide_element(single: Elements, other: Elements) -> tuple[Real, Real]:
     """Gauss points and weights on [-1, 1], cut where the normal passes the ends of the other curve's elements."""
     ends = np.unique(np.concatenate([other.start, other.end]))
-    cuts = single.locate(ends)
+    cuts = single.locate(ends)[0]
     inside = np.sort(cuts[np.abs(cuts) < 1 - 1e-12])
     borders = np.concatenate([[-1.0], inside, [1.0]])
     half, middle = 0.5 * np.diff(borders)[:, None], 0.5 * (borders[1:] + borders[:-1])[:, None]

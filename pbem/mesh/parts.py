@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
 
 Complex = NDArray[np.complex128]
@@ -68,25 +69,20 @@ def find_parts(mesh: Mesh) -> Parts:
 def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
     """Part of every way along the elements of a region, cracks' second faces last, and the number of parts."""
     cracks = own[mesh.crack[own]]
-    start = np.concatenate([mesh.start[own], mesh.end[cracks]])
-    end = np.concatenate([mesh.end[own], mesh.start[cracks]])
-    leave, arrive = _find_directions(mesh, own)
-    back_leave, back_arrive = _find_directions(mesh, cracks)
-    leave, arrive = np.concatenate([leave, -back_arrive]), np.concatenate([arrive, -back_leave])
-    count = len(start)
+    back = mesh.geometry.select(cracks).turn_back()
+    ways = Elements.join([mesh.geometry.select(own), back])
+    start, end = ways.start, ways.end
+    (leave, arrive), count = ways.directions(), ways.count
     vertex = _number_vertices(np.concatenate([start, end]), np.tile(_measure_reach(mesh, own, cracks), 2))
     follower = _follow(vertex[:count], vertex[count:], np.angle(leave), np.angle(-arrive))
     loops, label = connected_components(
         sparse.csr_matrix((np.ones(count), (np.arange(count), follower)), shape=(count, count)), directed=False
     )
-    # Twice the area, and of an arc what lies beyond its chord; about a point of each loop, as it may be small.
+    # Twice the area, with what lies beyond the chords; about a point of each loop, as it may be small.
     _, at = np.unique(label, return_index=True)
     origin = start[at][label]
     area = np.asarray((np.conj(start - origin) * (end - origin)).imag, dtype=float)
-    sweep = np.concatenate([mesh.sweep[own], -mesh.sweep[cracks]])
-    radius = np.abs(start - np.concatenate([mesh.center[own], mesh.center[cracks]]))
-    beyond = np.where(sweep != 0, radius**2 * (sweep - np.sin(sweep)), 0.0)
-    area = np.asarray(np.bincount(label, area + beyond, loops), dtype=float)
+    area = np.asarray(np.bincount(label, area + 2 * ways.areas, loops), dtype=float)
     around = np.asarray(np.bincount(label, np.abs(end - start), loops), dtype=float)
     outer = np.flatnonzero(area > FLAT * around**2)
     outer = outer[np.argsort(area[outer], kind="stable")]
@@ -101,12 +97,6 @@ def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
         edges = label == outer[number]
         part[inner[_is_inside(start[at[inner]], start[edges], end[edges])]] = number
     return part[label], len(outer) + (not bounded)
-
-
-def _find_directions(mesh: Mesh, elements: Integer) -> tuple[Complex, Complex]:
-    """Directions of travel at the start and the end of elements."""
-    chord, sweep = mesh.end[elements] - mesh.start[elements], mesh.sweep[elements]
-    return chord * np.exp(-0.5j * sweep), chord * np.exp(0.5j * sweep)
 
 
 def _measure_reach(mesh: Mesh, own: Integer, cracks: Integer) -> NDArray[np.float64]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from pbem.geometry.junction import format_point
 from pbem.geometry.loop import loop_legs, side_legs
-from pbem.geometry.sampling import leg_normals
 from pbem.model.model import Condition, Model, Region, Stage
 from pbem.model.support import FreeMotion
 
@@ -54,7 +53,7 @@ def _sum_tractions(
             for leg in side_legs(model.curves, side):
                 points = leg.point(0.5 * (_NODES + 1))
                 weights = 0.5 * _WEIGHTS * leg.length
-                tractions = _tractions(condition, values, leg_normals(leg, points)) * weights
+                tractions = _tractions(condition, values, leg.normals(points)) * weights
                 rates = (np.conj(tractions) * (a + 1j * spin * points)).real
                 force += complex(tractions.sum())
                 moment += float((np.conj(points) * tractions).imag.sum())
@@ -72,7 +71,7 @@ def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex
     area, first_moment = 0.0, 0j
     for leg in legs:
         points = leg.point(0.5 * (_NODES + 1)) - origin
-        outward = leg_normals(leg, points + origin) * 0.5 * _WEIGHTS * leg.length
+        outward = leg.normals(points + origin) * 0.5 * _WEIGHTS * leg.length
         area += 0.5 * float((np.conj(points) * outward).real.sum())
         first_moment += 0.5 * complex((np.abs(points) ** 2 * outward).sum())
     return region.material.density * complex(*stage.gravity) * area, origin + first_moment / area

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.elements import Elements
 from pbem.geometry.intersection import inner_points, measure_distances, project, surround
 from pbem.geometry.junction import format_point, split_leg
 from pbem.geometry.loop import Loops, Side, side_legs
-from pbem.geometry.sampling import leg_normals
 from pbem.model.model import Contact, Model, Region
 
 Complex = NDArray[np.complex128]
@@ -67,55 +67,23 @@ class Strip:
 
 
 class Surroundings:
-    """Legs, travelled with their region on the left, that rays may meet; straight ones are looked at all at once."""
+    """Legs, travelled with their region on the left, that rays may meet."""
 
     def __init__(self, legs: Sequence[Leg]) -> None:
-        straight = [number for number, leg in enumerate(legs) if leg.center is None]
-        self._numbers = np.array(straight, dtype=np.int64)
-        self._start = np.array([legs[number].start for number in straight], dtype=complex)
-        self._along = np.array([legs[number].end - legs[number].start for number in straight], dtype=complex)
-        self._arcs = [(number, leg) for number, leg in enumerate(legs) if leg.center is not None]
+        self._shapes = Elements.collect(legs)
 
     def look_along(self, points: Complex, normals: Complex, nearest: float) -> Sight:
         """What rays (k,) from the points along the unit normals meet first, from the distance `nearest` on."""
-        best = Sight(np.full(len(points), -1), np.full(len(points), np.inf), np.zeros(len(points)))
-        if len(self._numbers):
-            x, n = points[:, None], normals[:, None]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                distance = ((self._start - x) * np.conj(self._along)).imag / (n * np.conj(self._along)).imag
-                local = ((x + distance * n - self._start) / self._along).real
-            distance = np.where((local >= 0) & (local <= 1) & (distance >= nearest), distance, np.inf)
-            at = np.argmin(distance, axis=1)
-            rows = np.arange(len(points))
-            outward = -1j * self._along / np.abs(self._along)
-            met = np.isfinite(distance[rows, at])
-            best.leg[met] = self._numbers[at[met]]
-            best.distance[met] = distance[rows, at][met]
-            best.product[met] = (np.conj(normals) * outward[at]).real[met]
-        for number, leg in self._arcs:
-            for distance in _cross_arc(points, normals, leg):
-                at_arc = points + np.where(np.isfinite(distance), distance, 0.0) * normals
-                met = _is_on_arc(leg, at_arc) & (distance >= nearest) & (distance < best.distance)
-                facing = (np.conj(normals) * leg_normals(leg, at_arc)).real
-                best.leg[met], best.distance[met], best.product[met] = number, distance[met], facing[met]
-        return best
-
-
-def _cross_arc(points: Complex, normals: Complex, leg: Leg) -> list[Real]:
-    """Distances along the rays to the circle of a leg; nan where there is none."""
-    assert leg.center is not None
-    from_center = points - leg.center
-    along_ray = (np.conj(normals) * from_center).real
-    with np.errstate(invalid="ignore"):
-        root = np.sqrt(abs(leg.start - leg.center) ** 2 - np.abs(from_center) ** 2 + along_ray**2)
-    return [-along_ray - root, -along_ray + root]
-
-
-def _is_on_arc(leg: Leg, points: Complex) -> NDArray[np.bool_]:
-    """Whether points of the circle lie between the ends of the leg."""
-    assert leg.center is not None
-    angle = np.angle((points - leg.center) / (leg.start - leg.center)) * np.sign(leg.sweep)
-    return np.asarray(angle % (2 * np.pi) <= abs(leg.sweep))
+        crossing = self._shapes.cross(points, normals)
+        on_leg = (np.abs(crossing.local) <= 1) & (crossing.distance >= nearest)
+        distance = np.where(on_leg, crossing.distance, np.inf).min(axis=2)
+        at, rays = np.argmin(distance, axis=0), np.arange(len(points))
+        distance = distance[at, rays]
+        met = np.isfinite(distance)
+        seen, product = self._shapes.select(at[met]), np.zeros(len(points))
+        outward = seen.normals_at((points[met] + distance[met] * normals[met])[:, None])[:, 0]
+        product[met] = (np.conj(normals[met]) * outward).real
+        return Sight(np.where(met, at, -1), distance, product)
 
 
 def check_facing(model: Model) -> list[Fault]:
@@ -145,7 +113,7 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
         facing = Surroundings(side_legs(model.curves, sides[other]))
         for leg in side_legs(model.curves, sides[curve]):
             points = inner_points(leg, max(SAMPLES, 4 * leg.elements))
-            seen = facing.look_along(points, leg_normals(leg, points), -OVERLAP * shorter)
+            seen = facing.look_along(points, leg.normals(points), -OVERLAP * shorter)
             if ((seen.leg >= 0) & (seen.product < 0)).any():
                 return True
     return False
@@ -189,7 +157,7 @@ def _outward_ends(curve: Curve, side: Side) -> list[tuple[complex, complex]]:
         return []
     sign = 1 if side.forward else -1
     return [
-        (point, sign * complex(leg_normals(leg, np.array([point]))[0]))
+        (point, sign * complex(leg.normals(np.array([point]))[0]))
         for leg, point in ((curve.legs[0], curve.start), (curve.legs[-1], curve.end))
     ]
 
@@ -202,7 +170,7 @@ def _find_opposite(
     leg = curve.legs[number]
     t, distance = project(leg, end)
     foot = leg.point(np.array([t]))
-    outward = complex(leg_normals(leg, foot)[0]) * (1 if forward else -1)
+    outward = complex(leg.normals(foot)[0]) * (1 if forward else -1)
     shorter = min(length, curve.length)
     ahead = ((end - complex(foot[0])) * outward.conjugate()).real
     piece = LEAST_PIECE * leg.length / leg.elements
@@ -232,7 +200,7 @@ def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]])
             continue
         around = Surroundings([legs[number] for number in near])
         points = inner_points(leg, SAMPLES)
-        for inside, normals in ((False, leg_normals(leg, points)), (True, -leg_normals(leg, points))):
+        for inside, normals in ((False, leg.normals(points)), (True, -leg.normals(points))):
             seen = around.look_along(points, normals, 1e-12 * model.size)
             facing = (seen.leg >= 0) & ((-seen.product if inside else seen.product) < OPPOSITE)
             for number in np.unique(seen.leg[facing]):

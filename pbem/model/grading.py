@@ -63,7 +63,7 @@ def grade_curves(
             wanted = [(leg.refine_start, leg.refine_end) for leg in curve.legs]
         elif grading != "auto":
             met = (*breaks.get(name, ()), *(at for at in opposite.get(name, ()) if is_singular(name, at)))
-            wanted = _explicit(curve, grading, met, case.curves[name].center is not None)
+            wanted = _explicit(curve, grading, met, case.curves[name].points is not None)
         legs = [
             replace(leg, refine_start=start, refine_end=end, singular_start=singular_start, singular_end=singular_end)
             for leg, (start, end), (singular_start, singular_end) in zip(curve.legs, wanted, singular, strict=True)
@@ -92,12 +92,10 @@ def check_turning(case: Case, curves: Mapping[str, Curve]) -> list[Fault]:
 
 def _widest_turn(leg: Leg, elements: int | None = None) -> float:
     """Largest angle (degrees) that an element of the leg turns by, with the given number of elements if any."""
-    if leg.center is None:
-        return 0.0
     fractions = leg.element_fractions()
     if elements is not None:
         fractions = leg.divide(elements, leg.refine_start, leg.refine_end)
-    return math.degrees(abs(leg.sweep)) * float(np.diff(fractions).max())
+    return math.degrees(abs(leg.turn)) * float(np.diff(fractions).max())
 
 
 def _collect(curves: Mapping[str, Curve]) -> dict[complex, list[_LegEnd]]:
@@ -129,11 +127,11 @@ def _is_singular(
     return turns or behaviour[first.curve] != behaviour[second.curve]
 
 
-def _explicit(curve: Curve, grading: str, breaks: tuple[complex, ...], circular: bool) -> list[tuple[bool, bool]]:
+def _explicit(curve: Curve, grading: str, breaks: tuple[complex, ...], polyline: bool) -> list[tuple[bool, bool]]:
     """`start` and `end` are those of the whole curve; `both` is every leg of a polyline, and every break is refined."""
     if grading == "none":
         return [(False, False)] * len(curve.legs)
-    everywhere = grading == "both" and not circular
+    everywhere = grading == "both" and polyline
     wanted = [
         [everywhere or leg.start in breaks, everywhere or leg.end in breaks] for leg in curve.legs
     ]

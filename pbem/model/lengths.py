@@ -151,13 +151,8 @@ class LengthField:
 
     def place(self, cells: Cells) -> Complex:
         """The middles (k,) of cells."""
-        legs, t = self.surroundings.legs, 0.5 * (cells.low + cells.high)
-        start, end, center = (
-            np.array([complex(getattr(leg, name) or 0j) for leg in legs])[cells.leg]
-            for name in ("start", "end", "center")
-        )
-        sweep = np.array([leg.sweep for leg in legs])[cells.leg]
-        return np.where(sweep == 0, start + (end - start) * t, center + (start - center) * np.exp(1j * sweep * t))
+        t = 0.5 * (cells.low + cells.high)
+        return self.surroundings.shapes.select(cells.leg).place_fractions(t[:, None])[:, 0]
 
     def _measure_from_tips(self, points: Complex, cells: Cells, length: Real) -> Real:
         """What the tips of the same set of connected cracks allow."""

@@ -13,10 +13,8 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from pbem.geometry.curve import Leg
-from pbem.geometry.intersection import extremes
+from pbem.geometry.elements import Elements
 from pbem.model.model import Model
 
 # A model is moved if its middle is further away than so many times its size.
@@ -31,7 +29,7 @@ def move_to_own_origin(model: Model, radii: Mapping[str, float]) -> Model:
     The origin has few digits, so that no coordinate is rounded. radii: of circular curves as they were written; the
     ends of their legs, which were rounded far away, are put back on the circle.
     """
-    points = np.concatenate([extremes(leg) for curve in model.curves.values() for leg in curve.legs])
+    points = Elements.collect([leg for curve in model.curves.values() for leg in curve.legs]).extremes()
     middle = complex(0.5 * (points.real.min() + points.real.max()), 0.5 * (points.imag.min() + points.imag.max()))
     if abs(middle) <= FAR * model.size:
         return model
@@ -51,10 +49,9 @@ def _list_rounded(model: Model, radii: Mapping[str, float], origin: complex) -> 
     places: dict[complex, complex] = {}
     for name, curve in model.curves.items():
         for leg in curve.legs if name in radii else ():
-            assert leg.center is not None
-            for end in (leg.start, leg.end):
-                center, local = leg.center - origin, end - origin
-                on_circle = center + radii[name] * (local - center) / abs(local - center)
+            moved = leg.kind.move(leg, origin, 1.0)
+            for end, local in ((leg.start, moved.start), (leg.end, moved.end)):
+                on_circle = leg.kind.restore(moved, local, radii[name])
                 if abs(on_circle - local) <= most:
                     places.setdefault(end, on_circle)
     return places
@@ -64,9 +61,9 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
     """places: where points are about the origin, if not at the difference."""
 
     def shift(leg: Leg) -> Leg:
-        center = None if leg.center is None else leg.center - origin
         start, end = (places.get(point, point - origin) for point in (leg.start, leg.end))
-        return replace(leg, start=start, end=end, center=center)
+        moved = leg.kind.move(leg, origin, 1.0)._replace(start=start, end=end)
+        return replace(leg, **moved._asdict())
 
     curves = {name: replace(curve, legs=tuple(map(shift, curve.legs))) for name, curve in model.curves.items()}
     return replace(

@@ -198,7 +198,7 @@ def _merge_leg(leg: Leg) -> Leg:
     kept = [*range(0, middle + 1, 2), *range(middle + count % 2, count + 1, 2)]
     ends = leg.element_fractions()
     merged = ends[sorted(set(kept))]
-    if leg.center is not None and math.degrees(abs(leg.sweep)) * np.diff(merged).max() > WIDEST_ARC * (1 + 1e-9):
+    if math.degrees(abs(leg.turn)) * np.diff(merged).max() > WIDEST_ARC * (1 + 1e-9):
         return leg
     return _divide_leg(leg, merged)
 

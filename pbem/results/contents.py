@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pbem.geometry import elements as geometry
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -49,6 +52,12 @@ class Elements:
     curve: Integer
     crack: NDArray[np.bool_]
     tip: Integer
+
+    @cached_property
+    def geometry(self) -> geometry.Elements:
+        """Their places, directions and lengths."""
+        start, end = (self.vertices[..., 0] + 1j * self.vertices[..., 1]).T
+        return geometry.Elements.by_ends(start, end, self.sweep)
 
 
 @dataclass(frozen=True)

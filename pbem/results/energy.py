@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from pbem.bem.background import Background
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
-from pbem.mesh.interpolation import interpolate_tips, locate_nodes, stretch_elements
+from pbem.mesh.interpolation import interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.model.model import Model
 from pbem.results.dissipation import (
@@ -284,7 +284,7 @@ def weigh_faces(mesh: Mesh) -> Real:
     if len(tips):
         root = 0.5 * (1 + POINTS)
         s = np.where(mesh.tip[tips] == 1, 1, -1)[:, None] * (2 * root**2 - 1)
-        length = 2 * WEIGHTS * root * stretch_elements(mesh, tips, s)
+        length = 2 * WEIGHTS * root * mesh.geometry.select(tips).stretch(s)
         shapes = interpolate_tips(mesh.tip[tips], locate_nodes(mesh)[tips], s)
         nodes = tips[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
         weight[nodes] = np.einsum("eq,eqj->ej", length, shapes)

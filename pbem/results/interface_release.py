@@ -20,7 +20,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
 from pbem.model.material import Material
 from pbem.model.model import Model
-from pbem.results.interface_tips import InterfaceTip, find_cut, find_interface_tips, select_element
+from pbem.results.interface_tips import InterfaceTip, find_cut, find_interface_tips
 from pbem.results.tip_field import place_gauss
 from pbem.results.tip_shape import differentiate_at
 from pbem.solve.backgrounds import evaluate_backgrounds
@@ -179,7 +179,7 @@ class _BoundaryPart:
     ) -> None:
         points, weights = place_gauss(ON_ELEMENT)
         self._local = mesh.local[None]
-        self._one = select_element(mesh, element)
+        self._one = mesh.geometry.select([element])
         nodes = element * (mesh.order + 1) + np.arange(mesh.order + 1)
         self._direction = tip.direction
         self._u, self._t = (values[nodes] * np.conj(tip.direction) for values in (displacement, traction))
@@ -201,9 +201,7 @@ class _BoundaryPart:
     def integrate_slope(self) -> float:
         """Of the derivative of that times u over the part, in the direction of travel."""
         slope = differentiate(self._local, self._s[None])[0] @ self._t * self.tangent.real
-        radius = np.abs(self._one.start - self._one.center)[0]
-        curvature = np.sign(self._one.sweep[0]) / radius if self._one.sweep[0] else 0.0
-        turning = (1j * self.tangent).real * curvature * self.weight / self._by_s
+        turning = (1j * self.tangent).real * self._one.curvature(self._s)[0] * self.weight / self._by_s
         moved = interpolate(self._local, self._s[None])[0] @ self._u
         return float(self._by_s @ (np.conj(slope + self.carried * turning) * moved).real)
 
@@ -238,6 +236,6 @@ def prepare_interface_release(model: Model, mesh: Mesh) -> InterfaceRelease:
 def _cross(mesh: Mesh, tip: InterfaceTip, chain: Integer) -> complex:
     for element in chain.tolist():
         if max(abs(mesh.start[element] - tip.point), abs(mesh.end[element] - tip.point)) > tip.radius:
-            one = select_element(mesh, element)
+            one = mesh.geometry.select([element])
             return complex(one.place(np.array([find_cut(mesh, tip, element, tip.radius)]))[0, 0])
     raise AssertionError("the circle is smaller than the boundary that it cuts")

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.elements import Elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.results.tip_path import KINK, measure_clearance
@@ -77,9 +76,8 @@ def _make_tip(
     touching: dict[complex, list[int]], bonded: NDArray[np.bool_],
 ) -> InterfaceTip | None:
     ahead = int(here[~own][0])
-    half = np.exp(-0.5j * mesh.sweep[ahead]), np.exp(0.5j * mesh.sweep[ahead])
-    chord = mesh.end[ahead] - mesh.start[ahead]
-    direction = chord * half[0] if mesh.start[ahead] == point else -chord * half[1]
+    at_start = bool(mesh.start[ahead] == point)
+    direction = _tangent(mesh, ahead, at_start) * (1 if at_start else -1)
     sides = []
     for region in np.unique(mesh.region[here]):
         leaving = [int(each) for each in here if mesh.region[each] == region and mesh.start[each] == point]
@@ -100,8 +98,7 @@ def _make_tip(
 
 
 def _tangent(mesh: Mesh, element: int, at_start: bool) -> complex:
-    turn = np.exp((-0.5j if at_start else 0.5j) * mesh.sweep[element])
-    return complex((mesh.end[element] - mesh.start[element]) * turn)
+    return complex(mesh.geometry.select([element]).directions()[0 if at_start else 1][0])
 
 
 def _follow(
@@ -145,7 +142,7 @@ def _length_at(distance: Real, radius: float) -> float:
 
 def find_cut(mesh: Mesh, tip: InterfaceTip, element: int, radius: float) -> float:
     """The coordinate at which an element leaves the circle, by bisection."""
-    one = select_element(mesh, element)
+    one = mesh.geometry.select([element])
     inside, outside = -1.0, 1.0
     if np.abs(one.start[0] - tip.point) > np.abs(one.end[0] - tip.point):
         inside, outside = outside, inside
@@ -156,9 +153,3 @@ def find_cut(mesh: Mesh, tip: InterfaceTip, element: int, radius: float) -> floa
         else:
             outside = middle
     return inside
-
-
-def select_element(mesh: Mesh, element: int) -> Elements:
-    """A single element."""
-    one = slice(element, element + 1)
-    return Elements(mesh.start[one], mesh.end[one], mesh.center[one], mesh.sweep[one])

@@ -119,7 +119,7 @@ def _write_nodes(file: h5py.File, mesh: Mesh, faces: Faces, origin: complex) -> 
     elements["vertices"] = np.stack([to_columns(faces.start + origin), to_columns(faces.end + origin)], axis=1)
     elements["region"] = np.concatenate([mesh.region, mesh.region[crack]]).astype("i4")
     elements["curve"] = np.concatenate([mesh.curve, mesh.curve[crack]]).astype("i4")
-    elements["sweep"] = np.concatenate([mesh.sweep, -mesh.sweep[crack]])
+    elements["sweep"] = faces.sweep
     elements["crack"] = np.concatenate([mesh.crack, mesh.crack[crack]]).astype("i1")
     # The second face is travelled the other way.
     elements["tip"] = np.concatenate([mesh.tip, np.array([0, 2, 1])[mesh.tip[crack]]]).astype("i1")

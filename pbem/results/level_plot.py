@@ -16,7 +16,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import count_levels, impose_fractions
-from pbem.results.outline import choose_points, to_columns, trace_elements
+from pbem.results.outline import choose_points, to_columns
 from pbem.results.reader import Results
 
 Integer = NDArray[np.int64]
@@ -42,7 +42,7 @@ def draw_levels(axes: Axes, mesh: Mesh, levels: Integer) -> list[Line2D]:
     """Colour the elements by their levels (e,), dots at their ends; returns handles for a legend."""
     most = max(1, int(levels.max(initial=0)))
     colours = colormaps["viridis"](levels / most)
-    lines = to_columns(trace_elements(mesh.start, mesh.end, mesh.sweep, choose_points(mesh.elements)))
+    lines = to_columns(mesh.geometry.sample(choose_points(mesh.elements)))
     axes.add_collection(LineCollection(lines, colors=colours, linewidths=2.2, zorder=3.5))
     ends = np.concatenate([mesh.start, mesh.end])
     axes.plot(ends.real, ends.imag, ".", color="0.1", markersize=2.0, linestyle="none", zorder=3.6)

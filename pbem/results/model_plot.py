@@ -20,7 +20,7 @@ from pbem.model.model import Condition, Model
 from pbem.model.origin import move_back
 from pbem.results.describe import describe_condition
 from pbem.results.level_plot import draw_levels
-from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns, trace_elements
+from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
 
 Complex = NDArray[np.complex128]
@@ -117,7 +117,7 @@ def _list_loops(mesh: Mesh, lines: Complex, elements: slice) -> list[Complex]:
 
 def _trace_lines(mesh: Mesh) -> Complex:
     """Points along every element (e, points)."""
-    return trace_elements(mesh.start, mesh.end, mesh.sweep, choose_points(mesh.elements))
+    return mesh.geometry.sample(choose_points(mesh.elements))
 
 
 def _find_room(path: OutlinePath, boundary: Complex) -> complex:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.mesh.interpolation import find_coordinates, interpolate, interpolate_tips
+from pbem.mesh.interpolation import interpolate, interpolate_tips
 from pbem.results.contents import Elements, Nodes, Tips
 
 Complex = NDArray[np.complex128]
@@ -40,7 +40,7 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
     t = choose_points(len(elements.vertices))
     values = interpolate_elements(nodes, elements, displacement, t)
     start, end = elements.vertices[:, 0], elements.vertices[:, 1]
-    places = to_columns(trace_elements(to_complex(start), to_complex(end), elements.sweep, t))
+    places = to_columns(elements.geometry.sample(t))
     places[:, 0], places[:, -1] = start, end
     chains = find_chains(elements)
     join_tips(elements, chains, values)
@@ -65,8 +65,7 @@ def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t
     At crack tips the mean of the two faces is a polynomial, and their jump has the square-root shape.
     """
     count = len(elements.vertices)
-    start, end = to_complex(elements.vertices).T
-    local = find_coordinates(start, end, elements.sweep, to_complex(nodes.position).reshape(count, -1))
+    local = elements.geometry.preimage(to_complex(nodes.position).reshape(count, -1)).real
     at_nodes = displacement.reshape(count, -1, 2)
     values = interpolate(local, np.broadcast_to(t, (count, len(t)))) @ at_nodes
     # Second faces are stored in the order of the first ones, each travelled backwards.
@@ -78,18 +77,6 @@ def interpolate_elements(nodes: Nodes, elements: Elements, displacement: Real, t
         shapes = interpolate_tips(elements.tip[here], local[here], along) - interpolate(local[here], along)
         values[here] += shapes @ half_jump
     return np.asarray(values)
-
-
-def trace_elements(start: Complex, end: Complex, sweep: Real, t: Real) -> Complex:
-    """Points (e, len(t)) at the coordinates t in [-1, 1] of straight (sweep 0) and circular elements.
-
-    On an arc the coordinate is tan(angle/4) from its middle, scaled to 1 at the end, as in `pbem.mesh.elements`.
-    """
-    middle, half = 0.5 * (start + end)[:, None], 0.5 * (end - start)[:, None]
-    # Seen from the middle of the chord an arc is a fractional-linear map of the straight element, which stays as it
-    # is where the sweep is zero.
-    quarter = np.tan(0.25 * sweep)[:, None]
-    return middle + half * (t - 1j * quarter) / (1 - 1j * quarter * t)
 
 
 def to_complex(columns: Real) -> Complex:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.rows import Sources, evaluate_rows
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

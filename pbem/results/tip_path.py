@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
 
 Bool = NDArray[np.bool_]
@@ -68,10 +68,7 @@ def trace_paths(mesh: Mesh, element: Integer, end: Integer, most_whole: int) -> 
 
 def view_outward(mesh: Mesh, elements: Integer, outward: Bool) -> Elements:
     """Elements (any shape) as they are met when leaving a tip."""
-    start, end = mesh.start[elements], mesh.end[elements]
-    sweep = mesh.sweep[elements]
-    return Elements(np.where(outward, start, end), np.where(outward, end, start), mesh.center[elements],
-                    np.where(outward, sweep, -sweep))
+    return mesh.geometry.select(elements).turn_back(~outward)
 
 
 def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain]) -> TipPaths:
@@ -80,10 +77,10 @@ def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain])
     whole = np.array([chain.ends_in_tip for chain in chains])
     seen = view_outward(mesh, elements, outward)
     start, end = seen.start - point[:, None], seen.end - point[:, None]
-    inside, along = _reach_along(start, end, seen.sweep, whole)
+    inside, along = _reach_along(start, end, seen.directions(), whole)
     own = np.repeat(np.arange(len(tip)), inside), elements[np.arange(elements.shape[1]) < inside[:, None]]
     clearance = measure_clearance(mesh, point, along, *own)
-    middle = np.abs(0.5 * (start + end) - 0.5j * (end - start) * np.tan(0.25 * seen.sweep))
+    middle = np.abs(seen.move(point[:, None], np.array(1.0)).sample(np.zeros(1))[..., 0])
     limit = np.minimum(along, REACH * clearance)
     fits = middle <= limit[:, None] * (1 + 1e-9)
     fits &= np.arange(elements.shape[1]) < np.minimum(inside, MOST_INSIDE)[:, None]
@@ -124,10 +121,12 @@ def _follow(mesh: Mesh, element: Integer, end: Integer, most: int) -> list[_Chai
     return chains
 
 
-def _reach_along(start: Complex, end: Complex, sweep: Real, whole: Bool) -> tuple[Integer, Real]:
+def _reach_along(
+    start: Complex, end: Complex, directions: tuple[Complex, Complex], whole: Bool
+) -> tuple[Integer, Real]:
     """How many elements (k, m), seen from the tip, lead away from it without a corner, and the largest radius that they
-    allow."""
-    leaves, arrives = (end - start) * np.exp(-0.5j * sweep), (end - start) * np.exp(0.5j * sweep)
+    allow; directions: in which they leave their start and arrive at their end."""
+    leaves, arrives = directions
     away = (np.conj(start) * leaves).real >= 0
     away &= (np.conj(end) * arrives).real > 0
     away[:, 1:] &= np.abs(np.angle(leaves[:, 1:] / arrives[:, :-1])) < KINK
@@ -142,7 +141,7 @@ def measure_clearance(mesh: Mesh, points: Complex, radius: Real, owner: Integer,
 
     owner, own (l,): points, and elements that are theirs.
     """
-    lengths = Elements(mesh.start, mesh.end, mesh.center, mesh.sweep).lengths
+    lengths = mesh.geometry.lengths
     middle = 0.5 * (mesh.start + mesh.end)
     clearance = np.full(len(points), np.inf)
     classes = np.floor(np.log2(lengths / lengths.min())).astype(int)
@@ -158,18 +157,5 @@ def measure_clearance(mesh: Mesh, points: Complex, radius: Real, owner: Integer,
         near = members[np.concatenate([np.asarray(each, dtype=np.int64) for each in found])]
         others = ~np.isin(of * mesh.elements + near, left_out)
         of, near = of[others], near[others]
-        np.minimum.at(clearance, of, _measure_distance(mesh, near, points[of]))
+        np.minimum.at(clearance, of, mesh.geometry.select(near).distances(points[of, None])[:, 0])
     return clearance
-
-
-def _measure_distance(mesh: Mesh, elements: Integer, points: Complex) -> Real:
-    """Distance of points (k,) to straight or circular elements (k,)."""
-    start, end, center, sweep = (a[elements] for a in (mesh.start, mesh.end, mesh.center, mesh.sweep))
-    at_ends = np.minimum(np.abs(points - start), np.abs(points - end))
-    along = ((points - start) / (end - start)).real
-    straight = np.where((along > 0) & (along < 1), np.abs(points - start - along * (end - start)), at_ends)
-    arc = sweep != 0
-    apex = (start - center) * np.exp(0.5j * sweep)
-    off = np.abs(np.angle((points - center) / np.where(arc, apex, 1)))
-    around = np.where(off < 0.5 * np.abs(sweep), np.abs(np.abs(points - center) - np.abs(start - center)), at_ends)
-    return np.where(arc, around, straight)

@@ -62,7 +62,7 @@ def derive_forms(shape: TipShape) -> TipForms:
 
 def _is_whole_and_straight(shape: TipShape) -> bool:
     points = np.concatenate([shape.elements.start, shape.elements.end])
-    return shape.whole and not shape.elements.sweep.any() and bool(
+    return shape.whole and not shape.elements.turns.any() and bool(
         (np.abs(points.imag) <= STRAIGHT * np.abs(points[-1])).all()
     )
 
@@ -128,9 +128,9 @@ class _Near:
         carried = self.on_x * self.normal.real[:, None] + self.on_y * self.normal.imag[:, None]
         rest = self.moved.mean(axis=0)  # a displacement as a whole, which has no part in it
         s, weight = self._divide_faces()
-        points = self._place(s)
+        points = self.elements.sample(s)
         turn = np.pi + np.angle(-points)
-        tangent = self._point_away(s)
+        tangent = 1j * self.elements.normals(s)
         rows = []
         for amplitude in (1.0, 1j):
             dual = evaluate_eigenfield(amplitude, -0.5, self.radius * self.normal, self.turn, self.normal, kappa)
@@ -217,25 +217,7 @@ class _Near:
         root = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * points
         s = 2 * (root**2 - (start / chord)[:, None]) - 1
         weight = 2 * root * (high - low)[:, None] * weights
-        return s, weight * self._stretch(s) if by_length else weight
-
-    def _stretch(self, s: Real) -> Real:
-        quarter = np.tan(0.25 * self.elements.sweep)[:, None]
-        half = 0.5 * np.abs(self.elements.end - self.elements.start)[:, None]
-        return half * (1 + quarter**2) / (1 + (quarter * s) ** 2)
-
-    def _place(self, s: Real) -> Complex:
-        """Points of the elements at s (e, q)."""
-        quarter = 1j * np.tan(0.25 * self.elements.sweep)[:, None]
-        half = 0.5 * (self.elements.end - self.elements.start)[:, None]
-        middle = 0.5 * (self.elements.end + self.elements.start)[:, None]
-        return np.asarray(middle + half * (s - quarter) / (1 - quarter * s))
-
-    def _point_away(self, s: Real) -> Complex:
-        """Unit tangents at s (e, q)."""
-        quarter = np.tan(0.25 * self.elements.sweep)[:, None]
-        chord = (self.elements.end - self.elements.start)[:, None]
-        return np.asarray(chord / np.abs(chord) * np.exp(2j * np.arctan(quarter * s)))
+        return s, weight * self.elements.stretch(s) if by_length else weight
 
     def _interpolate(self, s: Real) -> Real:
         """The nodes' polynomials (e, q, j) at s (e, q)."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.background import Background
 from pbem.contact.laws import collect_laws
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.material import Material
@@ -175,7 +175,7 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
     tip = np.where(paths.outward, mesh.tip[paths.elements], np.array([0, 2, 1])[mesh.tip[paths.elements]])
     chord = seen.end - seen.start
     columns = np.column_stack([
-        np.round(chord[:, 1:] / chord[:, :-1] / ALIKE), np.round(seen.sweep / ALIKE), np.round(paths.cut_at / ALIKE),
+        np.round(chord[:, 1:] / chord[:, :-1] / ALIKE), np.round(seen.turns / ALIKE), np.round(paths.cut_at / ALIKE),
         paths.cut, paths.near, paths.whole, tip,
     ]) + 0.0  # fmt: skip
     alike: dict[tuple[Material, bytes], list[int]] = {}
@@ -185,7 +185,7 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
     for (material, _), places in alike.items():
         at, first = np.array(places), places[0]
         shape = TipShape(
-            Elements(seen.start[first], seen.end[first], seen.center[first], seen.sweep[first]), tip[first],
+            seen.select(first), tip[first],
             mesh.crack_local, material.kappa, bool(paths.whole[first]), int(paths.near[first]), int(paths.cut[first]),
             float(paths.cut_at[first]),
         )  # fmt: skip
@@ -203,8 +203,7 @@ def _see_from_tip(mesh: Mesh, paths: TipPaths) -> tuple[Elements, Complex, Real]
     length = np.abs(elements.end[:, 0] - tip[:, 0])
     direction = _find_directions(elements)
     turned = (np.conj(direction) / length)[:, None]
-    start, end, center = ((points - tip) * turned for points in (elements.start, elements.end, elements.center))
-    return Elements(start, end, np.where(elements.sweep == 0, 0, center), elements.sweep), direction, length
+    return elements.move(tip, turned), direction, length
 
 
 def _find_directions(elements: Elements) -> Complex:
@@ -213,12 +212,12 @@ def _find_directions(elements: Elements) -> Complex:
     Of a straight crack it is that of all of it: the ends of a short element have lost digits if it lies far from the
     origin.
     """
-    start, end, sweep = elements.start, elements.end, elements.sweep
+    start, end = elements.start, elements.end
     chord = end - start
     rounding = 16 * np.finfo(float).eps * np.abs(end) / np.abs(chord)
     longest = np.take_along_axis(chord, np.argmax(np.abs(chord), axis=1)[:, None], axis=1)
-    straight = ~(np.abs(np.angle(chord / longest)) > STRAIGHT + rounding).any(axis=1) & ~sweep.any(axis=1)
-    leading = np.where(straight, end[:, -1] - start[:, 0], chord[:, 0] * np.exp(-0.5j * sweep[:, 0]))
+    straight = ~(np.abs(np.angle(chord / longest)) > STRAIGHT + rounding).any(axis=1) & ~elements.turns.any(axis=1)
+    leading = np.where(straight, end[:, -1] - start[:, 0], elements.directions()[0][:, 0])
     return np.asarray(-leading / np.abs(leading))
 
 

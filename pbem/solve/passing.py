@@ -86,10 +86,9 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
 
 
 def _measure_sagitta(mesh: Mesh, region: int) -> float:
-    """How far a region's outline of chords lies from its arcs, twice, as a displacement bends them a little more."""
-    own = (mesh.region == region) & ~mesh.crack
-    turn = np.abs(mesh.sweep[own]) / (mesh.order + 1)
-    return 2 * float((np.abs(mesh.start[own] - mesh.center[own]) * (1 - np.cos(0.5 * turn))).max(initial=0.0))
+    """How far a region's outline of chords lies from itself, twice, as a displacement bends it a little more."""
+    own = mesh.geometry.select((mesh.region == region) & ~mesh.crack)
+    return 2 * float(own.rises(mesh.order + 1).max(initial=0.0))
 
 
 def _find_depth(mesh: Mesh, own: Integer, displacement: Complex, points: Complex, infinite: bool) -> Real:

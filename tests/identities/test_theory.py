@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.rows import Sources, evaluate_rows
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
 
 Complex = NDArray[np.complex128]

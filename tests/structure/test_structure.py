@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import pbem
-from tests.structure import checks
+from tests.structure import checks, kinds
 from tests.structure.checks import Module
 
 MODULES = checks.read_modules(Path(pbem.__file__).parent)
@@ -58,6 +58,16 @@ def test_docstrings_are_there(module: Module) -> None:
 @each_module
 def test_modules_are_short(module: Module) -> None:
     expect_none(checks.check_length(module))
+
+
+@each_module
+def test_only_the_protocol_asks_for_an_elements_kind(module: Module) -> None:
+    expect_none(kinds.check_kinds(module))
+
+
+def test_who_may_ask_for_a_kind_is_there_and_few() -> None:
+    # 36 modules did before there was a protocol.
+    assert kinds.MAY_ASK <= MODULES.keys() and len(kinds.MAY_ASK) <= 7
 
 
 # A model is made by calls as well as from a file: up to the mechanics nothing knows of files or processes.
@@ -116,6 +126,7 @@ def list_faults(modules: dict[str, Module]) -> list[str]:
         checks.check_names,
         checks.check_docstrings,
         checks.check_length,
+        kinds.check_kinds,
     ]
     return [fault for module in modules.values() for check in each for fault in check(module)] + checks.check_cycles(
         modules
@@ -153,6 +164,12 @@ BREACHES = {
     "vague function": ("mesh/mesh.py", "def _helper(): ...", "_helper does not say what it is"),
     "undocumented function": ("mesh/mesh.py", "def make(): ...", "make has no docstring"),
     "undocumented class": ("mesh/mesh.py", "class Mesh: ...", "Mesh has no docstring"),
+    "kind, compared": ("mesh/mesh.py", "_f = mesh.sweep == 0", "asks for an element's kind"),
+    "kind, chosen": ("mesh/mesh.py", "def _f(sweep):\n    return 1 if sweep[0] else 2", "asks for an element's kind"),
+    "kind, any": ("mesh/mesh.py", "_f = mesh.sweep[own].any()", "asks for an element's kind"),
+    "kind, map of an arc": ("mesh/mesh.py", "_f = np.tan(0.25 * one.sweep)", "asks for an element's kind"),
+    "kind, backwards": ("mesh/mesh.py", "_f = np.concatenate([mesh.sweep, -mesh.sweep])", "asks for an element's kind"),
+    "kind, center": ("mesh/mesh.py", "_f = 0 if leg.center is None else 1", "asks for an element's kind"),
     "long module": ("mesh/mesh.py", "\n" * 400, "402 lines, more than 400"),
 }
 

@@ -10,11 +10,10 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from pbem.mesh.interpolation import find_coordinates
 from pbem.mesh.mesh import second_face_nodes
 from pbem.model.model import Condition, Model
 from pbem.results.model_plot import draw_model
-from pbem.results.outline import POINTS_PER_ELEMENT, trace_elements, trace_outlines
+from pbem.results.outline import POINTS_PER_ELEMENT, trace_outlines
 from pbem.results.plot_style import FORCE, MODES, MOTION, label
 from pbem.results.plots import choose_magnification, draw_results, plot_model, plot_results
 from pbem.results.reader import Results, open_results
@@ -141,10 +140,10 @@ def test_outlines_close_and_follow_a_linear_displacement(tmp_path: Path) -> None
 
 def test_coordinates_on_elements_are_those_of_the_mesh() -> None:
     outer = ~MESH.crack
-    lines = trace_elements(MESH.start[outer], MESH.end[outer], MESH.sweep[outer], MESH.local)
+    lines = MESH.geometry.select(outer).place(MESH.local)
     assert (MESH.sweep != 0).sum() == 16
     np.testing.assert_allclose(lines.ravel(), MESH.position[~MESH.node_crack], atol=1e-14)
-    found = find_coordinates(MESH.start[outer], MESH.end[outer], MESH.sweep[outer], lines)
+    found = MESH.geometry.select(outer).preimage(lines).real
     np.testing.assert_allclose(found, np.tile(MESH.local, (outer.sum(), 1)), atol=1e-12)
 
 

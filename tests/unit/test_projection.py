@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.mesh.elements import Elements
+from pbem.geometry.elements import Elements
 from pbem.mesh.projection import project_nodes
 
 

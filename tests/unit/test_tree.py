@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from pbem.bem.farfield import mark_ancestors
 from pbem.bem.hierarchical import RATIO, sort_elements
-from pbem.bem.leaf import trace_elements
 from pbem.bem.tree import Forest, Interactions, build_forest, find_interactions
 from tests.identities.bodies import ROCK, Body, mesh_body
 
@@ -139,7 +138,7 @@ def test_circles_enclose_arcs(elements: int) -> None:
     mesh = mesh_body(body)[1]
     assert np.abs(mesh.sweep).max() == pytest.approx(2 * np.pi / elements)
     parts = sort_elements(mesh, [ROCK], 5)
-    point, _ = trace_elements(parts.sources[0], np.tile(np.linspace(-1, 1, 41), (mesh.elements, 1)))
+    point = parts.sources[0].geometry.place(np.linspace(-1, 1, 41))
     np.testing.assert_allclose(point[:, [0, -1]], np.stack([mesh.start, mesh.end], axis=1), rtol=1e-12)
     for cluster in range(parts.forest.clusters):
         own = parts.forest.items(cluster)

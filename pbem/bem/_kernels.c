@@ -11,9 +11,11 @@
  * which is stable. A tip element carries the densities t^(k + 1/2), t in [0, 1] the distance from the tip in units
  * of the element's length; its moments obey recursions of the same kind.
  *
- * moments.h has the moments of one pair, straight.h those of several pairs in the lanes of vectors (lanes.h), combine.h
- * makes rows of them and kinds.h goes over all pairs of straight elements; arcs.h has the closed form of circular arcs,
- * arc_rules.h and far_arcs.h Gauss points away from them; fill.h joins all.
+ * Pairs are done several at a time, in the lanes of vectors (lanes.h) and complex numbers of these (complex_lanes.h).
+ * moments.h has the moments of one pair, straight.h those of several; combine.h makes factors of the nodes of them, and
+ * fill_straight.h goes over all pairs of straight elements. fill_curves.h does so for curved ones, by Gauss points
+ * (rules.h) or the closed form of their kind (curves.h says what a kind is; arcs.h has circular arcs). select.h has the
+ * table by which order, equation and kind of element select code.
  *
  * The potentials (Kolosov-Muskhelishvili) turn the moments into complex factors P, Q: a density a s^k contributes
  * P a + Q conj(a). Rows give the value at the point as  A u + B t, with u, t the nodal displacements and tractions.
@@ -22,7 +24,7 @@
  */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
-#include "fill.h"
+#include "select.h"
 
 static int has_length(const Py_buffer *b, Py_ssize_t bytes, const char *name)
 {
@@ -54,27 +56,7 @@ static int check_lengths(const Py_buffer *b, Py_ssize_t n, Py_ssize_t m, Py_ssiz
            (!b[TRACTION].buf || has_length(&b[TRACTION], full, "traction"));
 }
 
-/* Returns 0 if memory is short. */
-static int fill_checked_rows(const Rows *r)
-{
-    Kind kinds[FAMILIES];
-    Workspace *work = malloc(sizeof(Workspace));
-    int enough = work != NULL;
-    for (int family = 0; family < FAMILIES; family++) {
-        kinds[family] = prepare_kind(r, family);
-        enough = enough && (!kinds[family].groups || (kinds[family].frame && kinds[family].element));
-    }
-    if (enough) {
-        Py_BEGIN_ALLOW_THREADS
-        fill_rows(r, kinds, work);
-        Py_END_ALLOW_THREADS
-    }
-    for (int family = 0; family < FAMILIES; family++) release_kind(&kinds[family]);
-    free(work);
-    return enough;
-}
-
-static PyObject *rows(PyObject *self, PyObject *args)
+static PyObject *rows(PyObject *Py_UNUSED(self), PyObject *args)
 {
     PyObject *normal, *traction, *result = NULL;
     Py_buffer b[BUFFERS];
@@ -98,6 +80,7 @@ static PyObject *rows(PyObject *self, PyObject *args)
         .end = b[END].buf, .center = b[CENTER].buf, .sweep = b[SWEEP].buf, .on = b[ON].buf, .on_local = b[ON_LOCAL].buf,
         .local = b[LOCAL].buf, .family = b[FAMILY].buf, .shape = b[SHAPE].buf, .order = (int)shapes - 1,
         .kappa = kappa, .shear_modulus = shear_modulus,
+        .f = 1 / (2 * M_PI * (kappa + 1)), .ft = 1 / (4 * M_PI * shear_modulus * (kappa + 1)),
         .log_length = log(length), .displacement = b[OUT].buf, .traction = b[TRACTION].buf,
     };
     for (Py_ssize_t j = 0; j < m; j++)
@@ -105,7 +88,11 @@ static PyObject *rows(PyObject *self, PyObject *args)
             PyErr_SetString(PyExc_ValueError, "an element turns by more than half a circle");
             goto end;
         }
-    if (!fill_checked_rows(&r)) {
+    int enough;
+    Py_BEGIN_ALLOW_THREADS
+    enough = fill_rows(&r);
+    Py_END_ALLOW_THREADS
+    if (!enough) {
         PyErr_NoMemory();
         goto end;
     }

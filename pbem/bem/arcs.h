@@ -1,4 +1,4 @@
-/* Integrals over a circular arc, in closed form; away from it far_arcs.h takes Gauss points.
+/* Circular arcs: where they lie, and their integrals in closed form; away from them fill_curves.h takes Gauss points.
  *
  * With the centre as origin, an arc of half-angle theta about the direction a is the image of s in [-1, 1] under
  *
@@ -8,71 +8,84 @@
  * and conj(zeta) = R^2/zeta, so that partial fractions in s bring all integrals back to the moments c, d, e of the
  * straight element at w and at the two fixed poles. Displacements are polynomials (or tip shapes) of s; tractions times
  * d(arc length)/ds are polynomials of s.
- *
- *     c = int s^k dzeta/(zeta - z),      d = dc/dz,
- *     q = int s^k ((conj zeta - conj z) dzeta/(zeta - z)^2 - d(conj zeta)/(zeta - z)),   dq = dq/dz at fixed conj z,
- * and for tractions, ds meaning |J| ds with J = 2 R q,
- *     n = int s^k ln|zeta - z| ds,       x = int s^k ds/(zeta - z),
- *     s = int s^k (conj zeta - conj z)/(zeta - z) ds,   y = ds/dz at fixed conj z,   l = int s^k ds.
  */
 #ifndef PBEM_ARCS_H
 #define PBEM_ARCS_H
-#include "moments.h"
+#include "curves.h"
 
 typedef struct {
-    cplx c[MAX_SHAPES], d[MAX_SHAPES], q[MAX_SHAPES], dq[MAX_SHAPES];
-    cplx s[MAX_SHAPES], x[MAX_SHAPES], y[MAX_SHAPES];
-    double n[MAX_SHAPES], l[MAX_SHAPES];
-} ArcMoments;
-
-typedef struct {
+    Curve curve;
     cplx center, apex; /* apex = R a, the middle of the arc from the centre */
-    double q, radius, reach, jacobian;
-    int order, family;
-    cplx infinity, origin;       /* the poles -i/q and i/q */
+    double q, radius;
+    cplx infinity, origin; /* the poles -i/q and i/q */
     Moments at_infinity, at_origin;
-    double node_weight[MAX_SHAPES]; /* by which nodal tractions become coefficients: 1/(1 + q^2 s^2) */
 } Arc;
 
-static const double ARC_LARGEST = 3.1416; /* sweep of an element, radians: a half circle and its rounding */
+_Static_assert(sizeof(Arc) <= sizeof(AnyCurve), "MOST_CURVE_BYTES is too small");
 
-static void evaluate_reference(const Arc *arc, cplx s, int on, Moments *m)
+static const double ARC_LARGEST = 3.1416; /* sweep of an element, radians: a half circle and its rounding */
+/* Sweep of a panel at most. All points near the centre, or opposite to the arc, where its closed form has poles, are then
+ * beyond the least distance. */
+static const double PANEL_SWEEP = 0.65;
+
+/* (theory, 17, 18) */
+static void prepare_arc(AnyCurve *element, const Rows *r, int64_t j)
 {
-    if (is_tip(arc->family))
-        evaluate_tip_moments(s, on, arc->order, arc->family, m);
-    else
-        evaluate_moments(s, on, arc->order, m);
+    Arc *arc = (Arc *)element;
+    Curve *curve = &arc->curve;
+    const double sweep = r->sweep[j];
+    const int panels = (int)ceil(fabs(sweep) / PANEL_SWEEP);
+    arc->center = r->center[j];
+    arc->radius = cabs(r->start[j] - arc->center);
+    arc->apex = (r->start[j] - arc->center) * cexp(0.5 * I * sweep);
+    arc->q = tan(0.25 * sweep);
+    arc->infinity = -I / arc->q;
+    arc->origin = I / arc->q;
+    curve->family = r->family[j];
+    curve->panels = panels < MOST_PANELS ? panels : MOST_PANELS;
+    curve->turn = fabs(sweep) / curve->panels;
+    curve->reach = 2 * arc->radius * sin(0.25 * curve->turn);
+    curve->jacobian = 2 * arc->radius * fabs(arc->q);
+    for (int p = 0; p < curve->panels; p++) {
+        const double turn = sweep * ((p + 0.5) / curve->panels - 0.5);
+        curve->middle[p] = arc->center + arc->apex * (curve->panels > 1 ? cexp(I * turn) : 1);
+    }
+    for (int k = 0; k <= r->order; k++) curve->node_weight[k] = 1 / (1 + arc->q * arc->q * r->local[k] * r->local[k]);
+}
+
+/* (1 + i q s)/(1 - i q s) and 1/(1 + q^2 s^2) */
+INLINE Complex turn_to(const Arc *arc, Lanes s, Lanes *inverse)
+{
+    const Lanes qs = arc->q * s;
+    *inverse = 1 / (1 + qs * qs);
+    return c_make((1 - qs * qs) * *inverse, 2 * qs * *inverse);
 }
 
 /* (theory, 17) */
-static void prepare_arc(Arc *arc, cplx start, cplx center, double sweep, int order, int family,
-                        const double *local)
+static void trace_arc(const AnyCurve *element, Lanes s, Complex *place, Complex *tangent, Lanes *stretch)
 {
-    arc->center = center;
-    arc->radius = cabs(start - center);
-    arc->apex = (start - center) * cexp(0.5 * I * sweep);
-    arc->q = tan(0.25 * sweep);
-    arc->reach = 2 * arc->radius * fabs(sin(0.25 * sweep));
-    arc->jacobian = 2 * arc->radius * fabs(arc->q);
-    arc->order = order;
-    arc->family = family;
-    arc->infinity = -I / arc->q;
-    arc->origin = I / arc->q;
-    for (int k = 0; k <= order; k++) arc->node_weight[k] = 1 / (1 + arc->q * arc->q * local[k] * local[k]);
+    const Arc *arc = (const Arc *)element;
+    Lanes inverse;
+    const Complex radial = c_mul(c_spread(arc->apex), turn_to(arc, s, &inverse));
+    *place = c_add(c_spread(arc->center), radial);
+    *tangent = c_scale((arc->q > 0 ? 1 : -1) / arc->radius, c_times_i(radial));
+    *stretch = arc->curve.jacobian * inverse;
 }
 
 /* The moments at the poles, which only the closed form needs. */
-static void prepare_poles(Arc *arc)
+static void prepare_poles(AnyCurve *element, int order)
 {
-    evaluate_reference(arc, arc->infinity, 0, &arc->at_infinity);
-    evaluate_reference(arc, arc->origin, 0, &arc->at_origin);
+    Arc *arc = (Arc *)element;
+    evaluate_family_moments(arc->infinity, 0, order, arc->curve.family, &arc->at_infinity);
+    evaluate_family_moments(arc->origin, 0, order, arc->curve.family, &arc->at_origin);
 }
 
 /* (theory, 30 to 32) */
-static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMoments *m)
+static void close_near_arc(const AnyCurve *element, const Rows *r, cplx point, int on, double s_on, PairMoments *m)
 {
-    const double R = arc->radius, q = arc->q, J = arc->jacobian;
-    const cplx a = arc->apex;
+    const Arc *arc = (const Arc *)element;
+    const double R = arc->radius, q = arc->q, J = arc->curve.jacobian;
+    const cplx a = arc->apex, z = point - arc->center;
     const cplx w = on ? s_on : -I * (z / a - 1) / (q * (z / a + 1));
     const cplx below = 1 - I * q * w;
     const cplx w1 = -I * below * below / (2 * q * a), w2 = -below / a * w1; /* dw/dz, d2w/dz2 */
@@ -85,8 +98,8 @@ static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMomen
     const double log_B = log(cabs(B));
     const cplx zero1 = -I * (1 - I * q * arc->origin) * (1 - I * q * arc->origin) / (2 * q * a); /* dw/dz at z = 0 */
     Moments at;
-    evaluate_reference(arc, w, on, &at);
-    for (int k = 0; k <= arc->order; k++) {
+    evaluate_family_moments(w, on, r->order, arc->curve.family, &at);
+    for (int k = 0; k <= r->order; k++) {
         const cplx c = at.c[k] - arc->at_infinity.c[k], c_zero = arc->at_origin.c[k] - arc->at_infinity.c[k];
         const cplx d = at.d[k] * w1, e = at.e[k] * w1 * w1 + at.d[k] * w2, d_zero = arc->at_origin.d[k] * zero1;
         const cplx difference = (c - c_zero) / z; /* int s^k dzeta/(zeta (zeta - z)) */
@@ -97,9 +110,9 @@ static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMomen
         m->d[k] = d;
         m->q[k] = off * d - R * R * difference / z - turned;
         m->dq[k] = off * e - 2 * R * R * slope / z - turned1;
-        if (arc->family != BOUNDARY) continue;
+        if (arc->curve.family != BOUNDARY) continue;
         const double l = at.l[k];
-        m->n[k] = J * (l * log_B + at.n[k] - arc->at_infinity.n[k]);
+        m->n[k] = J * (l * (log_B - r->log_length) + at.n[k] - arc->at_infinity.n[k]);
         m->s[k] = J * rho * (l + r1 * at.c[k] + r2 * arc->at_origin.c[k]);
         m->x[k] = -J / B * (l + from_pole * at.c[k]);
         m->y[k] = -J * rho / B * (l + (from_pole + r1 + r2 * from_pole / from_zero) * at.c[k] + r1 * from_pole * at.d[k] +
@@ -107,11 +120,6 @@ static void close_near_arc(const Arc *arc, cplx z, int on, double s_on, ArcMomen
     }
 }
 
-/* s_on: the point's coordinate if it lies on the arc. */
-static void evaluate_arc_moments(const Arc *arc, cplx point, int on, double s_on, ArcMoments *m)
-{
-    for (int k = 0; k <= arc->order; k++) m->l[k] = arc->jacobian * ((k % 2) ? 0.0 : 2.0 / (k + 1));
-    close_near_arc(arc, point - arc->center, on, s_on, m);
-}
+static const CurveKind ARCS = {prepare_arc, trace_arc, prepare_poles, close_near_arc};
 
 #endif

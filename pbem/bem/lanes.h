@@ -54,10 +54,6 @@ static void take_arguments(double *y, const double *x, int count)
 
 INLINE Lanes spread(double value) { return (Lanes){0} + value; }
 
-/* The complex product (a + ib)(c + id) in lanes. */
-#define MULTIPLY_REAL(a, b, c, d) ((a) * (c) - (b) * (d))
-#define MULTIPLY_IMAGINARY(a, b, c, d) ((a) * (d) + (b) * (c))
-
 #if LANES == 4
 INLINE double find_least(Lanes a)
 {

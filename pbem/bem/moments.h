@@ -17,6 +17,12 @@ static inline int is_tip(int family)
     return family == TIP_AT_START || family == TIP_AT_END;
 }
 
+/* The direction from the tip into its element, along s. */
+static inline double point_inward(int tip)
+{
+    return tip == TIP_AT_START ? 1.0 : -1.0;
+}
+
 typedef struct {
     cplx c[MAX_SHAPES + 1], d[MAX_SHAPES], e[MAX_SHAPES];
     double n[MAX_SHAPES], l[MAX_SHAPES]; /* l_k = int s^k ds */
@@ -91,11 +97,10 @@ static void evaluate_moments(cplx w, int on_element, int order, Moments *m)
     }
 }
 
-/* Moments of t^(k + 1/2) seen from the tip; brought to the element's own coordinate, units and direction. */
-/* (theory, 24) */
+/* Moments of t^(k + 1/2) seen from the tip; brought to the element's own coordinate, units and direction (theory, 24). */
 static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Moments *m)
 {
-    const double sign = tip == TIP_AT_START ? 1.0 : -1.0;
+    const double sign = point_inward(tip);
     m->y = on_element ? 0.0 : cimag(w);
     /* distance from the tip over the length: (1 + w)/2 at the start; at the end the axis is reversed, (1 - w)/2 */
     const cplx q = 0.5 * (1 + sign * (creal(w) + I * m->y));
@@ -137,6 +142,15 @@ static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Mom
         m->d[k] *= 0.5;
         m->e[k] *= 0.25 * sign;
     }
+}
+
+/* Of the shapes of a family: polynomials, or those of a tip. */
+static void evaluate_family_moments(cplx w, int on_element, int order, int family, Moments *m)
+{
+    if (is_tip(family))
+        evaluate_tip_moments(w, on_element, order, family, m);
+    else
+        evaluate_moments(w, on_element, order, m);
 }
 
 #endif

@@ -12,16 +12,17 @@
  */
 #ifndef PBEM_STRAIGHT_H
 #define PBEM_STRAIGHT_H
-#include "lanes.h"
-#include "moments.h"
+#include "rows.h"
 
-/* Elements, one a lane: middle, unit direction, half-length, its inverse and its logarithm. */
+/* Elements, one a lane: middle, unit direction, half-length, its inverse and its logarithm (theory, 16). */
 typedef struct {
-    Lanes mx, my, ex, ey, h, inverse_h, log_h;
+    Complex m, e;
+    Lanes h, inverse_h, log_h;
 } Frame;
 
 typedef struct {
-    Lanes y, cr[MAX_SHAPES + 1], ci[MAX_SHAPES + 1], dr[MAX_SHAPES], di[MAX_SHAPES], er[MAX_SHAPES], ei[MAX_SHAPES];
+    Lanes y;
+    Complex c[MAX_SHAPES + 1], d[MAX_SHAPES], e[MAX_SHAPES];
     Lanes n[MAX_SHAPES];
 } LaneMoments;
 
@@ -54,172 +55,118 @@ INLINE int choose_terms(const double *limit, double inverse_ratio)
 }
 
 /* sum of a_i q^i, i = 0 .. terms, with real coefficients: by the real recursion of the quadratic with the roots q. */
-INLINE void sum_series(const double *a, int terms, Lanes qr, Lanes qi, Lanes *pr, Lanes *pi)
+INLINE Complex sum_series(const double *a, int terms, Complex q)
 {
-    const Lanes twice = 2 * qr, square = qr * qr + qi * qi;
+    const Lanes twice = 2 * q.re, square = c_norm(q);
     Lanes after = spread(0), sum = spread(a[terms]);
     for (int i = terms - 1; i > 0; i--) {
         const Lanes next = (a[i] - square * after) + twice * sum;
         after = sum;
         sum = next;
     }
-    *pr = (a[0] - square * after) + qr * sum;
-    *pi = qi * sum;
+    return c_make((a[0] - square * after) + q.re * sum, q.im * sum);
 }
 
-/* The points as seen from the elements: along and across, in half-lengths. */
-INLINE void locate(const Frame *f, Lanes zx, Lanes zy, Lanes *x, Lanes *y)
+/* The points as seen from the elements: w = (z - m) conj(e)/h. */
+INLINE Complex locate(const Frame *f, Complex z)
 {
-    const Lanes dx = zx - f->mx, dy = zy - f->my;
-    *x = (dx * f->ex + dy * f->ey) * f->inverse_h;
-    *y = (dy * f->ex - dx * f->ey) * f->inverse_h;
+    return c_scale(f->inverse_h, c_mul(c_sub(z, f->m), c_conj(f->e)));
 }
 
-/* |w^2 - 1|^2 = |w - 1|^2 |w + 1|^2, without cancellation near the ends. */
-INLINE Lanes measure_ends(Lanes x, Lanes y)
+/* w^2 - 1 and, from its two factors, |w - 1|^2 and |w + 1|^2; without cancellation near the ends. */
+INLINE Complex multiply_ends(Complex w)
 {
-    return ((x - 1) * (x - 1) + y * y) * ((x + 1) * (x + 1) + y * y);
+    return c_make((w.re - 1) * (w.re + 1) - w.im * w.im, 2 * w.re * w.im);
 }
+
+INLINE Lanes measure_end(Complex w, int end) { return (w.re - end) * (w.re - end) + w.im * w.im; }
+INLINE Lanes measure_ends(Complex w) { return measure_end(w, 1) * measure_end(w, -1); }
 
 INLINE double integrate_power(int k) { return k % 2 ? 0.0 : 2.0 / (k + 1); }
 
 /* n_k from the others. log_ends = ln|w^2 - 1| (theory, 22). */
 INLINE void find_logarithmic(int order, Lanes log_ends, LaneMoments *m)
 {
-    for (int k = 0; k <= order; k++) m->n[k] = ((k % 2 ? m->cr[0] : log_ends) - m->cr[k + 1]) * (1.0 / (k + 1));
+    for (int k = 0; k <= order; k++) m->n[k] = ((k % 2 ? m->c[0].re : log_ends) - m->c[k + 1].re) * (1.0 / (k + 1));
 }
 
-/* (theory, 23) */
-INLINE void evaluate_far(int order, int with_e, int terms, Lanes x, Lanes y, Lanes ends, LaneMoments *m)
+/* ends = |w^2 - 1|^2 (theory, 23) */
+INLINE void evaluate_far(Variant is, int terms, Complex w, Lanes ends, LaneMoments *m)
 {
-    const int top = order + 1;
-    const Lanes r2 = x * x + y * y, both = 1 / (r2 * ends), inverse = both * ends, over_ends = 2 * both * r2;
-    const Lanes vr = x * inverse, vi = -y * inverse, qr = vr * vr - vi * vi, qi = 2 * vr * vi;
-    const Lanes Yr = over_ends * ((x - 1) * (x + 1) - y * y), Yi = -2 * over_ends * x * y;
-    Lanes cr, ci;
-    /* c_top = - sum of 2/(top + j + 1) v^(j + 1) over j = top (mod 2) */
-    sum_series(series + (top + 1) / 2, terms, qr, qi, &cr, &ci);
-    m->y = y;
-    m->cr[top] = top % 2 ? MULTIPLY_REAL(cr, ci, qr, qi) : MULTIPLY_REAL(cr, ci, vr, vi);
-    m->ci[top] = top % 2 ? MULTIPLY_IMAGINARY(cr, ci, qr, qi) : MULTIPLY_IMAGINARY(cr, ci, vr, vi);
+    const int top = is.order + 1;
+    const Lanes r2 = c_norm(w), both = 1 / (r2 * ends);
+    const Complex v = c_scale(both * ends, c_conj(w)), q = c_square(v);           /* 1/w, 1/w^2 */
+    const Complex d0 = c_scale(2 * both * r2, c_conj(multiply_ends(w)));          /* 2/(w^2 - 1) */
+    const Complex sum = sum_series(series + (top + 1) / 2, terms, q);
+    m->y = w.im;
+    m->c[top] = c_mul(sum, top % 2 ? q : v);
 #pragma GCC unroll 4
-    for (int k = order; k >= 0; k--) {
-        const Lanes ur = m->cr[k + 1] - integrate_power(k), ui = m->ci[k + 1];
-        m->cr[k] = MULTIPLY_REAL(ur, ui, vr, vi);
-        m->ci[k] = MULTIPLY_IMAGINARY(ur, ui, vr, vi);
+    for (int k = is.order; k >= 0; k--) m->c[k] = c_mul(c_shift(m->c[k + 1], -integrate_power(k)), v);
+    m->d[0] = d0;
+#pragma GCC unroll 4
+    for (int k = 1; k <= is.order; k++) {
+        const Complex kc = c_scale(k, m->c[k]);
+        m->d[k] = k % 2 ? c_mul(c_add(kc, d0), v) : c_add(c_mul(kc, v), d0);
     }
+    if (is.equation != TRACTION_EQUATION) return;
+    Complex rest = c_mul(c_square(d0), w); /* d_0^2 w^(1 - k) */
 #pragma GCC unroll 4
-    for (int k = 0; k <= order; k++) {
-        const Lanes cr = k * m->cr[k], ci = k * m->ci[k];
-        if (k == 0) {
-            m->dr[k] = Yr;
-            m->di[k] = Yi;
-        } else if (k % 2) {
-            m->dr[k] = MULTIPLY_REAL(cr + Yr, ci + Yi, vr, vi);
-            m->di[k] = MULTIPLY_IMAGINARY(cr + Yr, ci + Yi, vr, vi);
-        } else {
-            m->dr[k] = MULTIPLY_REAL(cr, ci, vr, vi) + Yr;
-            m->di[k] = MULTIPLY_IMAGINARY(cr, ci, vr, vi) + Yi;
-        }
-    }
-    if (!with_e) return;
-    /* X = w v^k Y^2 */
-    const Lanes Y2r = Yr * Yr - Yi * Yi, Y2i = 2 * Yr * Yi;
-    Lanes Xr = MULTIPLY_REAL(Y2r, Y2i, x, y), Xi = MULTIPLY_IMAGINARY(Y2r, Y2i, x, y);
-#pragma GCC unroll 4
-    for (int k = 0; k <= order; k++) {
-        m->er[k] = -Xr;
-        m->ei[k] = -Xi;
-        if (k > 1) {
-            const Lanes cr = k * (k - 1) * m->cr[k], ci = k * (k - 1) * m->ci[k];
-            m->er[k] += MULTIPLY_REAL(cr, ci, qr, qi);
-            m->ei[k] += MULTIPLY_IMAGINARY(cr, ci, qr, qi);
-        }
-        const Lanes real = MULTIPLY_REAL(Xr, Xi, vr, vi);
-        Xi = MULTIPLY_IMAGINARY(Xr, Xi, vr, vi);
-        Xr = real;
+    for (int k = 0; k <= is.order; k++) {
+        m->e[k] = k > 1 ? c_sub(c_mul(c_scale(k * (k - 1), m->c[k]), q), rest) : c_neg(rest);
+        rest = c_mul(rest, v);
     }
 }
 
 /* Near the element: upward from c_0 = log_ratio + i angle (theory, 20, 21). */
-INLINE void evaluate_near(int order, int with_e, Lanes x, Lanes y, Lanes log_ratio, Lanes angle, LaneMoments *m)
+INLINE void evaluate_near(Variant is, Complex w, Lanes log_ratio, Lanes angle, LaneMoments *m)
 {
-    const Lanes over_ends = 2 / measure_ends(x, y);
-    const Lanes Yr = over_ends * ((x - 1) * (x + 1) - y * y), Yi = -2 * over_ends * x * y;
-    m->y = y;
-    m->cr[0] = log_ratio;
-    m->ci[0] = angle;
-    m->dr[0] = Yr;
-    m->di[0] = Yi;
+    m->y = w.im;
+    m->c[0] = c_make(log_ratio, angle);
+    m->d[0] = c_scale(2 / measure_ends(w), c_conj(multiply_ends(w)));
 #pragma GCC unroll 4
-    for (int k = 0; k <= order; k++) {
-        m->cr[k + 1] = MULTIPLY_REAL(x, y, m->cr[k], m->ci[k]) + integrate_power(k);
-        m->ci[k + 1] = MULTIPLY_IMAGINARY(x, y, m->cr[k], m->ci[k]);
-    }
+    for (int k = 0; k <= is.order; k++) m->c[k + 1] = c_shift(c_mul(w, m->c[k]), integrate_power(k));
 #pragma GCC unroll 4
-    for (int k = 0; k < order; k++) {
-        m->dr[k + 1] = MULTIPLY_REAL(x, y, m->dr[k], m->di[k]) + m->cr[k];
-        m->di[k + 1] = MULTIPLY_IMAGINARY(x, y, m->dr[k], m->di[k]) + m->ci[k];
-    }
-    if (!with_e) return;
-    const Lanes Y2r = Yr * Yr - Yi * Yi, Y2i = 2 * Yr * Yi;
-    m->er[0] = -MULTIPLY_REAL(Y2r, Y2i, x, y);
-    m->ei[0] = -MULTIPLY_IMAGINARY(Y2r, Y2i, x, y);
+    for (int k = 0; k < is.order; k++) m->d[k + 1] = c_add(c_mul(w, m->d[k]), m->c[k]);
+    if (is.equation != TRACTION_EQUATION) return;
+    m->e[0] = c_neg(c_mul(c_square(m->d[0]), w));
 #pragma GCC unroll 4
-    for (int k = 0; k < order; k++) {
-        m->er[k + 1] = MULTIPLY_REAL(x, y, m->er[k], m->ei[k]) + 2 * m->dr[k];
-        m->ei[k + 1] = MULTIPLY_IMAGINARY(x, y, m->er[k], m->ei[k]) + 2 * m->di[k];
-    }
+    for (int k = 0; k < is.order; k++) m->e[k + 1] = c_add(c_mul(w, m->e[k]), c_scale(2, m->d[k]));
 }
 
 /* A point's place as a tip sees it: distance along and across from it, in lengths of the element. */
-INLINE void locate_from_tip(int tip, Lanes *x, Lanes *y)
+INLINE Complex locate_from_tip(int tip, Complex w) { return c_shift(c_scale(0.5 * point_inward(tip), w), 0.5); }
+
+/* Far from a tip element, q counted from the tip; moments in the element's own coordinate as the others (theory, 25). */
+INLINE void evaluate_far_tip(Variant is, int terms, int tip, Complex q, LaneMoments *m)
 {
-    const double sign = tip == TIP_AT_START ? 0.5 : -0.5;
-    *x = 0.5 + sign * *x;
-    *y = sign * *y;
+    const int with_e = is.equation == TRACTION_EQUATION;
+    const double sign = point_inward(tip), (*a)[MOST_TERMS] = tip_series[is.order];
+    const Complex v = c_inverse(q), v2 = c_square(v);
+    Complex c = c_mul(sum_series(a[0], terms, v), v), d = c_mul(sum_series(a[1], terms, v), v2), e = c_real(spread(0));
+    if (with_e) e = c_mul(c_mul(sum_series(a[2], terms, v), v), v2);
+    m->y = 2 * sign * q.im;
+#pragma GCC unroll 4
+    for (int k = is.order; k >= 0; k--) {
+        m->c[k] = c_scale(sign, c);
+        m->d[k] = c_scale(0.5, d);
+        m->e[k] = c_scale(0.25 * sign, e);
+        if (k == 0) break;
+        c = c_mul(c_shift(c, -1 / (k - 1 + 1.5)), v);
+        d = c_mul(c_sub(d, c), v);
+        if (with_e) e = c_mul(c_sub(e, c_scale(2, d)), v);
+    }
 }
 
-/* Far from a tip element, x and y counted from the tip; moments in the element's own coordinate as the others. */
-/* (theory, 25) */
-INLINE void evaluate_far_tip(int order, int with_e, int terms, int tip, Lanes x, Lanes y, LaneMoments *m)
+/* Near a tip element, one pair after the other (theory, 24). */
+static void put_near_tip(int order, int tip, cplx w, int on, int lane, LaneMoments *to)
 {
-    const double sign = tip == TIP_AT_START ? 1.0 : -1.0;
-    const Lanes inverse = 1 / (x * x + y * y), vr = x * inverse, vi = -y * inverse;
-    const Lanes v2r = vr * vr - vi * vi, v2i = 2 * vr * vi;
-    Lanes pr, pi, cr, ci, dr, di, er = spread(0), ei = er;
-    sum_series(tip_series[order][0], terms, vr, vi, &pr, &pi);
-    cr = MULTIPLY_REAL(pr, pi, vr, vi);
-    ci = MULTIPLY_IMAGINARY(pr, pi, vr, vi);
-    sum_series(tip_series[order][1], terms, vr, vi, &pr, &pi);
-    dr = MULTIPLY_REAL(pr, pi, v2r, v2i);
-    di = MULTIPLY_IMAGINARY(pr, pi, v2r, v2i);
-    if (with_e) {
-        sum_series(tip_series[order][2], terms, vr, vi, &pr, &pi);
-        const Lanes ar = MULTIPLY_REAL(pr, pi, vr, vi), ai = MULTIPLY_IMAGINARY(pr, pi, vr, vi);
-        er = MULTIPLY_REAL(ar, ai, v2r, v2i);
-        ei = MULTIPLY_IMAGINARY(ar, ai, v2r, v2i);
-    }
-    m->y = 2 * sign * y;
-#pragma GCC unroll 4
-    for (int k = order; k >= 0; k--) {
-        m->cr[k] = sign * cr;
-        m->ci[k] = sign * ci;
-        m->dr[k] = 0.5 * dr;
-        m->di[k] = 0.5 * di;
-        m->er[k] = 0.25 * sign * er;
-        m->ei[k] = 0.25 * sign * ei;
-        if (k == 0) break;
-        const Lanes br = cr - 1 / (k + 0.5), bi = ci;
-        cr = MULTIPLY_REAL(br, bi, vr, vi);
-        ci = MULTIPLY_IMAGINARY(br, bi, vr, vi);
-        const Lanes fr = dr - cr, fi = di - ci;
-        dr = MULTIPLY_REAL(fr, fi, vr, vi);
-        di = MULTIPLY_IMAGINARY(fr, fi, vr, vi);
-        if (!with_e) continue;
-        const Lanes gr = er - 2 * dr, gi = ei - 2 * di;
-        er = MULTIPLY_REAL(gr, gi, vr, vi);
-        ei = MULTIPLY_IMAGINARY(gr, gi, vr, vi);
+    Moments m;
+    evaluate_tip_moments(w, on, order, tip, &m);
+    to->y[lane] = m.y;
+    for (int k = 0; k <= order; k++) {
+        c_put(&to->c[k], lane, m.c[k]);
+        c_put(&to->d[k], lane, m.d[k]);
+        c_put(&to->e[k], lane, m.e[k]);
     }
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -10,13 +10,15 @@ import numpy as np
 from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements
 from pbem.bem.tree import find_interactions
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model, Operator
+from pbem.model.model import Model, Operator, SolverOptions
 
 # With more unknowns in one region than this the hierarchical operator is the faster one.
 DENSE_UNKNOWNS = 10_000
 # Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by
 # scripts/extrapolate.py.
 KEPT_EVERYWHERE = 2300.0
+# Of the hierarchical operator a difference of meshes asks for less than the solution itself.
+EASED_TOLERANCE, EASED_NEWTON_TOLERANCE = 1e-6, 1e-7
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,11 @@ class DenseChoice:
     name: ClassVar[Operator] = "dense"
 
     @staticmethod
+    def ease(solver: SolverOptions) -> SolverOptions:
+        """The settings for a second solution on another mesh: the same operator, as exact."""
+        return replace(solver, operator="dense")
+
+    @staticmethod
     def estimate_memory(model: Model, mesh: Mesh) -> Memory:
         """What a run takes."""
         operator, tangent = estimate_dense_memory(model, mesh)
@@ -48,6 +55,14 @@ class HierarchicalChoice:
     """Far elements by their expansions."""
 
     name: ClassVar[Operator] = "hierarchical"
+
+    @staticmethod
+    def ease(solver: SolverOptions) -> SolverOptions:
+        """The settings for a second solution on another mesh: the same operator, no more exact than it has to be."""
+        return replace(
+            solver, operator="hierarchical", tolerance=max(solver.tolerance, EASED_TOLERANCE),
+            newton_tolerance=max(solver.newton_tolerance, EASED_NEWTON_TOLERANCE),
+        )
 
     @staticmethod
     def estimate_memory(model: Model, mesh: Mesh) -> Memory:

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.bem.choice import choose_operator
 from pbem.mesh.carry import Carry, carry_nodes
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import coarsen_model
-from pbem.solve.choice import choose_system
 
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
@@ -59,7 +59,7 @@ def put_beside(model: Model, mesh: Mesh) -> Beside | None:
     coarse = coarsen_model(model)
     if coarse is None:
         return None
-    eased = choose_system(model, mesh).ease(coarse.model.solver)
+    eased = choose_operator(model, mesh).ease(coarse.model.solver)
     eased = replace(eased, newton_max_iterations=min(eased.newton_max_iterations, MOST_ITERATIONS))
     second = replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=())
     return relate_meshes(coarse.kind, model, mesh, second, generate_mesh(second))

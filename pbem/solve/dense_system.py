@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -18,7 +18,7 @@ from pbem.contact.laws import PairLaws
 from pbem.contact.loads import Load, OuterNodes, evaluate_load, find_needed_columns
 from pbem.contact.modes import Linearisation
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model, SolverOptions
+from pbem.model.model import Model
 from pbem.parallel import share_nodes
 from pbem.solve.condensed import CondensedTangent
 from pbem.solve.factored import FactoredTangent
@@ -53,11 +53,6 @@ class DenseSystem:
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
         """What to say when a model cannot be shared by so many ranks; None if it can."""
         return refuse_shares(mesh.nodes, ranks, choose_method(model.solver.linear, len(mesh.region_names)) == "lu")
-
-    @staticmethod
-    def ease(solver: SolverOptions) -> SolverOptions:
-        """The settings for a second solution that differs by its mesh: the system is the same, and as exact."""
-        return replace(solver, operator="dense")
 
     @staticmethod
     def assemble(

@@ -55,6 +55,7 @@ def _describe_bound(balanced: float) -> str:
 
 
 def end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceError) -> ConvergenceError:
+    """The error of a first step whose problem is the same at every fraction."""
     name = problem.model.stages[stage].name
     return ConvergenceError(
         error.reason,

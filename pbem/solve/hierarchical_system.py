@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -25,7 +25,7 @@ from pbem.contact.loads import OuterNodes, find_needed_columns
 from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
-from pbem.model.model import Model, SolverOptions
+from pbem.model.model import Model
 from pbem.parallel import add_up
 from pbem.solve.accuracy import measure_product_error
 from pbem.solve.groups import Group, divide_model, share_groups, surround_groups
@@ -41,8 +41,6 @@ Complex = NDArray[np.complex128]
 
 # Beyond this rounding in the expansions outweighs what further terms bring.
 MOST_TERMS = 60
-# Of this system a difference of meshes asks for less than the solution itself.
-EASED_TOLERANCE, EASED_NEWTON_TOLERANCE = 1e-6, 1e-7
 
 
 @dataclass(frozen=True)
@@ -64,14 +62,6 @@ class HierarchicalSystem:
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
         """What to say when a model cannot be shared by so many ranks; None, as ranks can be without a group."""
         return None
-
-    @staticmethod
-    def ease(solver: SolverOptions) -> SolverOptions:
-        """The settings for a second solution that differs by its mesh: the system is the same, but no more exact."""
-        return replace(
-            solver, operator="hierarchical", tolerance=max(solver.tolerance, EASED_TOLERANCE),
-            newton_tolerance=max(solver.newton_tolerance, EASED_NEWTON_TOLERANCE),
-        )
 
     @staticmethod
     def assemble(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from collections.abc import Callable
@@ -43,6 +44,19 @@ def test_no_cycle_of_imports() -> None:
 @each_module
 def test_libraries_come_in_by_their_own_part(module: Module) -> None:
     expect_none(checks.check_doors(module))
+
+
+@each_module
+def test_nobody_asks_which_system_of_equations_it_is(module: Module) -> None:
+    expect_none(checks.check_questions(module))
+
+
+def test_the_kinds_of_systems_are_there() -> None:
+    defined = {
+        node.name for module in MODULES.values() for node in ast.walk(module.tree) if isinstance(node, ast.ClassDef)
+    }
+    assert set(checks.KINDS) | checks.MAKERS.keys() <= defined
+    assert {maker for makers in checks.MAKERS.values() for maker in makers} <= MODULES.keys()
 
 
 @each_module
@@ -102,6 +116,7 @@ def list_faults(modules: dict[str, Module]) -> list[str]:
     each: list[Callable[[Module], list[str]]] = [
         lambda module: checks.check_order(module, modules),
         checks.check_doors,
+        checks.check_questions,
         checks.check_names,
         checks.check_docstrings,
         checks.check_length,
@@ -131,6 +146,11 @@ BREACHES = {
     "h5py": ("cli.py", "import h5py", "h5py may be imported in results only"),
     "tomllib": ("mesh/mesh.py", "import tomllib", "tomllib may be imported in case only"),
     "matplotlib": ("cli.py", "import matplotlib.pyplot as plt", "matplotlib.pyplot may be imported in results only"),
+    "question": ("mesh/mesh.py", "isinstance(music, HierarchicalOperator)", "asks for HierarchicalOperator"),
+    "question, several": ("mesh/mesh.py", "isinstance(music, int | a.KrylovTangent)", "asks for KrylovTangent"),
+    "question, attribute": ("mesh/mesh.py", "getattr(music.tangent, 'nearby', False)", "asks what music.tangent has"),
+    "question, type": ("mesh/mesh.py", "type(music) is a.RowOperator", "compares types"),
+    "maker": ("solve/newton.py", "from pbem.solve.krylov import KrylovTangent", "KrylovTangent is made in"),
     "name, variable": ("mesh/mesh.py", "mu = 0.5", "'mu' means several things"),
     "name, parameter": ("mesh/mesh.py", "def _f(mu): ...", "'mu' means several things"),
     "name, keyword": ("mesh/mesh.py", "_f(mu=1)", "'mu' means several things"),

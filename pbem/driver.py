@@ -141,76 +141,104 @@ def _refine_and_solve(
         model, target = bisect_elements(model, decision.marked, decision.gently), _Target(target.path, False, True)
 
 
+@dataclass(frozen=True)
+class _Output:
+    """The open result file, on the first rank; nothing on the others. former: the pass whose place it takes."""
+
+    writer: ResultWriter | None = None
+    former: KeptPass | None = None
+
+
 def _solve(
     model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals, one: Pass
 ) -> Decision:
     """March through the load history; the first rank writes. Returns what follows."""
     interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
-
-    former: KeptPass | None = None
-
-    def open_writer() -> ResultWriter | None:
-        nonlocal former
-        flat = [f"{name}={value}" for name, value in options.items()]
-        if target.resume:
-            return ResultWriter.resume(target.path, model, mesh, world.size, petsc_version(), flat, region)
-        former = keep_pass(target.path) if one.number > 1 else None
-        try:
-            writer = ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region,
-                                  force=target.force)
-        except BaseException:
-            if former:
-                former.drop()
-            raise
-        if former:
-            former.hold()
-        return writer
-
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
-    writer = do_on_first(world, PbemError, open_writer, share=False)
+    output = do_on_first(
+        world, PbemError, lambda: _open(model, mesh, target, options, region, one), share=False
+    ) or _Output()
     try:  # from here on whatever happens has to leave a closed file
-        if model.analysis.accuracy is not None:
-            do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
-        last: Step | None = broadcast(world, writer.last_step if writer else None)
-        signals.at_once = world.size == 1
-        problem = assemble_problem(model, mesh, world)
-        signals.at_once = False
-        watch.look_after(problem.laws)
-        watch.check()
-        for note in problem.notes:
-            watch.note(note)
-        if interior is not None:
-            interior.prepare(problem.operator)
-        start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-        estimator = make_estimator(model, mesh, last)
-        try:
-            store_steps(march(problem, watch, start), model.output_every, interior, writer, watch, estimator)
-        except ConvergenceError:
-            watch.check()  # a law that failed has answered with no strength
-            raise
-        estimator.destroy()
-        for note in estimator.list_notes() if writer else ():
-            watch.note(note)
-        decision: Decision = do_on_first(
-            world, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
-        )
-        for note in decision.notes:
-            watch.note(note)
-        if decision.failure:
-            raise ConvergenceError("accuracy", decision.failure)
-        do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
+        decision = _fill(output.writer, model, mesh, interior, watch, signals, one)
     except BaseException as error:
         told = _blame_pass(error, one, 2 * mesh.nodes) if one.number > 1 and not target.resume else error
-        if writer:
-            _end_badly(writer, told, former)
+        if output.writer:
+            _end_badly(output.writer, told, output.former)
         if told is error:
             raise
         raise told from error
-    if former:
-        former.drop()
+    if output.former:
+        output.former.drop()
     world.Barrier()
+    return decision
+
+
+def _open(
+    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], region: NDArray[np.int64] | None, one: Pass
+) -> _Output:
+    """The result file to go on with, or a new one beside which the former pass is kept."""
+    flat = [f"{name}={value}" for name, value in options.items()]
+    if target.resume:
+        return _Output(ResultWriter.resume(target.path, model, mesh, world.size, petsc_version(), flat, region))
+    former = keep_pass(target.path) if one.number > 1 else None
+    try:
+        writer = ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region, force=target.force)
+    except BaseException:
+        if former:
+            former.drop()
+        raise
+    if former:
+        former.hold()
+    return _Output(writer, former)
+
+
+def _fill(
+    writer: ResultWriter | None, model: Model, mesh: Mesh, interior: InteriorField | None, watch: Watch,
+    signals: StopSignals, one: Pass,
+) -> Decision:
+    """Assemble, march, store the steps as they come, and judge their errors."""
+    if model.analysis.accuracy is not None:
+        do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
+    last: Step | None = broadcast(world, writer.last_step if writer else None)
+    signals.at_once = world.size == 1
+    problem = assemble_problem(model, mesh, world)
+    signals.at_once = False
+    watch.look_after(problem.laws)
+    watch.check()
+    for note in problem.system.notes:
+        watch.note(note)
+    if interior is not None:
+        interior.prepare(problem.system)
+    start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
+    estimator = make_estimator(model, mesh, last)
+    try:
+        store_steps(march(problem, watch, start), model.output_every, interior, writer, watch, estimator)
+    except ConvergenceError:
+        watch.check()  # a law that failed has answered with no strength
+        raise
+    estimator.destroy()
+    for note in estimator.list_notes() if writer else ():
+        watch.note(note)
+    return _conclude(writer, model, mesh, estimator, watch, one)
+
+
+def _conclude(
+    writer: ResultWriter | None, model: Model, mesh: Mesh, estimator: Estimator, watch: Watch, one: Pass
+) -> Decision:
+    """What follows from the errors; the file is finished, or another pass is to take its place.
+
+    Raises ConvergenceError ("accuracy") when passes or unknowns run out.
+    """
+    decision: Decision = do_on_first(
+        world, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
+    )
+    for note in decision.notes:
+        watch.note(note)
+    if decision.failure:
+        raise ConvergenceError("accuracy", decision.failure)
+    do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
     return decision
 
 

@@ -80,7 +80,7 @@ def main() -> None:
     options = parser.parse_args()
     clock = time.perf_counter if options.wall else time.process_time
     factors = record(LinearSolver, "factorise", clock)
-    columns = record(PairColumns, "add", clock)
+    columns = record(PairColumns, "extend", clock)
     if world.rank == 0:
         print("count law      unknowns  iterations  factors   first     all  columns  whole run  over first  peak MB")
     with tempfile.TemporaryDirectory() as name:

@@ -72,6 +72,7 @@ def measure(case: Path, operator_only: bool, output: str | None = None) -> dict[
     from pbem import driver
     from pbem.parallel import world
     from pbem.solve import march, schwarz
+    from pbem.solve.problem import Problem
 
     clock = Clock()
     problems: list[Any] = []
@@ -82,7 +83,7 @@ def measure(case: Path, operator_only: bool, output: str | None = None) -> dict[
     driver.generate_mesh = clock.wrap("mesh", driver.generate_mesh, ignored)
     driver.assemble_problem = clock.wrap("assembly", driver.assemble_problem, problems)
     driver.do_on_first = clock.wrap("first rank", driver.do_on_first, ignored)
-    march.make_tangent = clock.wrap("tangent", march.make_tangent, tangents)
+    Problem.make_tangent = clock.wrap("tangent", Problem.make_tangent, tangents)
     march.solve_step = clock.wrap("Newton", march.solve_step, ignored)
     schwarz.SchwarzPreconditioner.update = clock.wrap("preconditioner", schwarz.SchwarzPreconditioner.update, ignored)
     if operator_only:
@@ -96,7 +97,7 @@ def measure(case: Path, operator_only: bool, output: str | None = None) -> dict[
     report: dict[str, Any] = {
         "unknowns": problem.unknowns,
         "ranks": world.size,
-        "notes": list(problem.notes),
+        "notes": list(problem.system.notes),
         "memory": world.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
         "seconds": _find_slowest(world.allgather(clock.seconds)),
     }
@@ -118,12 +119,9 @@ def measure_product(problem: Any, world: Any) -> dict[str, Any]:
     for _ in range(5):
         world.Barrier()
         begin = time.perf_counter()
-        problem.operator.apply(v)
+        problem.system.apply(v)
         best = min(best, max(world.allgather(time.perf_counter() - begin)))
-    if hasattr(problem.operator, "leaves"):  # none of them on a rank without a group
-        stored = sum(leaf.near.nbytes + leaf.far.nbytes for leaf in problem.operator.leaves)
-    else:
-        stored = sum(block.matrix.nbytes for block in problem.operator.blocks)
+    stored = problem.system.stored
     sample = np.ones(4_000_000)
     target = np.empty_like(sample)
     copy = np.inf
@@ -133,7 +131,7 @@ def measure_product(problem: Any, world: Any) -> dict[str, Any]:
         np.copyto(target, sample)
         copy = min(copy, max(world.allgather(time.perf_counter() - begin)))
     bytes_copied = max(world.allgather(stored))
-    sources = getattr(problem.operator, "sources", None)
+    sources = getattr(problem.system.operator, "sources", None)
     return {
         "product": best, "stored": world.allreduce(stored) / 1e6, "copy": copy * bytes_copied / sample.nbytes,
         "leaves": len(sources.forest.leaves) if sources else 0, "terms": sources.terms if sources else 0,

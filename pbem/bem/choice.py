@@ -2,25 +2,82 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
 import numpy as np
 
 from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements
 from pbem.bem.tree import find_interactions
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model
+from pbem.model.model import Model, Operator, SolverOptions
 
 # With more unknowns in one region than this the hierarchical operator is the faster one.
 DENSE_UNKNOWNS = 10_000
+# Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by
+# scripts/extrapolate.py.
+KEPT_EVERYWHERE = 2300.0
+# Of the hierarchical operator a difference of meshes asks for less than the solution itself.
+EASED_TOLERANCE, EASED_NEWTON_TOLERANCE = 1e-6, 1e-7
 
 
-def is_hierarchical(model: Model, mesh: Mesh) -> bool:
-    """Whether a model is computed with the hierarchical operator: as it asks, else by its largest region."""
+@dataclass(frozen=True)
+class Memory:
+    """stored: names, and bytes over all ranks; note: what there is beside; everywhere: bytes on every rank."""
+
+    stored: tuple[tuple[str, float], ...]
+    note: str
+    everywhere: float = 0.0
+
+
+class DenseChoice:
+    """Every entry of the matrix is stored."""
+
+    name: ClassVar[Operator] = "dense"
+
+    @staticmethod
+    def ease(solver: SolverOptions) -> SolverOptions:
+        """The settings for a second solution on another mesh: the same operator, as exact."""
+        return replace(solver, operator="dense")
+
+    @staticmethod
+    def estimate_memory(model: Model, mesh: Mesh) -> Memory:
+        """What a run takes."""
+        operator, tangent = estimate_dense_memory(model, mesh)
+        kind, factors = (
+            ("dense", "factored in its place") if len(model.regions) == 1
+            else ("sparse, by regions", "and its factors once more or a few times that")
+        )
+        return Memory((("operator", operator), (f"tangent operator ({kind})", tangent)), factors)
+
+
+class HierarchicalChoice:
+    """Far elements by their expansions."""
+
+    name: ClassVar[Operator] = "hierarchical"
+
+    @staticmethod
+    def ease(solver: SolverOptions) -> SolverOptions:
+        """The settings for a second solution on another mesh: the same operator, no more exact than it has to be."""
+        return replace(
+            solver, operator="hierarchical", tolerance=max(solver.tolerance, EASED_TOLERANCE),
+            newton_tolerance=max(solver.newton_tolerance, EASED_NEWTON_TOLERANCE),
+        )
+
+    @staticmethod
+    def estimate_memory(model: Model, mesh: Mesh) -> Memory:
+        """What a run takes."""
+        stored = (("hierarchical operator", estimate_hierarchical_memory(model, mesh)),)
+        return Memory(stored, "preconditioner and GMRES up to as much again", KEPT_EVERYWHERE * 2 * mesh.nodes)
+
+
+def choose_operator(model: Model, mesh: Mesh) -> type[DenseChoice] | type[HierarchicalChoice]:
+    """What a model is computed with: as it asks, else by its largest region."""
     solver = model.solver
-    if solver.operator != "auto":
-        return solver.operator == "hierarchical"
-    if solver.linear in ("lu", "mumps"):
-        return False
-    return 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
+    if solver.operator == "auto":
+        large = 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
+        return HierarchicalChoice if large and solver.linear not in ("lu", "mumps") else DenseChoice
+    return HierarchicalChoice if solver.operator == "hierarchical" else DenseChoice
 
 
 def estimate_hierarchical_memory(model: Model, mesh: Mesh) -> float:

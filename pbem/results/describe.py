@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from pbem.bem.choice import estimate_dense_memory, estimate_hierarchical_memory, is_hierarchical
+from pbem.bem.choice import choose_operator
 from pbem.description.generation import Group
 from pbem.geometry.curve import Curve
 from pbem.mesh.mesh import Mesh
@@ -110,11 +110,6 @@ def describe_errors(results: Results) -> list[str]:
         for name in worst
     ]
     return lines + _table(["last step, interface", "opening", "slip", "traction n", "traction s"], rows)
-
-
-# Bytes an unknown of mesh, laws, constraint map and trees that each rank keeps for the whole model; measured by
-# scripts/extrapolate.py.
-KEPT_EVERYWHERE = 2300.0
 
 
 def _describe_region(region: Region, made: Collection[str]) -> str:
@@ -229,20 +224,10 @@ def _describe_size(model: Model, mesh: Mesh) -> list[str]:
         f"{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, {2 * mesh.nodes} unknowns, "
         f"{mesh.pairs.count} contact pairs, scheme {model.analysis.scheme}"
     )
-    if is_hierarchical(model, mesh):
-        stored = _bytes(estimate_hierarchical_memory(model, mesh))
-        everywhere = _bytes(KEPT_EVERYWHERE * 2 * mesh.nodes)
-        note = f"preconditioner and GMRES up to as much again; besides, on every rank {everywhere}"
-        return [size, f"memory over all ranks: hierarchical operator {stored}, {note}"]
-    operator, tangent = estimate_dense_memory(model, mesh)
-    kind, factors = (
-        ("dense", "factored in its place") if len(model.regions) == 1
-        else ("sparse, by regions", "and its factors once more or a few times that")
-    )
-    return [
-        size,
-        f"memory over all ranks: operator {_bytes(operator)}, tangent operator ({kind}) {_bytes(tangent)}, {factors}",
-    ]
+    memory = choose_operator(model, mesh).estimate_memory(model, mesh)
+    parts = [*(f"{name} {_bytes(size)}" for name, size in memory.stored), memory.note]
+    everywhere = f"; besides, on every rank {_bytes(memory.everywhere)}" if memory.everywhere else ""
+    return [size, f"memory over all ranks: {', '.join(parts)}{everywhere}"]
 
 
 def _describe_steps(results: Results) -> str:

@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.anchor import group_motions
-from pbem.contact.cut_parts import name_part
 from pbem.contact.loads import Load
 from pbem.contact.support import Support
-from pbem.errors import ConvergenceError
 from pbem.model.support import FreeMotion
 from pbem.solve.problem import Problem
 from pbem.solve.step import Balance
@@ -25,13 +22,6 @@ from pbem.solve.step import Balance
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-# Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
-# anchors hold it, and that make a result wrong, where they are more than NOTED of those on the most loaded region too.
-NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
-# The same of a net force on an infinite region that prescribed displacements or springs bring about.
-NET_FORCE = 1e-2
-# Parts that cracks cut off are judged if they carry more than this part of what the most loaded region does.
-SLIGHT = 1e-2
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
 # Motions that differ by less than this part of their size are one.
@@ -228,9 +218,7 @@ def _measure_whole(
 
 def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
     """Tractions that are smaller are taken to be as large as this."""
-    rounding = ROUNDING
-    if isinstance(problem.operator, HierarchicalOperator):
-        rounding = max(rounding, problem.model.solver.tolerance)
+    rounding = max(ROUNDING, problem.system.tolerance)
     moved = float(np.abs(v[: 2 * problem.mesh.nodes]).max(initial=0.0))
     return max(FAINT * largest, rounding * problem.traction_scale * moved)
 
@@ -262,60 +250,3 @@ def _measure_carried(
 
 def _divide(part: Real, whole: Real) -> Real:
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)
-
-
-def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
-    """What is left over on the worst region, part or on the whole, where that is worth a note; None if it is not.
-
-    Raises ConvergenceError where it makes the result wrong: "not in balance", or "net force" of an infinite region.
-    """
-    _refuse_net_force(problem, balance)
-    parts = problem.cut_parts
-    relative = np.concatenate([balance.relative, balance.part_relative, [balance.whole_relative]])
-    weight = np.concatenate([balance.weight, balance.part_weight, [1.0]])
-    # Slivers between cracks carry little, of which much may be left over.
-    relative[len(balance.relative) :][weight[len(balance.relative) :] < SLIGHT] = 0.0
-    wrong = (relative > NOT_IN_BALANCE) & (relative * weight > NOTED)
-    worst = int(np.argmax(np.where(wrong, relative, 0.0) if wrong.any() else relative))
-    amount, at = float(relative[worst]), worst - len(balance.relative)
-    if amount <= NOTED:
-        return None
-    x, y, moment = np.concatenate([balance.resultant, balance.part_resultant, balance.whole[None]])[worst]
-    if at < 0:
-        on = f"region '{problem.mesh.region_names[worst]}'"
-    elif at < len(parts):
-        on = f"'{name_part(problem.mesh, problem.parts, int(parts[at]), problem.model.origin)}'"
-    else:
-        on = "the whole model"
-    left = (
-        f"the forces on {on} do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
-        f"{100 * amount:.2g} % of their sum without signs"
-    )
-    if at < 0 and float(balance.carried[worst]) > NOTED:
-        left += ", which nothing but the condition on its mean motion carries"
-    if wrong.any():
-        raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
-    return left
-
-
-def _refuse_net_force(problem: Problem, balance: Balance) -> None:
-    """Raise ConvergenceError if displacements that are prescribed push against an infinite region.
-
-    What they move it by grows with the logarithm of the distance to which it is looked at, and so does without bound
-    the force that an answer to them would take.
-    """
-    conditions = problem.model.conditions.values()
-    if not any("displacement" in each.known or any(each.stiffness) for each in conditions):
-        return
-    for number, region in enumerate(problem.model.regions):
-        amount = float(balance.relative[number])
-        if region.infinite and amount > NET_FORCE and amount * balance.weight[number] > NET_FORCE:
-            x, y, _ = balance.resultant[number]
-            raise ConvergenceError(
-                "net force",
-                f"prescribed displacements or springs act on the infinite region '{region.name}' with a net force of "
-                f"({x:.6g}, {y:.6g}), {100 * amount:.2g} % of the sum of all forces there without signs; the "
-                "displacement of a net force grows with the logarithm of the distance, so that these conditions "
-                "determine neither it nor their reactions; prescribe displacements whose forces balance, or "
-                "tractions that do, or a stiff inclusion in place of a hole held at rest, or take a finite region",
-            )

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.bem.choice import is_hierarchical
+from pbem.bem.choice import choose_operator
 from pbem.mesh.carry import Carry, carry_nodes
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.refinement import CoarseModel, coarsen_model
+from pbem.model.refinement import coarsen_model
 
 Bool = NDArray[np.bool_]
 Integer = NDArray[np.int64]
@@ -21,8 +21,6 @@ Real = NDArray[np.float64]
 
 # The second solution starts from the modes of the first, so that it settles soon or never.
 MOST_ITERATIONS = 8
-# Of a hierarchical operator a difference of meshes asks for less than the solution itself.
-TOLERANCE, NEWTON_TOLERANCE = 1e-6, 1e-7
 
 NOTHING_COARSER = "elements cannot be merged in pairs, and the order cannot be lowered"
 
@@ -61,7 +59,9 @@ def put_beside(model: Model, mesh: Mesh) -> Beside | None:
     coarse = coarsen_model(model)
     if coarse is None:
         return None
-    second = _ease_solver(coarse, is_hierarchical(model, mesh))
+    eased = choose_operator(model, mesh).ease(coarse.model.solver)
+    eased = replace(eased, newton_max_iterations=min(eased.newton_max_iterations, MOST_ITERATIONS))
+    second = replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=())
     return relate_meshes(coarse.kind, model, mesh, second, generate_mesh(second))
 
 
@@ -75,15 +75,3 @@ def relate_meshes(
     slot = second_mesh.pairs.slot
     lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slot]
     return Beside(kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, pair_of_node[carry.nearest[slot]])
-
-
-def _ease_solver(coarse: CoarseModel, hierarchical: bool) -> Model:
-    solver = coarse.model.solver
-    eased = replace(
-        solver,
-        operator="hierarchical" if hierarchical else "dense",
-        tolerance=max(solver.tolerance, TOLERANCE) if hierarchical else solver.tolerance,
-        newton_tolerance=max(solver.newton_tolerance, NEWTON_TOLERANCE) if hierarchical else solver.newton_tolerance,
-        newton_max_iterations=min(solver.newton_max_iterations, MOST_ITERATIONS),
-    )
-    return replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=())

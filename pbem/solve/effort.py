@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 # Operations of the small dense system's factors are done by one rank, and in smaller blocks.
 SMALL = 2.0
@@ -20,29 +20,24 @@ class Work:
     iteration: float
 
 
+@dataclass(frozen=True)
 class Effort:
     """Adds up what old factors cost beside new ones; when both are the same, new ones are due.
 
     Never more than twice the best is spent in this way, whatever the modes are going to do.
+    limited: they may be replaced. spent: operations with the present factors so far.
     """
 
-    def __init__(self, ranks: int) -> None:
-        self.ranks = ranks
-        self.restart(Work(0.0, 0.0, 0.0), limited=False)
-
-    def restart(self, work: Work, limited: bool) -> None:
-        """New factors are there; limited: they may be replaced."""
-        self.work, self.limited = work, limited
-        self.spent = 0.0
+    ranks: int
+    work: Work
+    limited: bool
+    spent: float = 0.0
 
     def allows(self, columns: int, size: int) -> bool:
-        """Whether so many columns and a dense system of such a size may be spent; then they are."""
-        cost = columns * self.work.column + 2 / 3 * SMALL * self.ranks * size**3
-        if self.limited and self.spent + cost > self.work.factors:
-            return False
-        self.spent += cost
-        return True
+        """Whether so many columns and a dense system of such a size may be spent."""
+        return not self.limited or self.spend(columns, size).spent <= self.work.factors
 
-    def count_columns(self, columns: int) -> None:
-        """So many columns are computed whatever they cost."""
-        self.spent += columns * self.work.column
+    def spend(self, columns: int, size: int = 0) -> Effort:
+        """With so many columns and a dense system of such a size more."""
+        cost = columns * self.work.column + 2 / 3 * SMALL * self.ranks * size**3
+        return replace(self, spent=self.spent + cost)

@@ -11,10 +11,10 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
-from pbem.solve.linear import choose_method
 from pbem.solve.problem import Problem
-from pbem.solve.reference import Reference
-from pbem.solve.tangent import Solved, describe_residual, select_states, size_residual
+from pbem.solve.reference import Reference, TangentRows
+from pbem.solve.response import select_states
+from pbem.solve.tangent import AnyTangent, Solved, describe_residual, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -23,16 +23,15 @@ Integer = NDArray[np.int64]
 LEAST_ITERATIONS, MOST_ITERATIONS = 4, 100
 
 
-class FactoredTangent:
+class FactoredTangent(AnyTangent):
     """The operator of the present modes, solved by GMRES with the factors of the same or of earlier modes.
 
     Old factors are kept until the further iterations with them have taken as many operations as new factors would.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, rows: TangentRows) -> None:
         self.problem = problem
-        method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
-        self.reference = Reference(problem, method)
+        self.reference = Reference(problem, rows, np.zeros(0, dtype=np.int64))
         self.factored: sparse.csr_matrix | None = None  # the constraint map of the factors
         self.spent = 0.0  # operations that old factors took beyond those that new ones would have
 
@@ -74,7 +73,7 @@ class FactoredTangent:
         """See AnyTangent."""
         self.reference.present = constraints.matrix
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
-        forces = (self.problem.operator.apply(-states[:, k]) for k in range(states.shape[1]))
+        forces = (self.problem.system.apply(-states[:, k]) for k in range(states.shape[1]))
         return np.stack([self._solve_by_any(constraints, each)[unknowns] for each in forces], axis=1)
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
+
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.hoop import evaluate_hoop_stress
-from pbem.bem.interior import InteriorRows, Values, evaluate_limits
+from pbem.bem.interior import Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
-from pbem.bem.operator import RowOperator
-from pbem.bem.pointwise import TreeRows
-from pbem.bem.rigid import find_rigid_motions
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import gather_parts
 from pbem.solve.backgrounds import evaluate_backgrounds
+from pbem.solve.dense_system import place_directly
+from pbem.solve.problem import InteriorRows, System
 from pbem.solve.step import Interior, Step
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+PlaceInterior = Callable[[Model, Mesh, Complex, Location], InteriorRows]
 
 
 class InteriorField:
@@ -35,17 +37,20 @@ class InteriorField:
         shares = np.linspace(0, len(points), comm.size + 1).astype(int)
         own = points[shares[comm.rank] : shares[comm.rank + 1]]
         self._model, self._mesh, self._comm = model, mesh, comm
-        self._rows: InteriorRows | TreeRows | None = None
         self._points = own
         self._location = locate_points(mesh, [region.infinite for region in model.regions], own)
+        self._place: PlaceInterior = place_directly
         parts = [self._location.region, self._location.element, self._location.s]
         region, element, s = (gather_parts(comm, np.asarray(part, dtype=float)) for part in parts)
         self.location = Location(region.astype(np.int64), element.astype(np.int64), s)
 
-    def prepare(self, operator: RowOperator | HierarchicalOperator) -> None:
-        """Evaluate by the trees of a hierarchical operator, if it is one."""
-        if isinstance(operator, HierarchicalOperator):
-            self._rows = TreeRows(operator, self._points, self._location)
+    def prepare(self, system: System) -> None:
+        """Evaluate in the way of a system of equations; else by every element of a point's region."""
+        self._place = system.place_interior
+
+    @cached_property
+    def _rows(self) -> InteriorRows:
+        return self._place(self._model, self._mesh, self._points, self._location)
 
     def evaluate(self, step: Step) -> Interior:
         """Displacement and stress at all points after a step, on every rank; all ranks call this together.
@@ -75,11 +80,6 @@ class InteriorField:
                 if len(inside) and not background.is_zero:
                     moved[inside] += background.displacement(self._points[inside])
                     stress[inside] += background.stress(self._points[inside])
-        if self._rows is None:
-            materials = [region.material for region in self._model.regions]
-            everywhere = np.ones(4 * mesh.nodes, dtype=bool)
-            rigid = find_rigid_motions(mesh, self._model.finite_regions, everywhere)
-            self._rows = InteriorRows(mesh, materials, self._points, self._location, rigid)
         elastic = self._rows.evaluate(displacement, traction)
         hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
         limit = evaluate_limits(

@@ -14,7 +14,8 @@ from pbem.contact.loads import Load
 from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
-from pbem.solve.balance import DRIVEN, measure_balance
+from pbem.solve.balance import measure_balance
+from pbem.solve.imbalance import DRIVEN
 from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]

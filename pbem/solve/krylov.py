@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
@@ -13,13 +14,14 @@ from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
-from pbem.solve.choice import make_dense_tangent
+from pbem.solve.groups import Group
 from pbem.solve.linear import PREFIX, PETSc, pass_over_divergence, petsc_options
 from pbem.solve.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.problem import Problem
+from pbem.solve.response import select_states
 from pbem.solve.schwarz import SchwarzPreconditioner
-from pbem.solve.sweeps import Judge, Sweeps
-from pbem.solve.tangent import AnyTangent, Solved, select_states, size_residual
+from pbem.solve.sweeps import Sweeps
+from pbem.solve.tangent import MOST_SETTLED, AnyTangent, Judge, Settling, Solved, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -34,25 +36,34 @@ SLOW = 60
 WIDENING, MOST_WIDENING = 4, 16
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
+# The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
+# sets that are far from each other are settled one by one.
+MOST_SETTLED_BY_GMRES = 12
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
 
 
-class KrylovTangent:
+class KrylovTangent(AnyTangent):
     """The tangent operator K = B M as a PETSc shell; its preconditioner follows the modes."""
 
-    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner) -> None:
+    def __init__(
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Group],
+        widen: Callable[[int], Sequence[Group]],
+    ) -> None:
+        """groups: of the preconditioner; widen: makes them with so many times as many elements around them."""
         self.problem = problem
         self.preconditioner = preconditioner
+        self._groups, self._widen_groups = groups, widen
         self.constraints: ConstraintMap | None = None
         self.solution: Real | None = None
         self.law: Linearisation | None = None
         # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
         self.expected: Real | None = None
         self.iterations: list[int] = []
-        self.nearby = answers_nearby(problem)
+        nearby = answers_nearby(problem)
+        self._settling = Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
         self.widening = 1
-        rows = problem.operator.rows
+        rows = 2 * len(problem.system.nodes)
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
         self._sweeps: Sweeps | None = None
         self._order = _find_order(problem)
@@ -82,6 +93,11 @@ class KrylovTangent:
             )
         self._solver = solver
         self._tolerance = float(solver.getTolerances()[0])  # the user's ksp_rtol, if one is given
+
+    @property
+    def settling(self) -> Settling:
+        """See AnyTangent."""
+        return self._settling
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
         """Solve B (M x + m) = 0 for a constraint map.
@@ -150,9 +166,9 @@ class KrylovTangent:
     def _widen(self) -> bool:
         """Let the groups of the preconditioner take in more around them; whether there was more to take."""
         wider = self.widening * WIDENING
-        if wider > MOST_WIDENING or self.problem.widen_groups is None:
+        if wider > MOST_WIDENING:
             return False
-        groups = self.problem.widen_groups(wider)
+        groups = self._widen_groups(wider)
         before = sum(len(inverse.around) for inverse in self.preconditioner.inverses)
         more = 2 * (self.problem.mesh.order + 1) * sum(len(group.around) for group in groups) > before
         if not add_up(self.problem.comm, np.array([float(more)]))[0]:
@@ -173,7 +189,7 @@ class KrylovTangent:
         Of cracks that meet, where the pairs are many, with the elements near to them alone.
         """
         self.constraints = constraints
-        if self.nearby and len(pairs) > MOST_ASKED:
+        if self.settling.nearby and len(pairs) > MOST_ASKED:
             return respond_nearby(self.problem, self.preconditioner, constraints, load, law, pairs, directions)
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
         result = np.empty((len(unknowns), len(unknowns)))
@@ -191,9 +207,9 @@ class KrylovTangent:
         self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
         solved: Solved, judge: Judge,
     ) -> ModeState:
-        """Modes (m,) on which groups of elements settle by themselves; the next solution begins from their states."""
+        """See AnyTangent; the next solution begins from the states that go with the modes."""
         if self._sweeps is None:
-            self._sweeps = Sweeps(self.problem, self.preconditioner, load)
+            self._sweeps = Sweeps(self.problem, self.preconditioner, self._groups, load)
         settled, self.expected = self._sweeps.settle(constraints, modes, memory, load, law, solved, judge)
         return settled
 
@@ -215,7 +231,7 @@ class KrylovTangent:
 
         Other loads or modes can make it much worse than none.
         """
-        problem, rows = self.problem, self.problem.operator.nodes
+        problem, rows = self.problem, self.problem.system.nodes
         if begin is None:
             return np.zeros(2 * len(rows))
         product = self.multiply(begin)
@@ -237,7 +253,7 @@ class KrylovTangent:
     def _apply(self, v: Real) -> Real:
         """This rank's rows of B v, without the anchors that do not act."""
         assert self.constraints is not None
-        return self.problem.operator.apply(v) - self.problem.find_released(v, self.constraints.released)
+        return self.problem.system.apply(v) - self.problem.find_released(v, self.constraints.released)
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See AnyTangent; without the anchors that the constraint map releases."""
@@ -251,18 +267,6 @@ class KrylovTangent:
     def destroy(self) -> None:
         for item in (self._solver, self._matrix, self._right, self._left):
             item.destroy()
-
-
-def make_tangent(problem: Problem) -> AnyTangent:
-    """The tangent operator that belongs to the problem's operator."""
-    if not isinstance(problem.operator, HierarchicalOperator):
-        return make_dense_tangent(problem)
-    materials = [region.material for region in problem.model.regions]
-    preconditioner = SchwarzPreconditioner(
-        problem.mesh, materials, problem.model.size, problem.anchors, problem.groups, problem.operator.nodes,
-        problem.operator.rigid,
-    )
-    return KrylovTangent(problem, preconditioner)
 
 
 def _choose_options() -> dict[str, str]:
@@ -299,6 +303,6 @@ class _Preconditioning:
 
 def _find_order(problem: Problem) -> NDArray[np.int64]:
     """Unknowns of all ranks, one rank after the other."""
-    own = problem.operator.nodes.astype(float)
+    own = problem.system.nodes.astype(float)
     nodes = gather_parts(problem.comm, own).astype(np.int64)
     return number_components(nodes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,49 +15,45 @@ IN_SPAN = 1e-14
 MOST_VECTORS = 24
 
 
+@dataclass(frozen=True)
 class LoadBasis:
     """Orthonormal load vectors with the forces B m that belong to them and the solutions -K0^-1 B m.
 
     Load vectors are equal on all ranks; forces are this rank's rows; solutions are whole.
     """
 
-    def __init__(self, unknowns: int, rows: int) -> None:
-        self.unknowns, self.rows = unknowns, rows
-        self.clear()
+    unknowns: int
+    rows: int
+    vectors: tuple[Real, ...] = ()
+    forces: tuple[Real, ...] = ()
+    solutions: tuple[Real, ...] = ()
 
-    def clear(self) -> None:
-        """Forget all loads."""
-        self.vectors: list[Real] = []
-        self.forces: list[Real] = []
-        self.solutions: list[Real] = []
+    def renew(self, solve: Callable[[Real], Real]) -> LoadBasis:
+        """The same loads solved for anew, for another K0; solve: from forces to the whole solution."""
+        return replace(self, solutions=tuple(solve(force) for force in self.forces))
 
-    def renew(self, solve: Callable[[Real], Real]) -> None:
-        """Solve anew for the loads, for another K0; solve: from forces to the whole solution."""
-        self.solutions = [solve(force) for force in self.forces]
-
-    def combine(
-        self, vector: Real, evaluate: Callable[[], Real], solve: Callable[[Real], Real]
-    ) -> tuple[Real, Real]:
-        """The solution (2 nodes,) for a load vector, and this rank's forces.
+    def extend(self, vector: Real, evaluate: Callable[[], Real], solve: Callable[[Real], Real]) -> LoadBasis:
+        """With a load vector in its span; of too many vectors those before are forgotten.
 
         evaluate, which gives the forces, and solve are called only if the vector is no sum of the others.
         """
         parts, rest = self._project(vector)
-        size = float(np.linalg.norm(vector))
-        if float(np.linalg.norm(rest)) > IN_SPAN * size:
-            if len(self.vectors) == MOST_VECTORS:
-                self.clear()
-                parts, rest = self._project(vector)
-            length = float(np.linalg.norm(rest))
-            force = evaluate()
-            for part, other in zip(parts, self.forces, strict=True):
-                force = force - part * other
-            self.solutions.append(solve(force / length))
-            self.forces.append(force / length)
-            self.vectors.append(rest / length)
-            parts = np.append(parts, length)
+        if float(np.linalg.norm(rest)) <= IN_SPAN * float(np.linalg.norm(vector)):
+            return self
+        if len(self.vectors) == MOST_VECTORS:
+            return LoadBasis(self.unknowns, self.rows).extend(vector, evaluate, solve)
+        length, force = float(np.linalg.norm(rest)), evaluate()
+        for part, other in zip(parts, self.forces, strict=True):
+            force = force - part * other
+        return replace(
+            self, vectors=(*self.vectors, rest / length), forces=(*self.forces, force / length),
+            solutions=(*self.solutions, solve(force / length)),
+        )
+
+    def combine(self, vector: Real) -> tuple[Real, Real]:
+        """The solution (2 nodes,) for a load vector in the span, and this rank's forces."""
         solution, forces = np.zeros(self.unknowns), np.zeros(self.rows)
-        for part, one, force in zip(parts, self.solutions, self.forces, strict=True):
+        for part, one, force in zip(self._project(vector)[0], self.solutions, self.forces, strict=True):
             solution += part * one
             forces += part * force
         return solution, forces

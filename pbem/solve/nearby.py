@@ -28,7 +28,6 @@ from pbem.parallel import add_up
 from pbem.solve.groups import connect_cracks, find_nearest
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
-from pbem.solve.tangent import AnyTangent
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -48,11 +47,6 @@ def answers_nearby(problem: Problem) -> bool:
     """
     pairs = problem.mesh.pairs
     return bool(pairs.crack.all() and not problem.laws.brittle.any() and connect_cracks(problem.mesh)[1].any())
-
-
-def is_nearby(tangent: AnyTangent) -> bool:
-    """Whether a tangent operator answers in this way."""
-    return bool(getattr(tangent, "nearby", False))
 
 
 def settle_parts(

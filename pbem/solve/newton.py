@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
@@ -31,8 +30,7 @@ from pbem.parallel import broadcast
 from pbem.solve.cascade import run_cascade
 from pbem.solve.groups import is_one_group
 from pbem.solve.hold import Hold
-from pbem.solve.krylov import KrylovTangent
-from pbem.solve.nearby import MOST_ASKED, is_nearby, settle_parts
+from pbem.solve.nearby import MOST_ASKED, settle_parts
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.search import Caution, Search
@@ -62,11 +60,6 @@ class Solution:
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
 STRAIN_FLOOR = 0.1
 
-# The most pairs that are settled together; with the hierarchical operator each costs two solutions by GMRES, but for
-# cracks that meet, of which nearby elements answer, and sets that are far from each other are settled one by one.
-MOST_SETTLED, MOST_SETTLED_BY_GMRES = 600, 12
-
-
 # After so many iterations, and so many more, it is asked whether anything could balance the loads.
 PATIENCE = 8
 
@@ -87,7 +80,7 @@ def solve_step(
     "limit load" in a march, where nothing can balance the loads with the bonds that are left.
     """
     iterations: list[Iteration] = []
-    if is_nearby(tangent) and not is_one_group(problem.mesh) and find_linear(problem.laws).all():
+    if tangent.settling.nearby and not is_one_group(problem.mesh) and find_linear(problem.laws).all():
         search = _make_search(problem, tangent, True)
         try:
             return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
@@ -99,13 +92,12 @@ def solve_step(
 
 
 def _make_search(problem: Problem, tangent: AnyTangent, sweeps: bool) -> Search:
-    hierarchical = isinstance(problem.operator, HierarchicalOperator)
-    few = hierarchical and not is_nearby(tangent)
+    settling = tangent.settling
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration.
     linear = find_linear(problem.laws)
     return Search(
-        MOST_SETTLED_BY_GMRES if few else MOST_SETTLED, None if hierarchical else problem.mesh.pairs.interface,
+        settling.most_pairs, problem.mesh.pairs.interface if settling.with_neighbours else None,
         problem.laws.follows | ~linear, varying=not bool(linear.all()), sweeps=sweeps,
     )
 
@@ -203,7 +195,7 @@ def _pivot(
     """
     problem = hold.problem
     judge = _make_judge(problem, solved, search.caution)
-    if isinstance(tangent, KrylovTangent) and search.may_sweep():
+    if search.may_sweep():
         swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
         if swept.fingerprint() != modes.fingerprint():
             search.swept = True
@@ -227,7 +219,7 @@ def _pivot(
         return follow_leaders(problem.laws, ModeState(mode, sign))
 
     def settle() -> Settled:
-        if is_nearby(tangent) and len(group) > MOST_ASKED:
+        if tangent.settling.nearby and len(group) > MOST_ASKED:
             return settle_parts(subset, response, search.proposal.modes, group, judge)
         return settle_subset(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
@@ -241,7 +233,7 @@ def _pivot(
     if found.modes is None:
         return None
     settled = complete(found.modes)
-    if is_nearby(tangent) and settled.fingerprint() == modes.fingerprint():
+    if tangent.settling.nearby and settled.fingerprint() == modes.fingerprint():
         return None  # what is near says otherwise than the whole model did
     return settled
 

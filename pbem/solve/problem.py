@@ -1,20 +1,19 @@
-"""One discretised problem on the ranks: its operator, its constraints, and residuals."""
+"""One discretised problem on the ranks: its system of equations, its constraints, and residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pbem.bem.hierarchical import HierarchicalOperator
-from pbem.bem.operator import Block, RowOperator
-from pbem.bem.pointwise import PointRows
+from pbem.bem.interior import Values
+from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.custom import asked_by_one_rank
@@ -29,7 +28,7 @@ from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
 from pbem.model.support import FreeMotion, find_plane_translations
 from pbem.parallel import do_on_first, gather_parts, norm_of_parts
-from pbem.solve.groups import Group
+from pbem.solve.tangent import AnyTangent
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -37,17 +36,62 @@ Complex = NDArray[np.complex128]
 T = TypeVar("T")
 
 
+class InteriorRows(Protocol):
+    """The elastic field at this rank's interior points, from its values on the boundary."""
+
+    def evaluate(self, displacement: Complex, traction: Complex) -> Values:
+        """Displacement and stress at the points; displacement and traction (nodes,), jumps on cracks.
+
+        Zero at points on the boundary, NaN outside. All ranks call this together.
+        """
+
+
+class System(Protocol):
+    """The integral equations B v = 0 of all collocation points, each rank with its rows; anchors are in them for good.
+
+    What the solution asks of them, however they are stored (pbem.solve.dense_system, pbem.solve.hierarchical_system):
+    the system is chosen in pbem.solve.choice, and nowhere else is it asked which it is. All ranks call all methods
+    together.
+    """
+
+    @property
+    def nodes(self) -> Integer:
+        """The collocation points (k,) whose equations this rank holds, rising."""
+
+    @property
+    def tolerance(self) -> float:
+        """Relative error of products with B that the user allows; 0 where they are exact to rounding."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know of it."""
+
+    @property
+    def stored(self) -> int:
+        """Bytes of this rank's matrices that a product reads."""
+
+    def apply(self, v: Real) -> Real:
+        """This rank's rows (2 k,) of B v, lengths, for v (4 nodes,)."""
+
+    def recover(self, v: Real) -> Real:
+        """This rank's part of the mean displacement of both faces at the crack nodes, by components.
+
+        The parts of all ranks, one after the other, are those of all crack nodes in mesh order.
+        """
+
+    def make_tangent(self, problem: Problem) -> AnyTangent:
+        """The tangent operator K = B M of the problem whose system it is."""
+
+    def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> InteriorRows:
+        """What evaluates the elastic field at this rank's points (q,) inside."""
+
+
 @dataclass(frozen=True)
 class Problem:
-    """What stays the same through a run; equal on all ranks but for `operator`, which holds this rank's rows.
+    """What stays the same through a run; equal on all ranks but for `system`, which holds this rank's rows.
 
     traction_scale: modulus/length, the unit of traction unknowns. equation_scale (nodes,): factors of the equations.
-    crack_rows, crack_nodes: this rank's share of the rows that recover the mean displacement of crack faces; of the
-    hierarchical operator crack_points take their place.
-    anchors: in the operator, for good; anchored: the free motions for which they were made.
-    block_columns: for every block of a dense operator, the unknowns on which its region depends.
-    groups: this rank's groups of elements, of the hierarchical operator; widen_groups makes them with so many
-    times as many around them. notes: what the user should know of it.
+    anchors: in the system, for good; anchored: the free motions for which they were made.
     """
 
     comm: MPI.Intracomm
@@ -55,18 +99,11 @@ class Problem:
     mesh: Mesh
     outer: OuterNodes
     laws: PairLaws
-    operator: RowOperator | HierarchicalOperator
-    crack_rows: tuple[Block, ...]
-    crack_nodes: Integer
+    system: System
     traction_scale: float
     equation_scale: Real
-    block_columns: tuple[Integer, ...]
     anchors: tuple[Anchor, ...]
     anchored: tuple[FreeMotion, ...]
-    crack_points: PointRows | None = None
-    groups: tuple[Group, ...] = ()
-    widen_groups: Callable[[int], tuple[Group, ...]] | None = None
-    notes: tuple[str, ...] = ()
 
     @property
     def unknowns(self) -> int:
@@ -138,9 +175,9 @@ class Problem:
 
         released (a, r): combinations of the anchors that do not act.
         """
-        own = self.operator.nodes
+        own = self.system.nodes
         far = np.where(self.mesh.traction_equation[own], load.far[1, own], load.far[0, own]) * self.equation_scale[own]
-        result: Real = self.operator.apply(v - load.known) - np.stack([far.real, far.imag], axis=1).ravel()
+        result: Real = self.system.apply(v - load.known) - np.stack([far.real, far.imag], axis=1).ravel()
         return result - self.find_released(v - load.known, released)
 
     def find_released(self, v: Real, released: Real | None) -> Real | float:
@@ -154,7 +191,7 @@ class Problem:
     @cached_property
     def anchor_parts(self) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
         """Patterns (this rank's rows, a) and functionals (a, 4 nodes) of the anchors: B contains their product."""
-        count, own = len(self.anchors), self.operator.nodes
+        count, own = len(self.anchors), self.system.nodes
         pattern = sparse.lil_matrix((2 * len(own), count))
         functional = sparse.lil_matrix((count, 4 * self.mesh.nodes))
         for number, anchor in enumerate(self.anchors):
@@ -175,12 +212,9 @@ class Problem:
 
         (theory, 13)
         """
-        elastic = v - load.known
-        part = np.zeros(2 * len(self.crack_nodes))
-        for block in self.crack_rows:
-            part[block.rows] = block.matrix @ elastic[block.columns]
-        if self.crack_points is not None:
-            mean = self.crack_points.displacement(elastic)
-            part[0::2], part[1::2] = mean.real, mean.imag
-        whole = gather_parts(self.comm, part)
+        whole = gather_parts(self.comm, self.system.recover(v - load.known))
         return whole[0::2] + 1j * whole[1::2] + load.background[self.all_crack_nodes]
+
+    def make_tangent(self) -> AnyTangent:
+        """The tangent operator that belongs to the system."""
+        return self.system.make_tangent(self)

@@ -12,13 +12,15 @@ so that the factors are those of the body without its cracks, whatever becomes o
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from pbem.bem.operator import Block, RowOperator
 from pbem.parallel import gather_parts
-from pbem.solve.linear import LinearSolver, Method
+from pbem.solve.linear import LinearSolver, choose_method
 from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]
@@ -76,16 +78,25 @@ def take_rows(matrix: Real, rows: Integer) -> Real:
     return matrix[rows]
 
 
+@dataclass(frozen=True)
+class TangentRows:
+    """This rank's rows of B, and for every block the unknowns (rising) on which it depends in any modes."""
+
+    operator: RowOperator
+    block_unknowns: tuple[Integer, ...]
+
+
 class Reference:
     """Holds the factors of a K0, and the constraint map with which products are taken (`present`).
 
-    eliminated (k,): crack pairs whose unknowns are eliminated; every M0 holds them in stick without joints.
+    rows: of B, and the unknowns on which they can depend. eliminated (k,): crack pairs whose unknowns are eliminated;
+    every M0 holds them in stick without joints.
     """
 
-    def __init__(self, problem: Problem, method: Method, eliminated: Integer | None = None) -> None:
-        assert isinstance(problem.operator, RowOperator)
-        self.problem, self.operator = problem, problem.operator
-        nodes = problem.mesh.pairs.slot[[] if eliminated is None else eliminated]
+    def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer) -> None:
+        self.problem, self.operator, self.block_unknowns = problem, rows.operator, rows.block_unknowns
+        method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
+        nodes = problem.mesh.pairs.slot[eliminated]
         kept = np.ones(problem.unknowns, dtype=bool)
         kept.reshape(-1, 2)[nodes] = False
         self.kept, self.number = kept, np.cumsum(kept) - 1
@@ -108,8 +119,8 @@ class Reference:
         Raises ConvergenceError ("singular tangent", "linear solver").
         """
         self.present = constraints
-        problem, kept = self.problem, self.kept
-        chosen = [columns[kept[columns]] for columns in problem.block_columns]
+        kept = self.kept
+        chosen = [columns[kept[columns]] for columns in self.block_unknowns]
         wanted = [np.flatnonzero(kept[self.own][block.rows]) for block in self.operator.blocks]
         if self.solver.method == "lu":
             self._fill_dense(constraints, wanted)

@@ -20,7 +20,8 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem
-from pbem.solve.tangent import AnyTangent, Solved, describe_residual, select_states, size_residual
+from pbem.solve.response import select_states
+from pbem.solve.tangent import AnyTangent, Solved, describe_residual, size_residual
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
@@ -32,7 +33,7 @@ MOST_CORRECTIONS = 2
 COLUMNS_AT_ONCE = 512
 
 
-class ReleasedTangent:
+class ReleasedTangent(AnyTangent):
     """Another tangent operator, whose solutions it frees from the anchors that a constraint map releases."""
 
     def __init__(self, problem: Problem, anchored: AnyTangent) -> None:
@@ -114,7 +115,7 @@ class ReleasedTangent:
         result = np.empty((len(unknowns), len(unknowns)))
         for first in range(0, len(unknowns), COLUMNS_AT_ONCE):
             some = states[:, first : first + COLUMNS_AT_ONCE]
-            change = self.anchored.solve_forces(constraints, load, law, self.problem.operator.apply(-some))
+            change = self.anchored.solve_forces(constraints, load, law, self.problem.system.apply(-some))
             whole = self._complete(change, constraints.matrix @ change + some, constraints)
             result[:, first : first + COLUMNS_AT_ONCE] = whole[unknowns]
         return result

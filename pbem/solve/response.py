@@ -9,6 +9,7 @@ from pbem.contact.complementarity import Response
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
+from pbem.mesh.numbering import number_components
 from pbem.solve.problem import Problem
 from pbem.solve.tangent import AnyTangent, Solved
 
@@ -44,3 +45,15 @@ def complete_states(tangent: Real, traction_scale: float) -> Real:
     units = np.array([traction_scale, traction_scale, 1.0, 1.0])
     further: Real = np.linalg.svd(tangent / units[:, None])[0][:, :, 2:] * units[:, None]
     return further
+
+
+def select_states(
+    problem: Problem, load: Load, law: Linearisation, pairs: Integer, directions: Real
+) -> tuple[Real, Integer]:
+    """v (4 nodes, 2 s) of offsets of pairs (s,) along directions (s, 4, 2), and the pairs' own unknowns (2 s,)."""
+    spread = np.zeros_like(law.tangent)
+    spread[pairs] = directions
+    matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
+    unknowns = number_components(problem.mesh.pairs.slot[pairs])
+    # The carriers' displacements are columns of their own: those of the pairs' unknowns are their states alone.
+    return matrix[:, unknowns].toarray(), unknowns

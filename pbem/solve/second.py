@@ -19,10 +19,9 @@ from pbem.parallel import StopSignals, do_on_first
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.beside import Beside
 from pbem.solve.hold import Hold
-from pbem.solve.krylov import make_tangent
-from pbem.solve.march import describe_step
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
+from pbem.solve.recovery import describe_step
 from pbem.solve.step import ContactState, SilentReporter, Step
 from pbem.solve.tangent import AnyTangent
 from pbem.solve.watch import Watch
@@ -38,7 +37,7 @@ class SecondSolution:
         """
         self.beside = beside
         self.problem: Problem = assemble_problem(beside.model, beside.mesh, comm)
-        self.tangent: AnyTangent = make_tangent(self.problem)
+        self.tangent: AnyTangent = self.problem.make_tangent()
         self.memory: Memory = start_memory(self.problem.laws)
         self._watch = Watch(comm, SilentReporter(), StopSignals())
         self._watch.look_after(self.problem.laws)

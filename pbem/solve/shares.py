@@ -13,6 +13,12 @@ Integer = NDArray[np.int64]
 BLOCK = 64
 
 
+def cut_equally(numbers: Integer, comm: MPI.Intracomm) -> Integer:
+    """This rank's part of numbers (k,), all parts of the same size but for one."""
+    cuts = np.linspace(0, len(numbers), comm.size + 1).astype(int)
+    return numbers[cuts[comm.rank] : cuts[comm.rank + 1]]
+
+
 def change_shares(comm: MPI.Intracomm, part: Real, old: Integer, new: Integer) -> Real:
     """This rank's rows (old[rank], ...) in other shares (new[rank], ...); rows keep their order over the ranks."""
     if np.array_equal(old, new):
@@ -45,3 +51,25 @@ def find_own_blocks(count: int, comm: MPI.Intracomm, across: bool = False) -> In
     wide = comm.size // down
     ranks, own = (wide, comm.rank % wide) if across else (down, comm.rank // wide)
     return np.flatnonzero(np.arange(count) // BLOCK % ranks == own)
+
+
+def refuse_shares(nodes: int, ranks: int, lu: bool) -> str | None:
+    """What to say when the dense operator of so many nodes cannot be shared; None if it can. lu: by ScaLAPACK."""
+    if fits_ranks(nodes, ranks, lu):
+        return None
+    most = next(fewer for fewer in range(ranks, 0, -1) if fits_ranks(nodes, fewer, lu))
+    if nodes < ranks:
+        found = f"the model has {nodes} nodes, fewer than the {ranks} ranks"
+    else:
+        found = f"ScaLAPACK cannot share the {2 * nodes} rows of the dense matrix equally among {ranks} ranks"
+    other = ", or solver.linear = \"mumps\"" if nodes >= ranks else ""
+    return f"{found}; start at most {most}{other}, or solver.operator = \"hierarchical\""
+
+
+def fits_ranks(nodes: int, ranks: int, lu: bool) -> bool:
+    """Whether every rank gets a node, and ScaLAPACK's blocks of rows are the same on all ranks but the last.
+
+    PETSc's ScaLAPACK matrices must have a block of ceil(rows / ranks) rows on each rank, the last one what is left.
+    """
+    block = -(-2 * nodes // ranks)
+    return ranks == 1 or (nodes >= ranks and (not lu or (ranks - 1) * block <= 2 * nodes))

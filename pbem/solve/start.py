@@ -17,8 +17,8 @@ from pbem.errors import LaunchError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import broadcast, describe_library, gather_by_node, refuse_together
-from pbem.solve.assembly import is_hierarchical
-from pbem.solve.linear import PETSc, choose_method
+from pbem.solve.choice import choose_system
+from pbem.solve.linear import PETSc
 
 # The library itself, not its Fortran and C++ parts: libmpi.so.40, libmpich.so.12, libmpi_cray.so.12.
 MPI_LIBRARY = re.compile(r"/lib(mpi|mpich|mpi_cray|mpi_gnu_\d+|mpigcc|mpi_abi|msmpi)\.so[.\d]*$")
@@ -100,31 +100,6 @@ def refuse_libraries(found: Libraries, world: int) -> str | None:
 
 def check_shares(model: Model, mesh: Mesh, ranks: int) -> None:
     """Raise LaunchError if the model is too small for so many ranks; decided alike on all of them."""
-    if is_hierarchical(model, mesh):
-        return
-    lu = choose_method(model.solver.linear, len(mesh.region_names)) == "lu"
-    refusal = refuse_shares(mesh.nodes, ranks, lu)
+    refusal = choose_system(model, mesh).refuse_ranks(model, mesh, ranks)
     if refusal:
         raise LaunchError(refusal)
-
-
-def refuse_shares(nodes: int, ranks: int, lu: bool) -> str | None:
-    """What to say when the dense operator of so many nodes cannot be shared; None if it can. lu: by ScaLAPACK."""
-    if fits_ranks(nodes, ranks, lu):
-        return None
-    most = next(fewer for fewer in range(ranks, 0, -1) if fits_ranks(nodes, fewer, lu))
-    if nodes < ranks:
-        found = f"the model has {nodes} nodes, fewer than the {ranks} ranks"
-    else:
-        found = f"ScaLAPACK cannot share the {2 * nodes} rows of the dense matrix equally among {ranks} ranks"
-    other = ", or solver.linear = \"mumps\"" if nodes >= ranks else ""
-    return f"{found}; start at most {most}{other}, or solver.operator = \"hierarchical\""
-
-
-def fits_ranks(nodes: int, ranks: int, lu: bool) -> bool:
-    """Whether every rank gets a node, and ScaLAPACK's blocks of rows are the same on all ranks but the last.
-
-    PETSc's ScaLAPACK matrices must have a block of ceil(rows / ranks) rows on each rank, the last one what is left.
-    """
-    block = -(-2 * nodes // ranks)
-    return ranks == 1 or (nodes >= ranks and (not lu or (ranks - 1) * block <= 2 * nodes))

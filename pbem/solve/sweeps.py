@@ -10,7 +10,7 @@ solution of the whole model, which begins from the states that go with them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +19,10 @@ from scipy.spatial import cKDTree
 
 from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
-from pbem.contact.laws import Memory, ModeState, PairLaws, PairState, follow_leaders, plastic_slip
+from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.local_laws import solve_laws
-from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, Proposal, linearise
+from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
 from pbem.parallel import add_up
@@ -30,12 +30,10 @@ from pbem.solve.elimination import take_blocks
 from pbem.solve.groups import Group, find_nearest
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
-from pbem.solve.tangent import Solved
+from pbem.solve.tangent import Judge, Solved
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
-# The modes that states of some pairs ask for: of their laws, modes, states, memory and pressure.
-Judge = Callable[[PairLaws, ModeState, PairState, Memory, Real], Proposal]
 
 # The groups of a network are divided into parts of so many elements at most, which settle with the elements nearest to
 # them, so many times as many: what they take grows with the square of these numbers.
@@ -58,7 +56,9 @@ class Sweeps:
     Group j has those from first[j] to first[j + 1], and their stiffness (see pbem.contact.local_laws).
     """
 
-    def __init__(self, problem: Problem, preconditioner: SchwarzPreconditioner, load: Load) -> None:
+    def __init__(
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Iterable[Group], load: Load
+    ) -> None:
         self._problem, mesh = problem, problem.mesh
         self._jumps = _free(problem, ~problem.laws.follows)
         constraints = problem.constrain(self._jumps, load)
@@ -66,12 +66,12 @@ class Sweeps:
         # The tractions of a crack's pair are in its own node's equations alone.
         own_equations = take_blocks((preconditioner.free @ closed.matrix).tocsr(), mesh.nodes)[mesh.pairs.slot]
         self._softness = np.linalg.inv(own_equations)
-        self._held = np.flatnonzero(np.isin(mesh.pairs.slot, problem.operator.nodes))
+        self._held = np.flatnonzero(np.isin(mesh.pairs.slot, problem.system.nodes))
         pair_of_node = np.full(mesh.nodes, -1)
         pair_of_node[mesh.pairs.slot] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
         pairs, owned = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=bool)]
         self._stiffness = []
-        for own, around in _divide(mesh, problem.groups):
+        for own, around in _divide(mesh, groups):
             near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (around, own))
             if not len(inside):
                 continue
@@ -157,7 +157,7 @@ class Sweeps:
         unknowns[mesh.pairs.slot] = np.where(problem.laws.follows[:, None], 0.0, jumps)
         v = problem.constrain(self._jumps, load).evaluate(unknowns.ravel())
         equations = problem.apply(v, load, constraints.released).reshape(-1, 2)
-        place = np.searchsorted(problem.operator.nodes, mesh.pairs.slot[self._held])
+        place = np.searchsorted(problem.system.nodes, mesh.pairs.slot[self._held])
         result = np.zeros((mesh.pairs.count, 2))
         result[self._held] = -(self._softness[self._held] @ equations[place][..., None])[..., 0]
         return add_up(problem.comm, result)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -9,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.laws import Memory, ModeState, PairLaws, PairState
 from pbem.contact.loads import Load
-from pbem.contact.modes import Linearisation
+from pbem.contact.modes import Linearisation, Proposal
 from pbem.errors import ConvergenceError
-from pbem.mesh.numbering import number_components
-from pbem.solve.problem import Problem
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
+# The modes that states of some pairs ask for: of their laws, modes, states, memory and pressure.
+Judge = Callable[[PairLaws, ModeState, PairState, Memory, Real], Proposal]
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,31 @@ class Solved:
     linear_iterations: int = 0
 
 
+# The most pairs that are settled together where their responses cost little.
+MOST_SETTLED = 600
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How pairs can be settled together by the responses of a tangent operator.
+
+    most_pairs: so many at most. with_neighbours: whether the pairs beside them may join them, as more cost little.
+    nearby: whether many are answered for by what is near to them alone, so that a solution of the whole has to judge
+    their modes; and whether groups of neighbouring elements can settle by themselves (`sweep`).
+    """
+
+    most_pairs: int
+    with_neighbours: bool
+    nearby: bool
+
+
 class AnyTangent(Protocol):
     """Solves the linear systems of Newton's method; all ranks call it together and get the same."""
+
+    @property
+    def settling(self) -> Settling:
+        """How pairs can be settled together."""
+        return Settling(MOST_SETTLED, with_neighbours=True, nearby=False)
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
         """Solve B (M x + m) = 0 for the constraint map of linearised laws.
@@ -63,6 +88,13 @@ class AnyTangent(Protocol):
         After `solve` with the same constraints. Raises ConvergenceError: "singular tangent", "linear solver".
         """
 
+    def sweep(
+        self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
+        solved: Solved, judge: Judge,
+    ) -> ModeState:
+        """Modes (m,) on which groups of elements settle by themselves; those that there are where none do."""
+        return modes
+
     def destroy(self) -> None:
         """Free the storage."""
 
@@ -87,15 +119,3 @@ def describe_residual(residual: float, tolerance: float) -> ConvergenceError:
         f"the linear system is solved only to a relative residual of {residual:.1e} (asked: {tolerance:.1e}); "
         "a body is probably free to move in its present contact",
     )
-
-
-def select_states(
-    problem: Problem, load: Load, law: Linearisation, pairs: Integer, directions: Real
-) -> tuple[Real, Integer]:
-    """v (4 nodes, 2 s) of offsets of pairs (s,) along directions (s, 4, 2), and the pairs' own unknowns (2 s,)."""
-    spread = np.zeros_like(law.tangent)
-    spread[pairs] = directions
-    matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
-    unknowns = number_components(problem.mesh.pairs.slot[pairs])
-    # The carriers' displacements are columns of their own: those of the pairs' unknowns are their states alone.
-    return matrix[:, unknowns].toarray(), unknowns

@@ -44,8 +44,9 @@ def assemble_tangent(problem: Problem, modes: ModeState | None = None) -> Real:
     """K = B M (2 nodes, 2 nodes) for given modes, by default those before any load."""
     constraints = problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 0.0))
     tangent = np.zeros((problem.unknowns, problem.unknowns))
-    for block, columns in zip(problem.operator.blocks, problem.block_columns, strict=True):
-        tangent[np.ix_(block.rows, columns)] = problem.operator.multiply_block(block, constraints.matrix, columns)
+    system = problem.system
+    for block, columns in zip(system.operator.blocks, system.block_unknowns, strict=True):
+        tangent[np.ix_(block.rows, columns)] = system.operator.multiply_block(block, constraints.matrix, columns)
     return tangent
 
 

@@ -49,7 +49,7 @@ reference = Reference(problem, method)
 sizes = []
 LinearSolver.factorise = lambda self: sizes.append(self.matrix.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_allocated"] * 8)
 reference.form(problem.constrain(law, load).matrix)
-blocks = [*problem.operator.blocks, *problem.crack_rows]
+blocks = [*problem.system.operator.blocks, *problem.system.crack_rows]
 dense = sum(block.matrix.nbytes for block in blocks)
 (matrix,) = sizes
 rest = sum(array.nbytes for array in list_arrays(problem, set())) - dense

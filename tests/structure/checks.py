@@ -29,6 +29,26 @@ DOORS = {
     "matplotlib": ("results",),
 }
 
+# The systems of equations and what they are made of: asking an object which of them it is belongs to none ...
+KINDS = (
+    "RowOperator", "HierarchicalOperator", "DenseSystem", "HierarchicalSystem", "DenseChoice", "HierarchicalChoice",
+    "CondensedTangent", "FactoredTangent", "ReleasedTangent", "KrylovTangent",
+)
+# ... and their classes are known to those alone that make them, beside the modules that define them.
+MAKERS = {
+    "DenseSystem": ("pbem.solve.choice",),
+    "HierarchicalSystem": ("pbem.solve.choice",),
+    "DenseChoice": (),
+    "HierarchicalChoice": (),
+    "CondensedTangent": ("pbem.solve.dense_system",),
+    "FactoredTangent": ("pbem.solve.dense_system",),
+    "ReleasedTangent": ("pbem.solve.dense_system",),
+    "KrylovTangent": ("pbem.solve.hierarchical_system",),
+}
+
+# What objects of these kinds are called.
+HELD = ("system", "tangent", "operator", "problem")
+
 FORBIDDEN_NAME = "mu"  # friction coefficient, shear modulus or measure? friction_coefficient, shear_modulus
 VAGUE_WORDS = {"util", "utils", "helper", "helpers", "manager", "managers"}
 MOST_LINES = 400
@@ -125,6 +145,32 @@ def check_doors(module: Module) -> list[str]:
         for line, name in list_imports(module)
         if (library := name.split(".")[0]) in DOORS and module.part not in DOORS[library]
     ]
+
+
+def check_questions(module: Module) -> list[str]:
+    """No module asks which system of equations or tangent operator it has before it, and only makers know them."""
+    faults = []
+    for node in ast.walk(module.tree):
+        match node:
+            case ast.Call(func=ast.Name(id="isinstance" | "issubclass"), args=[_, kind]):
+                asked = {name.id for name in ast.walk(kind) if isinstance(name, ast.Name)}
+                asked |= {name.attr for name in ast.walk(kind) if isinstance(name, ast.Attribute)}
+                faults += [f"{module.path}:{node.lineno}: asks for {name}" for name in sorted(asked & {*KINDS})]
+            case ast.Call(func=ast.Name(id="getattr" | "hasattr"), args=[held, *_]) if _ends_in(held, HELD):
+                faults.append(f"{module.path}:{node.lineno}: asks what {ast.unparse(held)} has")
+            case ast.Compare(left=left, comparators=[right]) if _ends_in(left, KINDS) or _ends_in(right, KINDS):
+                faults.append(f"{module.path}:{node.lineno}: compares types")
+    faults += [
+        f"{module.path}:{line}: {name} is made in {' and '.join(MAKERS[kind]) or 'its own module'} only"
+        for line, name in list_imports(module)
+        if (kind := name.rpartition(".")[2]) in MAKERS and module.name not in MAKERS[kind]
+    ]
+    return faults
+
+
+def _ends_in(node: ast.expr, names: tuple[str, ...]) -> bool:
+    """Whether an expression is a name, or an attribute, of these."""
+    return (isinstance(node, ast.Name) and node.id in names) or (isinstance(node, ast.Attribute) and node.attr in names)
 
 
 def check_names(module: Module) -> list[str]:

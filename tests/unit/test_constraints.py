@@ -138,7 +138,7 @@ def test_columns_outside_the_blocks_are_never_touched(problem: Problem) -> None:
         modes = ModeState(random.integers(0, 3, count).astype(np.int8), np.ones(count))
         law, load = linearise_pairs(problem, modes, -1.0), problem.evaluate_load(0, 1.0)
         matrix = problem.constrain(law, load).matrix
-        for block, columns in zip(problem.operator.blocks, problem.block_columns, strict=True):
+        for block, columns in zip(problem.system.operator.blocks, problem.system.block_unknowns, strict=True):
             left_out = np.setdiff1d(np.arange(problem.unknowns), columns)
             own = mesh.node_region == block.region
             rows = np.flatnonzero(np.tile(np.repeat(own, 2), 2))

@@ -11,7 +11,6 @@ from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import make_tangent
 from pbem.solve.problem import Problem
 from tests.identities.solving import assemble_tangent, linearise_pairs
 from tests.unit.far_sample import read_sample
@@ -31,7 +30,7 @@ def draw_modes(count: int) -> ModeState:
 def test_eliminated_unknowns_follow_from_their_own_nodes_equations(name: str) -> None:
     problem = assemble(name, "hierarchical")
     modes = draw_modes(problem.mesh.pairs.count) if name in ("cracks", "infinite") else None
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     tangent.preconditioner.update(problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 0.0)))
     less = tangent.preconditioner._less
     exact = assemble_tangent(assemble(name, "dense"), modes)
@@ -53,7 +52,7 @@ def test_eliminated_unknowns_follow_from_their_own_nodes_equations(name: str) ->
 def test_sticking_cracks_leave_nothing_slipping_ones_half_and_open_ones_all() -> None:
     problem = assemble("cracks", "hierarchical")
     count, nodes = problem.mesh.pairs.count, problem.mesh.pairs.slot
-    preconditioner = make_tangent(problem).preconditioner
+    preconditioner = problem.make_tangent().preconditioner
     for mode, eliminated in ((STICK, 2), (SLIP, 1), (OPEN, 0)):
         modes = ModeState(np.full(count, mode, dtype=np.int8), np.ones(count))
         preconditioner.update(problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 0.0)))
@@ -65,7 +64,7 @@ def test_sticking_cracks_leave_nothing_slipping_ones_half_and_open_ones_all() ->
 
 def test_tractions_of_interfaces_are_not_eliminated_as_both_regions_feel_them() -> None:
     problem = assemble("inclusions", "hierarchical")
-    preconditioner = make_tangent(problem).preconditioner
+    preconditioner = problem.make_tangent().preconditioner
     preconditioner.update(problem.constrain(linearise_pairs(problem), problem.evaluate_load(0, 0.0)))
     assert not preconditioner._less.local.any()
 
@@ -74,6 +73,6 @@ def test_a_pair_with_an_elastic_joint_keeps_its_tractions() -> None:
     problem = assemble("cracks", "hierarchical")
     soft = np.full(problem.mesh.pairs.count, 1e-3)
     problem = replace(problem, laws=replace(problem.laws, compliance_n=soft, compliance_s=soft))
-    preconditioner = make_tangent(problem).preconditioner
+    preconditioner = problem.make_tangent().preconditioner
     preconditioner.update(problem.constrain(linearise_pairs(problem), problem.evaluate_load(0, 0.0)))
     assert not preconditioner._less.local.any()

@@ -21,7 +21,8 @@ from pbem.environment import (
     refuse_threads,
 )
 from pbem.solve.linear import share_equally
-from pbem.solve.start import Libraries, find_mpi_libraries, fits_ranks, refuse_libraries, refuse_shares
+from pbem.solve.shares import fits_ranks, refuse_shares
+from pbem.solve.start import Libraries, find_mpi_libraries, refuse_libraries
 
 BATCH = {"SLURM_JOB_ID": "7", "SLURM_NTASKS": "8", "SLURM_NPROCS": "8", "SLURM_PROCID": "0", "SLURM_LOCALID": "0"}
 STEP = BATCH | {"SLURM_STEP_ID": "0", "SLURM_STEP_NUM_TASKS": "8", "SLURM_PROCID": "3"}

@@ -16,7 +16,7 @@ from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve import groups
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.linear import petsc_options
 from pbem.solve.step import SilentReporter, Step
 from tests.cli.cli_sample import BLOCKS
@@ -165,7 +165,7 @@ def test_the_users_tolerance_of_gmres_is_taken(many_groups: None) -> None:
     counts = []
     for given, least, most in ((None, 0.0, 1e-9), ("1e-2", 1e-5, 0.1), ("1e-12", 0.0, 1e-11)):
         with petsc_options({} if given is None else {"ksp_rtol": given}):
-            tangent = make_tangent(problem)
+            tangent = problem.make_tangent()
         assert isinstance(tangent, KrylovTangent)
         if given == "1e-2":  # Newton's method wants more
             with pytest.raises(pbem.ConvergenceError, match=r"asked: 1.0e-09\); the option ksp_rtol = 0.01"):
@@ -217,7 +217,7 @@ def solve_once(text: str) -> KrylovTangent:
     """The tangent operator after the first linear system."""
     model = read(text)
     problem = assemble_problem(model, generate_mesh(model), world)
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent)
     load = problem.evaluate_load(0, 1.0)
     solved = tangent.solve(problem.constrain(linearise_pairs(problem), load), load)
@@ -257,7 +257,7 @@ steps = 1
 
 def test_slender_bodies_are_solved_to_the_true_residual() -> None:
     tangent = solve_once(SLENDER)
-    assert len(tangent.problem.groups) > 5
+    assert len(tangent.problem.system.groups) > 5
     tangent.destroy()
     assert tangent.solution is not None
     # Timoshenko's beam, but for the clamped end.
@@ -268,7 +268,7 @@ def test_slender_bodies_are_solved_to_the_true_residual() -> None:
     # The dense operator has the same tip, up to what such a beam makes of the residual.
     model = read(SLENDER)
     dense = assemble_problem(replace(model, solver=replace(model.solver, operator="dense")), mesh, world)
-    direct, load = make_tangent(dense), dense.evaluate_load(0, 1.0)
+    direct, load = dense.make_tangent(), dense.evaluate_load(0, 1.0)
     law = linearise_pairs(dense)
     exact = direct.solve(dense.constrain(law, load), load, law).unknowns.reshape(-1, 2)
     direct.destroy()
@@ -317,7 +317,7 @@ def test_the_faces_of_a_slit_are_solved_together(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(groups, "CONNECTED_ELEMENTS", 32)
     monkeypatch.setattr(groups, "GROUP_ELEMENTS", 12)
     tangent = solve_once(SLIT)
-    mesh, own = tangent.problem.mesh, tangent.problem.groups
+    mesh, own = tangent.problem.mesh, tangent.problem.system.groups
     assert sum(tangent.iterations) < 35
     assert len(own) > 5 and all(len(np.unique(mesh.curve[group.elements])) == 2 for group in own)
     tangent.destroy()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve import groups
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.nearby import MOST_ASKED, part_by_distance
 from pbem.solve.problem import Problem
 from pbem.solve.response import complete_states
@@ -57,11 +59,11 @@ def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_cracks_that_meet_are_divided_by_place(many_groups: None) -> None:
     problem = assemble()
-    mesh, divided = problem.mesh, [group.elements for group in problem.groups]
+    mesh, divided = problem.mesh, [group.elements for group in problem.system.groups]
     assert sorted(np.concatenate(divided)) == list(range(mesh.elements))
     assert max(len(np.unique(mesh.curve[group])) for group in divided) > 1
     middle = 0.5 * (mesh.start + mesh.end)
-    for group in problem.groups:
+    for group in problem.system.groups:
         assert set(group.around) == set(group.elements) | set(group.nearest)
         gap = np.abs(middle[group.nearest][:, None] - np.concatenate(
             [mesh.start[group.elements], middle[group.elements], mesh.end[group.elements]])).min(axis=1)
@@ -71,7 +73,7 @@ def test_cracks_that_meet_are_divided_by_place(many_groups: None) -> None:
 
 def test_a_solution_begins_from_the_last_one(many_groups: None) -> None:
     problem = assemble()
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
     constraints = problem.constrain(law, load)
     first = tangent.solve(constraints, load, law)
@@ -84,8 +86,8 @@ def test_a_solution_begins_from_the_last_one(many_groups: None) -> None:
 
 def test_nearby_elements_answer_nearly_as_the_whole_model_does(many_groups: None) -> None:
     problem = assemble()
-    tangent = make_tangent(problem)
-    assert isinstance(tangent, KrylovTangent) and tangent.nearby and MOST_ASKED < 16
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and tangent.settling.nearby and MOST_ASKED < 16
     modes = draw_modes(problem.mesh.pairs.count)
     load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
     constraints = problem.constrain(law, load)
@@ -93,7 +95,7 @@ def test_nearby_elements_answer_nearly_as_the_whole_model_does(many_groups: None
     pairs = np.arange(20, 36)
     directions = complete_states(law.tangent[pairs], problem.traction_scale)
     found = tangent.respond(constraints, load, law, pairs, directions)
-    tangent.nearby = False
+    tangent._settling = replace(tangent.settling, nearby=False)
     exact = tangent.respond(constraints, load, law, pairs, directions)
     assert np.abs(found - exact).max() < 0.1 * np.abs(exact).max()
     tangent.destroy()
@@ -113,7 +115,7 @@ def test_pairs_at_the_ends_of_the_comb_are_two_sets() -> None:
 def test_large_groups_are_exact_in_what_is_not_eliminated(many_groups: None) -> None:
     problem = assemble()
     modes = draw_modes(problem.mesh.pairs.count)
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     preconditioner = tangent.preconditioner
     preconditioner.update(problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 0.0)))
     exact = assemble_tangent(assemble("dense"), modes)
@@ -121,7 +123,7 @@ def test_large_groups_are_exact_in_what_is_not_eliminated(many_groups: None) -> 
     found = np.zeros(len(exact))
     preconditioner.apply(residual, found)
     less = preconditioner._less
-    unknowns = (2 * problem.operator.nodes[:, None] + np.arange(2)).ravel()
+    unknowns = (2 * problem.system.nodes[:, None] + np.arange(2)).ravel()
     for inverse in preconditioner.inverses:
         around = inverse.around
         expected = np.linalg.solve(exact[np.ix_(around, around)], residual[around])

@@ -17,7 +17,6 @@ from pbem.model.support import find_free_motions
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.balance import describe_imbalance, measure_balance
-from pbem.solve.choice import make_dense_tangent
 from pbem.solve.hold import Hold
 from pbem.solve.problem import Problem
 from pbem.solve.release import ReleasedTangent
@@ -82,7 +81,7 @@ def test_released_anchors_leave_the_equations_without_them(linear: str, tmp_path
     modes, load = choose_modes(problem, STICK, slice(2, 20)), problem.evaluate_load(0, 1.0)
     law = linearise_pairs(problem, modes)
     constraints = Hold(problem).release(problem.constrain(law, load), modes)
-    tangent = make_dense_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, ReleasedTangent)
     solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
     # The same equations with no anchor ever added.
@@ -110,7 +109,7 @@ def test_anchors_of_motions_that_stay_free_go_on_acting(tmp_path: Path) -> None:
     modes, load = choose_modes(problem, SLIP, slice(0, 24)), problem.evaluate_load(0, 1.0)
     law = linearise_pairs(problem, modes)
     constraints = Hold(problem).release(problem.constrain(law, load), modes)
-    tangent = make_dense_tangent(problem)
+    tangent = problem.make_tangent()
     solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
     support = problem.find_support(modes)
     seen = problem.anchor_parts[1] @ solved.v

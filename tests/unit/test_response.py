@@ -14,7 +14,7 @@ from pbem.contact.modes import linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.response import find_response
 
 CRACKS = """
@@ -54,7 +54,7 @@ def test_the_response_tells_the_states_in_other_modes(text: str, kind: str) -> N
         text = text.replace("ty = -0.3", "ty = -0.5")
     _, model = parse_model(text + options + "\n")
     problem = assemble_problem(model, generate_mesh(model), world)
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent) == (kind == "hierarchical")
     laws, memory, load = problem.laws, start_memory(problem.laws), problem.evaluate_load(0, 1.0)
     random = np.random.default_rng(1)

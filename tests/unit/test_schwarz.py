@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from pbem.bem import hierarchical
+from pbem.case.build import parse_model
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
-from pbem.model.build import parse_model
 from pbem.parallel import world
 from pbem.solve import assembly, groups
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.groups import Group
-from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
 from tests.identities.solving import assemble_tangent, linearise_pairs
@@ -51,7 +51,7 @@ def draw_modes(problem: Problem, seed: int) -> ModeState:
 
 
 def precondition(problem: Problem) -> SchwarzPreconditioner:
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent)
     return tangent.preconditioner
 
@@ -87,7 +87,7 @@ def test_with_one_group_gmres_ends_at_once(name: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(groups, "ONE_GROUP", 10**6)
     shrink_leaves(monkeypatch)
     problem = assemble(name)
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent)
     solved = tangent.solve(constrain(problem), problem.evaluate_load(0, 1.0))
     # The inverse is that of the exact tangent operator, the product has the errors of the expansions.
@@ -115,7 +115,7 @@ def test_a_rotation_that_an_anchor_holds_is_in_the_inverse(x: float) -> None:
     _, model = parse_model(DISC.format(x=x, operator="hierarchical"))
     problem = assemble_problem(model, generate_mesh(model), world)
     assert len(problem.anchors) == 1 and any(motions.interpolated for motions in problem.operator.rigid)
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent)
     solved = tangent.solve(constrain(problem), problem.evaluate_load(0, 1.0))
     assert sum(tangent.iterations) <= 3 and solved.residual <= 1e-9
@@ -130,7 +130,7 @@ def test_a_rotation_that_an_anchor_holds_is_in_the_inverse(x: float) -> None:
 @pytest.mark.parametrize("name", ["cracks", "panel", "infinite", "inclusions"])
 def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) -> None:
     problem = assemble(name)
-    preconditioner, count = precondition(problem), len(problem.groups)
+    preconditioner, count = precondition(problem), len(problem.system.groups)
     residual = np.random.default_rng(2).normal(size=problem.unknowns)
     modes = draw_modes(problem, 5)
     assert preconditioner.update(constrain(problem, modes)) == count > 5
@@ -140,7 +140,7 @@ def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) ->
     affected = preconditioner.update(constrain(problem, changed))
     slot = problem.mesh.node_element[problem.mesh.pairs.slot[0]]
     assert 1 <= affected < count or count < 8
-    assert affected >= sum(slot in group.around for group in problem.groups)
+    assert affected >= sum(slot in group.around for group in problem.system.groups)
     fresh = precondition(problem)
     fresh.update(constrain(problem, changed))
     assert_same(apply(preconditioner, residual), apply(fresh, residual))
@@ -173,7 +173,7 @@ def test_each_group_has_the_exact_rows_of_its_own_tangent(
     assert np.isfinite(found).all(), "every unknown belongs to a group"
     for inverse in preconditioner.inverses:
         local = exact[np.ix_(inverse.around, inverse.around)]
-        at = np.isin(inverse.around, (2 * problem.operator.nodes[:, None] + np.arange(2)).ravel()[inverse.own])
+        at = np.isin(inverse.around, (2 * problem.system.nodes[:, None] + np.arange(2)).ravel()[inverse.own])
         expected = np.linalg.solve(local, residual[inverse.around])[at]
         limit = 1e-14 * np.linalg.cond(local) * np.abs(expected).max()
         np.testing.assert_allclose(found[inverse.own], expected, rtol=0, atol=limit)
@@ -193,7 +193,7 @@ def test_a_group_without_an_inverse_passes_its_residual_on(many_groups: None) ->
     hit = [inverse for inverse in preconditioner.inverses if column in inverse.around]
     assert hit
     for inverse in hit:
-        rows = (2 * problem.operator.nodes[:, None] + np.arange(2)).ravel()[inverse.own]
+        rows = (2 * problem.system.nodes[:, None] + np.arange(2)).ravel()[inverse.own]
         np.testing.assert_array_equal(result[inverse.own], residual[rows])
     preconditioner.update(constraints)
     fresh = precondition(problem)
@@ -205,7 +205,7 @@ def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.Mo
     """With the whole model around every group the preconditioner is the inverse again."""
     problem = assemble("cracks")
     whole = np.arange(problem.mesh.elements)
-    problem = replace(problem, groups=tuple(Group(group.elements, whole) for group in problem.groups[:]))
+    problem = replace(problem, groups=tuple(Group(group.elements, whole) for group in problem.system.groups[:]))
     preconditioner = precondition(problem)
     preconditioner.update(constrain(problem))
     exact = assemble_tangent(assemble("cracks", "dense"))

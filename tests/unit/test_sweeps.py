@@ -17,7 +17,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve import groups, sweeps
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent, make_tangent
+from pbem.solve.krylov import KrylovTangent
 from pbem.solve.march import march
 from pbem.solve.problem import Problem
 from pbem.solve.search import SWEPT, Search
@@ -80,7 +80,7 @@ def test_laws_without_a_solution_have_none() -> None:
 @pytest.mark.parametrize("law", ["friction = 0.4", f"friction = 0.4, {SOFT}"])
 def test_tractions_are_those_of_the_solution_and_of_the_stiffness(many_groups: None, law: str) -> None:
     problem = assemble(write_network(law=law))
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     modes = draw_modes(problem.mesh.pairs.count)
     load, law_now = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
     constraints = problem.constrain(law_now, load)
@@ -104,7 +104,7 @@ def test_tractions_are_those_of_the_solution_and_of_the_stiffness(many_groups: N
 
 def solve_and_sweep(problem: Problem, modes: ModeState) -> tuple[ModeState, Real]:
     """The modes and states that follow from the solution in some modes under the whole load."""
-    tangent = make_tangent(problem)
+    tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent)
     load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
     constraints = problem.constrain(law, load)
@@ -136,7 +136,7 @@ def test_one_group_finds_the_modes_of_the_whole(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(groups, "ONE_GROUP", 10**6)
     monkeypatch.setattr(sweeps, "MOST_STEPS", 50)
     problem = assemble(write_network())
-    assert len(problem.groups) == 1
+    assert len(problem.system.groups) == 1
     (step,) = march(problem, SilentReporter())
     settled, states = solve_and_sweep(problem, start_memory(problem.laws).modes)
     np.testing.assert_array_equal(settled.mode, step.contact.mode)

@@ -12,7 +12,7 @@ import numpy as np
 from pbem.case.build import parse_model
 from pbem.contact import laws
 from pbem.errors import ConvergenceError
-from pbem.solve import newton, search
+from pbem.solve import search, tangent
 from pbem.solve.step import OPEN, SLIP, STICK, ContactState
 from tests.verification.proofs.proof import (
     Outcome,
@@ -126,14 +126,14 @@ def solve_stiffly(text: str, factor: float, most_pivoted: int) -> Solved | str:
 
     most_pivoted: pairs; with 0 the search makes plain Newton steps only.
     """
-    usual = laws.SOFTNESS, newton.MOST_SETTLED, search.CAUTIONS
-    laws.SOFTNESS, newton.MOST_SETTLED, search.CAUTIONS = factor * usual[0], most_pivoted, usual[2][:1]
+    usual = laws.SOFTNESS, tangent.MOST_SETTLED, search.CAUTIONS
+    laws.SOFTNESS, tangent.MOST_SETTLED, search.CAUTIONS = factor * usual[0], most_pivoted, usual[2][:1]
     try:
         return solve_model(parse_model(text)[1])
     except ConvergenceError as error:
         return error.reason
     finally:
-        laws.SOFTNESS, newton.MOST_SETTLED, search.CAUTIONS = usual
+        laws.SOFTNESS, tangent.MOST_SETTLED, search.CAUTIONS = usual
 
 
 def stiff_trials(factor: float) -> Outcome:
@@ -141,7 +141,7 @@ def stiff_trials(factor: float) -> Outcome:
     text = write_field(1, FEW)
     usual = solve_text(text)
     assert solve_stiffly(text, factor, 0) == "mode cycle"
-    solved = solve_stiffly(text, factor, newton.MOST_SETTLED)
+    solved = solve_stiffly(text, factor, tangent.MOST_SETTLED)
     if isinstance(solved, str):
         return Outcome(1.0, usual.unknowns, solved)
     other = float((solved.last.contact.mode != usual.last.contact.mode).mean())

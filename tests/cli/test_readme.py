@@ -48,9 +48,9 @@ def run_python(text: str, folder: Path) -> list[str]:
 def test_all_snippets_are_found() -> None:
     # Else the tests below could pass because they look at nothing.
     assert set(FILES) == {"first.toml", "limited_friction.py"}
-    assert (len(SNIPPETS), len(FRAGMENTS)) == (2, 1)
+    assert (len(SNIPPETS), len(FRAGMENTS)) == (3, 1)
     whole = "".join(TEXTS)
-    assert whole.count("```python") == 4 and whole.count("```toml") == 2
+    assert whole.count("```python") == 5 and whole.count("```toml") == 2
     assert len(COMMANDS) == sum(text.count("\n") for language, text in BLOCKS if language == "sh") > 10
 
 
@@ -76,6 +76,15 @@ def test_the_crack_has_the_classical_stress_intensity(folder: Path) -> None:
     lines = run_python(find_snippet("griffith.toml"), folder)
     start, end = (float(number) for number in lines[0].strip("[]").split())
     assert start == pytest.approx(end, rel=1e-9) == pytest.approx(3.14159265**0.5, rel=1e-4)
+
+
+def test_the_crack_made_in_python_has_the_stress_intensity_of_its_friction(folder: Path) -> None:
+    for line in run_python(find_snippet("pbem.Case("), folder):
+        friction, start, end = (float(number) for number in re.findall(r"[-\d.e]+", line))
+        driving = 0.5 * (1 - friction)  # shear less friction on the crack
+        expected = driving * (3.14159265 * 0.7 * 2**0.5) ** 0.5
+        assert abs(start) == pytest.approx(expected, rel=1e-4) == abs(end)
+    assert pbem.Case.read(folder / "inclined.toml").interfaces["crack"].friction == 0.2
 
 
 def test_a_law_of_ones_own_gives_the_force_that_is_told(folder: Path) -> None:

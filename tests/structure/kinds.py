@@ -15,6 +15,7 @@ MAY_ASK = {
     "pbem.geometry.elements.array",
     "pbem.geometry.elements.meeting",
     "pbem.geometry.shape",
+    "pbem.model.shaping",
     "pbem.description.conflicts",
     "pbem.case.make",
 }
@@ -35,8 +36,8 @@ def check_kinds(module: Module) -> list[str]:
 def find_questions(module: Module) -> Iterator[int]:
     """Lines that ask for an element's kind.
 
-    That is: calculate with `sweep` (the angle that an arc turns through, 0 of straight elements), compare it, test it or
-    hand it to a function, but for those that carry it on; or ask whether a `center` is there.
+    That is: calculate with `sweep` (the angle that an arc turns through, 0 of straight elements), compare it, test it
+    or hand it to a function, but for those that carry it on; or ask whether a `center` is there.
     """
     counters = {
         node.target.id for node in ast.walk(module.tree)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pbem.geometry.curve import Leg
 from pbem.geometry.elements import Elements, cross_carriers
+from pbem.geometry.intersection import project
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -109,7 +110,9 @@ def test_lengths_and_fractions_are_integrals_of_the_stretch(elements: Elements) 
 
 
 def test_centroids_and_areas_are_integrals(elements: Elements) -> None:
-    expect_equal(elements.centroids, integrate(elements, elements.place(GAUSS)) / elements.lengths)
+    legs = [make_leg(elements.select([number])) for number in range(7)]
+    centroids = [leg.kind.centroid(leg) for leg in legs]
+    expect_equal(centroids, integrate(elements, elements.place(GAUSS)) / elements.lengths)
     from_start = elements.place(GAUSS) - elements.start[:, None]
     expect_equal(elements.areas, 0.5 * (np.conj(from_start) * elements.slope(GAUSS)).imag @ WEIGHTS)
 
@@ -248,6 +251,9 @@ def test_a_leg_is_the_same_as_an_element(seed: int) -> None:
         for at in (0.1, 0.6):
             off = complex(leg.point(np.array(at))) + 0.05 * complex(leg.normals(leg.point(np.array([at])))[0])
             expect_equal(leg.project(off), at)
+        for end, beyond in ((leg.start, leg.point(np.array(-0.1))), (leg.end, leg.point(np.array(1.1)))):
+            t, distance = project(leg, complex(beyond))
+            expect_equal([t, distance], [float(end == leg.end), abs(beyond - end)])
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -76,9 +76,6 @@ class Arc(Kind):
     def fraction(self, e: Shape, s: Any) -> Any:
         return 0.5 + 2 * np.arctan(_tangent(e) * s) / e.sweep
 
-    def coordinate(self, e: Shape, t: Any) -> Any:
-        return np.tan(0.25 * e.sweep * (2 * t - 1)) / _tangent(e)
-
     def walk(self, e: Shape, t: Any) -> Any:
         return e.center + (e.start - e.center) * np.exp(1j * e.sweep * t)
 

@@ -116,10 +116,6 @@ class Elements:
         return self._each("area")
 
     @property
-    def centroids(self) -> Complex:
-        return self._each("centroid")
-
-    @property
     def degree(self) -> float:
         """Of the maps from s to the places: the largest."""
         return max(kind.degree for kind, _ in self._groups)

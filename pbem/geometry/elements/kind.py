@@ -119,10 +119,6 @@ class Kind(ABC):
         """t at s."""
 
     @abstractmethod
-    def coordinate(self, e: Shape, t: Any) -> Any:
-        """s at t."""
-
-    @abstractmethod
     def walk(self, e: Shape, t: Any) -> Any:
         """Points at t, but for rounding at the ends."""
 

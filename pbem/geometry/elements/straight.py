@@ -55,9 +55,6 @@ class Straight(Kind):
     def fraction(self, e: Shape, s: Any) -> Any:
         return 0.5 * (1 + s)
 
-    def coordinate(self, e: Shape, t: Any) -> Any:
-        return 2 * t - 1
-
     def walk(self, e: Shape, t: Any) -> Any:
         return e.start + (e.end - e.start) * t
 

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-import petsc4py
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-# Signals are the shell's and MPI's business: with PETSc's handlers a closed pipe would look like a crash.
-petsc4py.init(["pbem", "-no_signal_handler"])
-from petsc4py import PETSc  # noqa: E402
-
-from pbem.errors import ConvergenceError  # noqa: E402
-from pbem.parallel import gather_parts  # noqa: E402
-from pbem.solve.effort import Work  # noqa: E402
-from pbem.solve.shares import change_shares, find_own_blocks, share_equally  # noqa: E402
+from pbem.errors import ConvergenceError
+from pbem.parallel import gather_parts
+from pbem.solve.effort import Work
+from pbem.solve.petsc import PREFIX, PETSc, factor_in_place, pass_over_divergence
+from pbem.solve.shares import change_shares, find_own_blocks, share_equally
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Method = Literal["lu", "mumps"]
-
-PREFIX = "pbem_"
 
 # MUMPS' codes (INFOG(1)) for too little work space, which can be asked for again, and for too little memory.
 MORE_ROOM_HELPS = (-8, -9, -11, -12, -14, -15, -17, -18, -20)
@@ -33,7 +26,6 @@ MOST_WORKSPACE = 10_000  # per cent
 
 # PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
 ZERO_PIVOT, LIBRARY_ERROR = 71, 76
-NOT_CONVERGED = 91
 
 # What an operation takes, in those of a large LU factorisation (a tenth of a nanosecond a core): to form and store an
 # entry of the matrix, an operation on one column (it waits for memory), and one on many columns at a time.
@@ -46,39 +38,6 @@ def choose_method(requested: str, regions: int) -> Method:
     if requested in ("lu", "mumps"):
         return "lu" if requested == "lu" else "mumps"
     return "lu" if regions == 1 else "mumps"
-
-
-def petsc_version() -> str:
-    """Version of the PETSc library in use."""
-    return ".".join(str(part) for part in PETSc.Sys.getVersion())
-
-
-@contextmanager
-def pass_over_divergence() -> Iterator[None]:
-    """Leave to the caller what the option ksp_error_if_not_converged makes an error: it asks for the reason itself."""
-    try:
-        yield
-    except PETSc.Error as error:
-        if error.ierr != NOT_CONVERGED:
-            raise
-
-
-@contextmanager
-def petsc_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Hold options in PETSc's database under the program's prefix while the block runs."""
-    database = PETSc.Options()
-    for name, value in options.items():
-        database.setValue(PREFIX + name, value)
-    try:
-        yield
-    finally:
-        for name in options:
-            database.delValue(PREFIX + name)
-
-
-def list_options() -> list[str]:
-    """Names of the options that PETSc's database holds under the program's prefix."""
-    return list(PETSc.Options(PREFIX).getAll())
 
 
 class LinearSolver:
@@ -216,7 +175,7 @@ class LinearSolver:
         preconditioner.setType("lu")
         preconditioner.setFactorSolverType(self.factor_type)
         preconditioner.setReusePreconditioner(True)
-        with _factors_in_place(self.factor_type != "mumps"):
+        with factor_in_place(self.factor_type != "mumps"):
             solver.setFromOptions()
         if preconditioner.getType() == "lu" and preconditioner.getFactorSolverType() == "mumps":
             # Only now: a factor that was made before would not know the prefix of the user's options, which win.
@@ -342,20 +301,6 @@ class _Product:
 
     def mult(self, _: Any, given: PETSc.Vec, result: PETSc.Vec) -> None:
         result.setArray(self.multiply(np.array(given.getArray(readonly=True))))
-
-
-@contextmanager
-def _factors_in_place(wanted: bool) -> Iterator[None]:
-    """Let the factors take the matrix's storage; petsc4py knows this by an option only."""
-    database, name = PETSc.Options(), PREFIX + "pc_factor_in_place"
-    if not wanted or database.hasName(name):
-        yield
-        return
-    database.setValue(name, "1")
-    try:
-        yield
-    finally:
-        database.delValue(name)
 
 
 def _explain_factors(code: int | None) -> ConvergenceError:

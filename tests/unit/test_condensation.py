@@ -292,8 +292,8 @@ def test_loads_in_the_span_of_others_are_not_solved_for() -> None:
     basis = LoadBasis(6, 6)
     first, second = random.normal(size=(2, 9))
     for vector in (first, 0.3 * first, second, 0.1 * first + 0.9 * second, 0 * first):
-        basis = basis.extend(vector, lambda v=vector: matrix @ v, solve)  # type: ignore[misc]
-        solution, forces = basis.combine(vector)
+        basis, parts = basis.extend(vector, lambda v=vector: matrix @ v, solve)  # type: ignore[misc]
+        solution, forces = basis.combine(parts)
         np.testing.assert_allclose(forces, matrix @ vector, atol=1e-13)
         np.testing.assert_allclose(operator @ solution, -matrix @ vector, atol=1e-12)
     assert len(solved) == 2

@@ -31,9 +31,9 @@ from pbem.results.writer import ResultWriter
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.beside import NOTHING_COARSER, put_beside
 from pbem.solve.fields import InteriorField
-from pbem.solve.linear import petsc_options, petsc_version
 from pbem.solve.march import march, start_from
 from pbem.solve.options import check_options
+from pbem.solve.petsc import petsc_options, petsc_version
 from pbem.solve.second import SecondSolution
 from pbem.solve.start import check_shares, check_start
 from pbem.solve.step import Reporter, SilentReporter, Step

@@ -195,8 +195,8 @@ class CondensedTangent(AnyTangent):
         offset[self.varying, G_N] = problem.laws.gap[self.varying]
         constant = problem.constrain(Linearisation(known.laws, offset, law.leader), load).offset
         vector = join_load(constant, load, problem.traction_scale)
-        loads = known.loads.extend(vector, lambda: problem.apply(constant, load), self._solve_load)
-        found = LoadSolution(load, fixed, constant, *loads.combine(vector))
+        loads, parts = known.loads.extend(vector, lambda: problem.apply(constant, load), self._solve_load)
+        found = LoadSolution(load, fixed, constant, *loads.combine(parts))
         self.known = replace(known, loads=loads, load=found)
         return found
 

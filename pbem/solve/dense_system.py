@@ -22,7 +22,8 @@ from pbem.model.model import Model
 from pbem.parallel import share_nodes
 from pbem.solve.condensed import CondensedTangent
 from pbem.solve.factored import FactoredTangent
-from pbem.solve.linear import choose_method, list_options
+from pbem.solve.linear import choose_method
+from pbem.solve.petsc import list_options
 from pbem.solve.problem import Problem
 from pbem.solve.reference import TangentRows
 from pbem.solve.release import ReleasedTangent

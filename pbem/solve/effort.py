@@ -12,10 +12,12 @@ SMALL = 2.0
 class Work:
     """What factors have cost and what is done with them costs, in operations of a large LU factorisation.
 
-    factors: to form and factorise the operator; column: one of many columns solved for; iteration: one of GMRES.
+    factors: to form and factorise the operator; call: of columns, however many, and column: each of them; iteration:
+    one of GMRES.
     """
 
     factors: float
+    call: float
     column: float
     iteration: float
 
@@ -39,5 +41,6 @@ class Effort:
 
     def spend(self, columns: int, size: int = 0) -> Effort:
         """With so many columns and a dense system of such a size more."""
-        cost = columns * self.work.column + 2 / 3 * SMALL * self.ranks * size**3
+        solved = self.work.call + columns * self.work.column if columns else 0.0
+        cost = solved + 2 / 3 * SMALL * self.ranks * size**3
         return replace(self, spent=self.spent + cost)

@@ -15,8 +15,8 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.groups import Group
-from pbem.solve.linear import PREFIX, PETSc, pass_over_divergence, petsc_options
 from pbem.solve.nearby import MOST_ASKED, answers_nearby, respond_nearby
+from pbem.solve.petsc import PREFIX, PETSc, pass_over_divergence, petsc_options
 from pbem.solve.problem import Problem
 from pbem.solve.response import select_states
 from pbem.solve.schwarz import SchwarzPreconditioner

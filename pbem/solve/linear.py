@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
-import petsc4py
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-# Signals are the shell's and MPI's business: with PETSc's handlers a closed pipe would look like a crash.
-petsc4py.init(["pbem", "-no_signal_handler"])
-from petsc4py import PETSc  # noqa: E402
-
-from pbem.errors import ConvergenceError  # noqa: E402
-from pbem.parallel import gather_parts  # noqa: E402
-from pbem.solve.effort import Work  # noqa: E402
-from pbem.solve.shares import change_shares, find_own_blocks, share_equally  # noqa: E402
+from pbem.errors import ConvergenceError
+from pbem.parallel import gather_parts
+from pbem.solve.effort import Work
+from pbem.solve.petsc import PREFIX, PETSc, factor_in_place, pass_over_divergence
+from pbem.solve.shares import change_shares, find_own_blocks, share_equally
 
 Real = NDArray[np.float64]
 Integer = NDArray[np.int64]
 Method = Literal["lu", "mumps"]
-
-PREFIX = "pbem_"
 
 # MUMPS' codes (INFOG(1)) for too little work space, which can be asked for again, and for too little memory.
 MORE_ROOM_HELPS = (-8, -9, -11, -12, -14, -15, -17, -18, -20)
@@ -33,12 +26,12 @@ MOST_WORKSPACE = 10_000  # per cent
 
 # PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
 ZERO_PIVOT, LIBRARY_ERROR = 71, 76
-NOT_CONVERGED = 91
 
-# What an operation takes, in those of a large LU factorisation (a tenth of a nanosecond a core): to form and store an
-# entry of the matrix, an operation on one column (it waits for memory), and one on many columns at a time.
-OPERATIONS_OF_AN_ENTRY = 200.0
-SINGLE, MANY = 12.0, {"petsc": 1.5, "scalapack": 4.0, "mumps": 4.0}
+# What is taken beside the operations of the factorisation, in those of a large one (a tenth of a nanosecond a core): to
+# form and store an entry of the matrix, and to order and analyse a row of a sparse one; a call for any columns; an
+# operation on one column (it waits for memory), one on many columns at a time, and such a one of several ranks.
+OPERATIONS_OF_AN_ENTRY, OPERATIONS_OF_A_ROW, OPERATIONS_OF_A_CALL = 200.0, 4e5, 2e7
+SINGLE, MANY, MANY_BY_RANKS = 12.0, 1.0, 4.0
 
 
 def choose_method(requested: str, regions: int) -> Method:
@@ -46,39 +39,6 @@ def choose_method(requested: str, regions: int) -> Method:
     if requested in ("lu", "mumps"):
         return "lu" if requested == "lu" else "mumps"
     return "lu" if regions == 1 else "mumps"
-
-
-def petsc_version() -> str:
-    """Version of the PETSc library in use."""
-    return ".".join(str(part) for part in PETSc.Sys.getVersion())
-
-
-@contextmanager
-def pass_over_divergence() -> Iterator[None]:
-    """Leave to the caller what the option ksp_error_if_not_converged makes an error: it asks for the reason itself."""
-    try:
-        yield
-    except PETSc.Error as error:
-        if error.ierr != NOT_CONVERGED:
-            raise
-
-
-@contextmanager
-def petsc_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Hold options in PETSc's database under the program's prefix while the block runs."""
-    database = PETSc.Options()
-    for name, value in options.items():
-        database.setValue(PREFIX + name, value)
-    try:
-        yield
-    finally:
-        for name in options:
-            database.delValue(PREFIX + name)
-
-
-def list_options() -> list[str]:
-    """Names of the options that PETSc's database holds under the program's prefix."""
-    return list(PETSc.Options(PREFIX).getAll())
 
 
 class LinearSolver:
@@ -109,7 +69,7 @@ class LinearSolver:
         self.multiply = multiply
         self.operator.setUp()
         self.right, self.left = self.operator.createVecs()
-        self.work = Work(0.0, 0.0, 0.0)
+        self.work = Work(0.0, 0.0, 0.0, 0.0)
         self.iterations = 0
 
     @property
@@ -192,15 +152,17 @@ class LinearSolver:
         entries, stored, operations = rows**2, rows**2, 2 / 3 * rows**3
         if self.factor_type == "mumps":
             entries = float(self.matrix.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
-            stored, operations = entries, 0.0
+            stored, operations = entries, OPERATIONS_OF_A_ROW * rows
             if self._find_mumps_code() is not None:
                 factor = self.solver.getPC().getFactorMatrix()
                 size = factor.getMumpsInfog(29)  # below zero: in millions
-                stored, operations = float(size if size >= 0 else -1e6 * size), factor.getMumpsRinfog(3)
+                stored = float(size if size >= 0 else -1e6 * size)
+                operations += factor.getMumpsRinfog(3)
         # A product is one of known and unknown values: twice the matrix's entries.
         return Work(
             operations + OPERATIONS_OF_AN_ENTRY * entries,
-            2.0 * stored * MANY[self.factor_type],
+            OPERATIONS_OF_A_CALL + SINGLE * 2.0 * stored,
+            2.0 * stored * (MANY if self.comm.size == 1 else MANY_BY_RANKS),
             SINGLE * (4.0 * entries + 2.0 * stored),
         )
 
@@ -216,7 +178,7 @@ class LinearSolver:
         preconditioner.setType("lu")
         preconditioner.setFactorSolverType(self.factor_type)
         preconditioner.setReusePreconditioner(True)
-        with _factors_in_place(self.factor_type != "mumps"):
+        with factor_in_place(self.factor_type != "mumps"):
             solver.setFromOptions()
         if preconditioner.getType() == "lu" and preconditioner.getFactorSolverType() == "mumps":
             # Only now: a factor that was made before would not know the prefix of the user's options, which win.
@@ -342,20 +304,6 @@ class _Product:
 
     def mult(self, _: Any, given: PETSc.Vec, result: PETSc.Vec) -> None:
         result.setArray(self.multiply(np.array(given.getArray(readonly=True))))
-
-
-@contextmanager
-def _factors_in_place(wanted: bool) -> Iterator[None]:
-    """Let the factors take the matrix's storage; petsc4py knows this by an option only."""
-    database, name = PETSc.Options(), PREFIX + "pc_factor_in_place"
-    if not wanted or database.hasName(name):
-        yield
-        return
-    database.setValue(name, "1")
-    try:
-        yield
-    finally:
-        database.delValue(name)
 
 
 def _explain_factors(code: int | None) -> ConvergenceError:

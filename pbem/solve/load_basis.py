@@ -32,28 +32,32 @@ class LoadBasis:
         """The same loads solved for anew, for another K0; solve: from forces to the whole solution."""
         return replace(self, solutions=tuple(solve(force) for force in self.forces))
 
-    def extend(self, vector: Real, evaluate: Callable[[], Real], solve: Callable[[Real], Real]) -> LoadBasis:
-        """With a load vector in its span; of too many vectors those before are forgotten.
+    def extend(
+        self, vector: Real, evaluate: Callable[[], Real], solve: Callable[[Real], Real]
+    ) -> tuple[LoadBasis, Real]:
+        """With a load vector in its span, and the vector's components; of too many vectors those before are forgotten.
 
         evaluate, which gives the forces, and solve are called only if the vector is no sum of the others.
         """
         parts, rest = self._project(vector)
-        if float(np.linalg.norm(rest)) <= IN_SPAN * float(np.linalg.norm(vector)):
-            return self
+        length = float(np.linalg.norm(rest))
+        if length <= IN_SPAN * float(np.linalg.norm(vector)):
+            return self, parts
         if len(self.vectors) == MOST_VECTORS:
             return LoadBasis(self.unknowns, self.rows).extend(vector, evaluate, solve)
-        length, force = float(np.linalg.norm(rest)), evaluate()
+        force = evaluate()
         for part, other in zip(parts, self.forces, strict=True):
             force = force - part * other
-        return replace(
+        basis = replace(
             self, vectors=(*self.vectors, rest / length), forces=(*self.forces, force / length),
             solutions=(*self.solutions, solve(force / length)),
         )
+        return basis, np.append(parts, length)
 
-    def combine(self, vector: Real) -> tuple[Real, Real]:
-        """The solution (2 nodes,) for a load vector in the span, and this rank's forces."""
+    def combine(self, parts: Real) -> tuple[Real, Real]:
+        """The solution (2 nodes,) and this rank's forces for a load of such components."""
         solution, forces = np.zeros(self.unknowns), np.zeros(self.rows)
-        for part, one, force in zip(self._project(vector)[0], self.solutions, self.forces, strict=True):
+        for part, one, force in zip(parts, self.solutions, self.forces, strict=True):
             solution += part * one
             forces += part * force
         return solution, forces

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pbem.errors import CaseError, Fault
-from pbem.solve.linear import PREFIX, PETSc, petsc_options
+from pbem.solve.petsc import PREFIX, PETSc, petsc_options
 
 
 def check_options(source: str, case: Mapping[str, str], given: Mapping[str, str]) -> None:

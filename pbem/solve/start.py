@@ -18,7 +18,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import broadcast, describe_library, gather_by_node, refuse_together
 from pbem.solve.choice import choose_system
-from pbem.solve.linear import PETSc
+from pbem.solve.petsc import PETSc
 
 # The library itself, not its Fortran and C++ parts: libmpi.so.40, libmpich.so.12, libmpi_cray.so.12.
 MPI_LIBRARY = re.compile(r"/lib(mpi|mpich|mpi_cray|mpi_gnu_\d+|mpigcc|mpi_abi|msmpi)\.so[.\d]*$")

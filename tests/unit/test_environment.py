@@ -20,8 +20,7 @@ from pbem.environment import (
     refuse_copies,
     refuse_threads,
 )
-from pbem.solve.linear import share_equally
-from pbem.solve.shares import fits_ranks, refuse_shares
+from pbem.solve.shares import fits_ranks, refuse_shares, share_equally
 from pbem.solve.start import Libraries, find_mpi_libraries, refuse_libraries
 
 BATCH = {"SLURM_JOB_ID": "7", "SLURM_NTASKS": "8", "SLURM_NPROCS": "8", "SLURM_PROCID": "0", "SLURM_LOCALID": "0"}

@@ -17,7 +17,7 @@ from pbem.results.reader import Results
 from pbem.solve import groups
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.krylov import KrylovTangent
-from pbem.solve.linear import petsc_options
+from pbem.solve.petsc import petsc_options
 from pbem.solve.step import SilentReporter, Step
 from tests.cli.cli_sample import BLOCKS
 from tests.identities.solving import linearise_pairs

@@ -14,6 +14,7 @@ MAY_ASK = {
     "pbem.geometry.elements.arc",
     "pbem.geometry.elements.array",
     "pbem.geometry.elements.meeting",
+    "pbem.geometry.shape",
     "pbem.model.shaping",
     "pbem.description.conflicts",
     "pbem.case.make",

@@ -42,7 +42,7 @@ def describe_model(tables: Mapping[str, Any]) -> Model:
 
     Its text, which the results store, is that of a file with these tables.
     """
-    draft = description.draft_case(tables)
+    draft = description.draft_tables(tables)
     model, faults = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
     faults = [*draft.faults, *faults]
     if draft.case is None or model is None or faults:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from pbem.case.lines import find_line, find_lines, format_place
 from pbem.description.case import Draft, draft_case
-from pbem.description.controls import DEEPEST, find_depth
 from pbem.errors import CaseError, Fault, KeyPath
 
 
@@ -54,10 +53,6 @@ def parse_draft(text: str, source: str = "case") -> FileDraft:
     if not raw:
         return _refuse("the file", "nothing (an empty file)", "the tables [materials.*], [curves] and [regions.*]")
     lines = find_lines(text)
-    deep = find_depth(raw)
-    if deep is not None:
-        return _refuse(format_place(deep[:4], find_line(lines, deep[:1])), f"tables and lists within each other more "
-                       f"than {DEEPEST} deep", "the tables and keys of a case file")
     draft = draft_case(raw, source)
     faults = _order(add_lines(draft.faults, lines), lines)
     return FileDraft(draft.case, faults, draft.conditions_known, lines)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 from pydantic import ValidationError
@@ -76,7 +76,7 @@ class Case:
 
         Raises CaseError with every fault of tables and keys, each of which names the object and its field.
         """
-        draft = draft_case(tables)
+        draft = draft_tables(tables)
         if draft.case is None or draft.faults:
             raise CaseError(UNNAMED, draft.faults)
         self._take(vars(draft.case))
@@ -137,17 +137,26 @@ class Draft:
     conditions_known: bool = True
 
 
-def draft_case(tables: Mapping[str, Any], source: str = UNNAMED) -> Draft:
-    """A case of the tables as far as possible, with all their faults in the order of the schema; never raises for what
-    is wrong with them."""
+def draft_tables(tables: Mapping[str, Any]) -> Draft:
+    """A case of tables given by calls; see `make_plain` for what may stand in them."""
     raw, faults = make_plain(tables)
+    draft = draft_case(raw)
+    return replace(draft, faults=(*faults, *draft.faults))
+
+
+def draft_case(raw: Mapping[str, Any], source: str = UNNAMED) -> Draft:
+    """A case of tables as far as possible, with all their faults in the order of the schema; never raises for what is
+    wrong with them.
+
+    raw: dictionaries, lists and plain values, as a reader of files has them; source: the file's path, as it was given.
+    """
     deep = find_depth(raw)
     if deep is not None:
         found = f"tables and lists within each other more than {DEEPEST} deep"
-        return Draft(None, (Fault.at(deep[:4], found, "the tables and keys of a case"),))
+        return Draft(None, (Fault.at(deep[:4], found, "the tables and keys of a case file"),))
     findings = find_controls(raw) + find_conflicts(raw) + find_schema_findings(raw)
     case, more = _compose(raw, findings, source)
-    faults += [Fault.at(finding.loc, finding.found, finding.expected) for finding in (*findings, *more)]
+    faults = [Fault.at(finding.loc, finding.found, finding.expected) for finding in (*findings, *more)]
     return Draft(case, _order(faults), not any(_concerns_loads(fault.path) for fault in faults))
 
 

@@ -30,6 +30,8 @@ def _copy_table(table: Mapping[Any, Any], path: KeyPath, faults: list[Fault]) ->
 
 
 def _copy(value: Any, path: KeyPath, faults: list[Fault]) -> Any:
+    if type(value) in (int, float, str, bool):
+        return value
     if len(path) > DEEPEST + 1:  # deeper than any case, perhaps without end
         return value
     if isinstance(value, Table):

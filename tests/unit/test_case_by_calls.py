@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import datetime
+import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +16,15 @@ import pbem
 from pbem.case import parse_case
 from pbem.case.build import describe_model, parse_model
 from pbem.case.writer import write_tables
+from pbem.description.case import draft_case
 from pbem.errors import CaseError, Fault, format_path
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import find_loops
 from pbem.geometry.shape import Division, draw_circle, draw_expression, draw_polyline, join_ends, measure_extent
 from pbem.geometry.tolerance import make_tolerance
-from pbem.model.build import build_model
+from pbem.model.build import build_model, examine, shorten
+from pbem.model.model import Model
 from tests.cases.bundled import CASES
 from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, change, find_faults
 from tests.unit.test_case_reader import EVERYTHING
@@ -208,6 +212,25 @@ def test_a_case_prints_in_a_line() -> None:
 def test_what_was_generated_is_as_in_a_file() -> None:
     text = GENERATED.replace("elements = 1", "elements = 4").replace("normal_stiffness = 3.0", "")
     assert describe_model(tomllib.loads(text)).curves == parse_model(text)[1].curves
+
+
+def read_json(path: Path) -> Model:
+    """Another format of case files, in as many lines as it takes; its faults have paths, and no lines."""
+    draft = draft_case(json.loads(path.read_text("utf-8")), str(path))
+    model, faults = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
+    if model is None or draft.faults or faults:
+        raise CaseError(str(path), shorten([*draft.faults, *faults]))
+    return model
+
+
+def test_another_format_needs_its_own_text_only(tmp_path: Path) -> None:
+    path = tmp_path / "case.json"
+    for text in (BLOCKS, EVERYTHING):
+        path.write_text(json.dumps(tomllib.loads(text)), encoding="utf-8")
+        assert replace(read_json(path), source=text) == parse_model(text)[1]
+    path.write_text(json.dumps(tomllib.loads(SAME_FAULTS["keys"])), encoding="utf-8")
+    with pytest.raises(CaseError, match=r"case\.json: 3 faults\n  materials\.soft\.young: found -1; "):
+        read_json(path)
 
 
 def draw(**points: list[complex]) -> dict[str, Curve]:

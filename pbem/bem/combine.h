@@ -16,7 +16,7 @@ INLINE void combine_displacements(Variant v, const Rows *r, const double *integr
 #pragma GCC unroll 4
     for (int j = 0; j <= v.order; j++) {
         H->P[j] = c_make(f * (kappa + 1) * m->c[j].im, f * (1 - kappa) * m->c[j].re);
-        H->Q[j] = c_mul(y_e2, c_conj(m->d[j]));
+        H->Q[j] = c_mul_conj(y_e2, m->d[j]);
     }
     if (!v.tractions) return;
     const Lanes h = ft * at->h, log_h = at->log_h - r->log_length;
@@ -25,7 +25,7 @@ INLINE void combine_displacements(Variant v, const Rows *r, const double *integr
     for (int j = 0; j <= v.order; j++) {
         const double l = integral[j];
         G->P[j] = c_real(-2 * kappa * h * (m->n[j] + l * log_h));
-        G->Q[j] = c_sub(c_scale(l, h_e2), c_times_i(c_mul(yh_e2, c_conj(m->c[j]))));
+        G->Q[j] = c_sub(c_scale(l, h_e2), c_times_i(c_mul_conj(yh_e2, m->c[j])));
     }
 }
 
@@ -35,21 +35,20 @@ INLINE void combine_tractions(Variant v, const Rows *r, const Frame *at, Complex
 {
     const double kappa = r->kappa, f = r->f;
     const Lanes g = 2 * r->shear_modulus * f * at->inverse_h, y2 = 2 * m->y;
-    const Complex e2 = c_square(at->e), A = c_mul(at->e, c_conj(N)), e2_A = c_mul(e2, A), S = c_scale(2 * A.re, e2);
+    const Complex e2 = c_square(at->e), A = c_mul_conj(at->e, N), e2_A = c_mul(e2, A), S = c_scale(2 * A.re, e2);
     const Complex gA = c_scale(2 * g, A), igS = c_times_i(c_scale(g, S)), yg_e2_A = c_scale(y2 * g, e2_A);
 #pragma GCC unroll 4
     for (int j = 0; j <= v.order; j++) {
-        H->P[j] = c_real(-c_mul(c_conj(m->d[j]), gA).im);
-        H->Q[j] = c_add(c_mul(igS, c_conj(m->d[j])), c_mul(yg_e2_A, c_conj(m->e[j])));
+        H->P[j] = c_real(-c_mul_conj(gA, m->d[j]).im);
+        H->Q[j] = c_add(c_mul_conj(igS, m->d[j]), c_mul_conj(yg_e2_A, m->e[j]));
     }
     if (!v.tractions) return;
     const Complex sum_A = c_scale(f * (kappa + 1), A), difference_A = c_scale(f * (kappa - 1), A);
     const Complex fS = c_scale(f, S), iy_e2_A = c_times_i(c_scale(f * y2, e2_A));
 #pragma GCC unroll 4
     for (int j = 0; j <= v.order; j++) {
-        const Complex c = c_conj(m->c[j]);
-        G->P[j] = c_make(c_mul(sum_A, c).re, c_mul(difference_A, c).im);
-        G->Q[j] = c_sub(c_mul(fS, c), c_mul(iy_e2_A, c_conj(m->d[j])));
+        G->P[j] = c_make(c_mul_conj(sum_A, m->c[j]).re, c_mul_conj(difference_A, m->c[j]).im);
+        G->Q[j] = c_sub(c_mul_conj(fS, m->c[j]), c_mul_conj(iy_e2_A, m->d[j]));
     }
 }
 
@@ -74,11 +73,11 @@ INLINE void combine_curve_tractions(Variant v, const Rows *r, Complex N, const C
 #pragma GCC unroll 4
     for (int j = 0; j <= v.order; j++) {
         H->P[j] = c_real(2 * g * c_mul(m->d[j], N).im);
-        H->Q[j] = c_scale(g, c_times_i(c_add(c_mul(c_conj(m->d[j]), N), c_conj(c_mul(m->dq[j], N)))));
+        H->Q[j] = c_scale(g, c_times_i(c_add(c_mul_conj(N, m->d[j]), c_conj(c_mul(m->dq[j], N)))));
         if (!v.tractions) continue;
         const Complex xN = c_mul(m->x[j], N);
         G->P[j] = c_make(f * (1 + kappa) * xN.re, f * (1 - kappa) * xN.im);
-        G->Q[j] = c_scale(f, c_add(c_mul(c_conj(m->x[j]), N), c_conj(c_mul(m->y[j], N))));
+        G->Q[j] = c_scale(f, c_add(c_mul_conj(N, m->x[j]), c_conj(c_mul(m->y[j], N))));
     }
 }
 

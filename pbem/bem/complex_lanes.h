@@ -31,6 +31,12 @@ INLINE Complex c_times_i(Complex a) { return (Complex){-a.im, a.re}; }
 INLINE Complex c_scale_lanes(Lanes a, Complex z) { return (Complex){a * z.re, a * z.im}; }
 INLINE Complex c_shift_lanes(Complex z, Lanes a) { return (Complex){z.re + a, z.im}; }
 INLINE Complex c_mul(Complex a, Complex b) { return (Complex){a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re}; }
+/* a conj(b) */
+INLINE Complex c_mul_conj(Complex a, Complex b)
+{
+    return (Complex){a.re * b.re + a.im * b.im, a.im * b.re - a.re * b.im};
+}
+
 INLINE Complex c_square(Complex a) { return (Complex){a.re * a.re - a.im * a.im, 2 * a.re * a.im}; }
 /* |a|^2 */
 INLINE Lanes c_norm(Complex a) { return a.re * a.re + a.im * a.im; }

@@ -27,25 +27,24 @@ INLINE void sum_rule(Variant v, const Rule *rule, double log_length, Complex z, 
     for (int g = 0; g < rule->points; g++) {
         const Complex e = c_make(rule->ex[g], rule->ey[g]), r = c_sub(c_make(rule->x[g], rule->y[g]), z);
         const Complex inverse = c_inverse(r), square = c_square(inverse); /* 1/r, 1/r^2 */
-        const Complex i_y = c_times_i(c_real(c_mul(c_conj(r), e).im));
+        const Lanes y = c_mul_conj(e, r).im;
         if (v.equation == TRACTION_EQUATION) {
             add_weighted(shapes, rule->H, g, c_mul(e, square), m->d);
-            add_weighted(shapes, rule->H, g, c_mul(c_add(c_conj(e), c_scale(4, c_mul(i_y, inverse))), square), m->dq);
+            const Complex turned = c_add(c_conj(e), c_times_i(c_scale(4 * y, inverse)));
+            add_weighted(shapes, rule->H, g, c_mul(turned, square), m->dq);
             if (!v.tractions) continue;
             add_weighted(shapes, rule->G, g, inverse, m->x);
-            add_weighted(shapes, rule->G, g, c_mul(c_conj(r), square), m->y);
+            add_weighted(shapes, rule->G, g, c_mul_conj(square, r), m->y);
         } else {
             const Complex c = c_mul(e, inverse);
             add_weighted(shapes, rule->H, g, c, m->c);
-            add_weighted(shapes, rule->H, g, c_mul(i_y, square), m->q); /* half of it */
+            add_weighted(shapes, rule->H, g, c_times_i(c_scale(2 * y, square)), m->q);
             if (!v.tractions) continue;
-            add_weighted(shapes, rule->G, g, c_mul(c_conj(r), inverse), m->s);
+            add_weighted(shapes, rule->G, g, c_mul_conj(inverse, r), m->s);
 #pragma GCC unroll 4
             for (int j = 0; j < shapes; j++) m->n[j] -= rule->N[j][g] * c.re;
         }
     }
-#pragma GCC unroll 4
-    for (int j = 0; j < shapes; j++) m->q[j] = c_scale(2, m->q[j]);
     if (!has_logarithm(v)) return;
     /* n by parts: the shapes' integrals times ln|r| at the ends, less their integral with its derivative, Re c */
     Lanes logs[FUNCTION_BATCH / LANES];
@@ -132,9 +131,11 @@ typedef struct {
 static void sort_points(const Rows *r, const Curve *curve, int64_t j, Py_ssize_t first, SortedPoints *to)
 {
     const Py_ssize_t last = first + MOST_SORTED < r->points ? first + MOST_SORTED : r->points;
+    double distance2[LEVELS];
+    list_distances(curve, distance2);
     memset(to->count, 0, sizeof to->count);
     for (Py_ssize_t i = first; i < last; i++) {
-        const int level = r->on[i] == j ? LEVELS : choose_level(curve, r->point[i]);
+        const int level = r->on[i] == j ? LEVELS : choose_level(curve, distance2, r->point[i]);
         to->point[level][to->count[level]++] = i;
     }
 }

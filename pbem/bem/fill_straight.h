@@ -148,8 +148,9 @@ INLINE double find_nearest(Lanes r2, double limit, int has_near)
 }
 
 /* All points against the groups of a tile with polynomial shapes. */
-INLINE void fill_tile(Variant v, const Rows *r, const Elements *of, Tile *tile)
+INLINE void fill_tile(Variant v, const Rows *rows, const Elements *of, Tile *tile)
 {
+    const Rows copy = *rows, *r = &copy; /* which no store into the rows can change: constants stay in registers */
     const int groups = tile->groups;
     Complex w[TILE];
     Lanes ends[TILE], logs[TILE];
@@ -187,8 +188,9 @@ INLINE void fill_tile(Variant v, const Rows *r, const Elements *of, Tile *tile)
 }
 
 /* The same with the shapes of tips. */
-INLINE void fill_tip_tile(Variant v, const Rows *r, const Elements *of, Tile *tile)
+INLINE void fill_tip_tile(Variant v, const Rows *rows, const Elements *of, Tile *tile)
 {
+    const Rows copy = *rows, *r = &copy; /* which no store into the rows can change: constants stay in registers */
     for (Py_ssize_t i = 0;; i++) {
         if (tile->near.count > MOST_NEAR - TILE * LANES || (i == r->points && tile->near.count))
             fill_near_tips(v, r, of, tile);

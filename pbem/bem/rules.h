@@ -150,8 +150,17 @@ static const Rule *use_rule(Rules *rules, const CurveKind *kind, const AnyCurve 
     return rule;
 }
 
+/* Distances of the levels, squared, for an element. */
+static void list_distances(const Curve *curve, double *square)
+{
+    int class = 0;
+    while (class < TURN_CLASSES - 1 && curve->turn > CLASS_TURN[class]) class++;
+    for (int level = 0; level < LEVELS; level++)
+        square[level] = LEVEL_DISTANCE[class][level] * LEVEL_DISTANCE[class][level] * curve->reach * curve->reach;
+}
+
 /* The rule for a point; LEVELS if it is near. */
-static int choose_level(const Curve *curve, cplx z)
+static int choose_level(const Curve *curve, const double *distance2, cplx z)
 {
     double least = INFINITY;
     for (int p = 0; p < curve->panels; p++) {
@@ -159,10 +168,8 @@ static int choose_level(const Curve *curve, cplx z)
         const double square = dx * dx + dy * dy;
         least = square < least ? square : least;
     }
-    int class = 0, level = 0;
-    while (class < TURN_CLASSES - 1 && curve->turn > CLASS_TURN[class]) class++;
-    const double *distance = LEVEL_DISTANCE[class], reach2 = curve->reach * curve->reach;
-    while (level < LEVELS && !(least > distance[level] * distance[level] * reach2)) level++;
+    int level = 0;
+    while (level < LEVELS && !(least > distance2[level])) level++;
     /* the root's panels do not resolve more than this */
     return level < LEVELS && curve->panels > 1 ? LEVELS - 1 : level;
 }

@@ -67,12 +67,13 @@ static const struct {
 static Elements select_elements(const Rows *r, int kind, int family, int64_t *index)
 {
     const int shapes = r->order + 1;
+    const double *shape = r->shape + family * shapes * shapes;
     Elements to = {.family = family, .index = index, .curve = kinds[kind].curve};
     for (Py_ssize_t j = 0; j < r->elements; j++)
         if (r->family[j] == family && find_kind(r, j) == kind) index[to.count++] = j;
-    memcpy(to.shape, r->shape + family * shapes * shapes, shapes * shapes * sizeof(double));
+    memcpy(to.shape, shape, shapes * shapes * sizeof(double));
     for (int j = 0; j < shapes; j++)
-        for (int k = 0; k < shapes; k++) to.integral[j] += to.shape[k * shapes + j] * integrate_power(k);
+        for (int k = 0; k < shapes; k++) to.integral[j] += shape[k * shapes + j] * integrate_power(k);
     return to;
 }
 

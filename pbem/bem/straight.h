@@ -70,7 +70,7 @@ INLINE Complex sum_series(const double *a, int terms, Complex q)
 /* The points as seen from the elements: w = (z - m) conj(e)/h. */
 INLINE Complex locate(const Frame *f, Complex z)
 {
-    return c_scale(f->inverse_h, c_mul(c_sub(z, f->m), c_conj(f->e)));
+    return c_scale(f->inverse_h, c_mul_conj(c_sub(z, f->m), f->e));
 }
 
 /* w^2 - 1 and, from its two factors, |w - 1|^2 and |w + 1|^2; without cancellation near the ends. */

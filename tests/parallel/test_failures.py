@@ -69,7 +69,7 @@ def expect_one_traceback(done: subprocess.CompletedProcess[str], rank: int, erro
 # Where: before anything is computed, in the assembly, in the third step, on the way to the file.
 PLACES = {
     "meshing": ("pbem.driver", "generate_mesh", 1, 0),
-    "assembly": ("pbem.solve.assembly", "assemble_rows", 1, 0),
+    "assembly": ("pbem.solve.dense_system", "assemble_rows", 1, 0),
     "a step": ("pbem.solve.march", "solve_step", 3, 2),
     "the linear solver": ("pbem.solve.linear", "LinearSolver.solve_columns", 2, None),
 }
@@ -201,7 +201,7 @@ def test_what_forces_could_balance_is_asked_on_the_first_rank_alone(
     (folder / "away.toml").write_text(UNZIPS)
     told = []
     for rank in (0, 1):
-        arguments = (str(rank), "pbem.solve.march", name, "1", "ConvergenceError('asked', 'on this rank')")
+        arguments = (str(rank), "pbem.solve.ends", name, "1", "ConvergenceError('asked', 'on this rank')")
         done = mpirun_snippet(2, BROKEN, *arguments, "run", "away.toml", "--quiet", "--force", cwd=folder, timeout=SOON)
         assert done.returncode == 3, done.stderr
         told.append(done.stderr)

@@ -16,8 +16,9 @@ from pbem.mesh.generate import generate_mesh
 from pbem.model.support import find_free_motions
 from pbem.parallel import world
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.balance import describe_imbalance, measure_balance
+from pbem.solve.balance import measure_balance
 from pbem.solve.hold import Hold
+from pbem.solve.imbalance import describe_imbalance
 from pbem.solve.problem import Problem
 from pbem.solve.release import ReleasedTangent
 from tests.identities.solving import assemble_tangent, linearise_pairs

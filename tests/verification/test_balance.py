@@ -15,7 +15,8 @@ from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve.assembly import assemble_problem
-from pbem.solve.balance import describe_imbalance, measure_balance
+from pbem.solve.balance import measure_balance
+from pbem.solve.imbalance import describe_imbalance
 from pbem.solve.march import march
 from pbem.solve.problem import Problem
 from pbem.solve.step import OPEN, SilentReporter

@@ -6,9 +6,9 @@
 Ends: a signal to one rank (SIGTERM, SIGHUP, SIGINT, SIGXCPU), memory (a rank may not have more than it has, and asks
 for more), size (files may not grow), disk (a file system of its own that is filled up; as root only), quota (its error,
 made up). Phases: while the equations are assembled, within an iteration of Newton's method, and within a write call of
-the first rank. Of each the exit code has to be the one that the manual tells, with one message and no traceback, and the
-file has to say "stopped" and to go on to what a run left alone gives, to 1e-9. Prints a line for each; exit code 1 if
-one is wrong.
+the first rank. Of each the exit code has to be the one that the manual tells, with one message and no traceback, and
+the file has to say "stopped" and to go on to what a run left alone gives, to 1e-9. Prints a line for each; exit code 1
+if one is wrong.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.model.model import Model
-from pbem.parallel import world
+from pbem.parallel import gather_parts, world
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.factored import FactoredTangent
 from pbem.solve.march import start_from_rest
@@ -94,7 +94,7 @@ def solve_classically(problem: Problem, tangent: FactoredTangent, load: Load, fa
             return state, number - 1
         if not np.abs(unknowns).max() < 1e6 * problem.model.size:
             break
-        unknowns -= tangent.solve_system(unbalanced)
+        unknowns -= gather_parts(world, tangent.reference.solve_columns(unbalanced[:, None])[:, 0])
     return state, MOST_ITERATIONS
 
 

@@ -91,7 +91,7 @@ def launch_all(kernels: Path, records: Path, options: argparse.Namespace) -> int
 
 
 def read_records(path: Path) -> list[Found]:
-    """What was found so far; a model that is too large or wrong has a record without the key "equal"."""
+    """What was found so far; a model that is too large or refused has a record without the key "equal"."""
     return [json.loads(line) for line in path.read_text().splitlines()]
 
 
@@ -117,6 +117,7 @@ def work(kernels: Path, records: Path, first: int, count: int, most_nodes: int) 
     """On all ranks: so many pairs from a seed on; the first rank adds a line for each."""
     from pbem.bem import rows
     from pbem.case.build import read_model
+    from pbem.errors import CaseError
     from pbem.mesh.generate import generate_mesh
     from pbem.parallel import world
     from scripts.torture.kinds import draw_sample
@@ -131,8 +132,11 @@ def work(kernels: Path, records: Path, first: int, count: int, most_nodes: int) 
             if world.rank == 0:
                 case.write_text(draw_sample(seed, KINDS).text())
             world.Barrier()
-            nodes = generate_mesh(read_model(case)[1]).nodes
-            if nodes <= most_nodes:
+            try:
+                nodes = generate_mesh(read_model(case)[1]).nodes
+            except CaseError as error:  # before any kernel is asked
+                nodes, found = 0, found | {"refused": str(error)[-200:]}
+            if 0 < nodes <= most_nodes:
                 ends = []
                 for turn, mixed in enumerate((False, True)):
                     rows._kernels = other if mixed and world.rank == seed % 2 else own

@@ -23,6 +23,9 @@ from pbem.solve.petsc import PETSc
 # The library itself, not its Fortran and C++ parts: libmpi.so.40, libmpich.so.12, libmpi_cray.so.12.
 MPI_LIBRARY = re.compile(r"/lib(mpi|mpich|mpi_cray|mpi_gnu_\d+|mpigcc|mpi_abi|msmpi)\.so[.\d]*$")
 
+# Bytes of address space that OpenBLAS takes at its first call, once for all: 128 MB, and a little for its own lists.
+WORK_SPACE = 2**27 + 2**20
+
 
 @dataclass(frozen=True)
 class Libraries:
@@ -39,7 +42,8 @@ class Libraries:
 def check_start(comm: MPI.Intracomm) -> tuple[str, ...]:
     """Notes on how the ranks were started, the same on all.
 
-    Raises LaunchError on all ranks alike: copies that MPI does not join, libraries that do not fit, too many threads.
+    Raises LaunchError on all ranks alike: copies that MPI does not join, libraries that do not fit, too many threads;
+    MemoryError on a rank that has too little to begin with.
     """
     copies = refuse_copies(find_launch(os.environ), comm.size, describe_library())
     if copies:
@@ -49,7 +53,17 @@ def check_start(comm: MPI.Intracomm) -> tuple[str, ...]:
     refusal, notes = judge_nodes(gather_by_node(comm, read_site(os.environ)), allowed)
     if refusal:
         raise LaunchError(refusal)
+    claim_work_space()
     return notes
+
+
+def claim_work_space() -> None:
+    """Let OpenBLAS take its work space while it is known that there is some: without, it would ask for it for ever.
+
+    Raises MemoryError.
+    """
+    np.empty(WORK_SPACE, dtype=np.uint8)  # only asked for, and given back
+    np.linalg.solve(np.eye(2), np.ones(2))
 
 
 def read_libraries() -> Libraries:

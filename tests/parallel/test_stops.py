@@ -120,6 +120,32 @@ def test_too_little_memory_is_told_in_one_message(ranks: int, rank: int, folder:
     expect_equal(pbem.run(folder / "case.toml", folder / "case.h5", resume=True), whole)
 
 
+# The address space that is there when the program begins, and so many MB.
+LIMITED = """
+import resource, sys
+from pbem.cli import main
+import pbem.driver
+from pbem.parallel import world
+
+megabytes, rank, *arguments = sys.argv[1:]
+if world.rank == int(rank):
+    with open("/proc/self/statm") as sizes:
+        size = int(sizes.read().split()[0]) * resource.getpagesize() + int(megabytes) * 2**20
+    resource.setrlimit(resource.RLIMIT_AS, (size, size))
+sys.exit(main(arguments))
+"""
+
+
+@pytest.mark.parametrize(("megabytes", "ranks", "rank"), [(2, 1, 0), (100, 2, 1)])
+def test_too_little_memory_for_the_first_product_is_told(
+    megabytes: int, ranks: int, rank: int, folder: Path
+) -> None:
+    """OpenBLAS asks for its work space at its first call, again and again without an end if there is none."""
+    done = launch_snippet(ranks, LIMITED, str(megabytes), str(rank), "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("out of memory") == 1 and "Traceback" not in done.stderr, done.stderr
+
+
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_a_file_that_may_not_grow_is_told_in_one_message(ranks: int, folder: Path, whole: Results) -> None:
     """The limit of the size of files acts as a disk that is full, or a quota."""

@@ -18,7 +18,7 @@ from pbem.solve.linearity import describe_nonlinearity, measure_excess, measure_
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.passing import describe_passing, find_passing
 from pbem.solve.problem import Problem
-from pbem.solve.proportional import is_proportional
+from pbem.solve.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.step import ContactState, Reporter, Step
 from pbem.solve.tangent import AnyTangent
 
@@ -26,6 +26,8 @@ from pbem.solve.tangent import AnyTangent
 NEAR = 0.02
 # Of what forces in the contacts could still balance, a step takes this part.
 SAFE = 0.97
+# After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
+TRIED_FROM_REST = 2
 # The end of what is said of a limit load.
 BEYOND = "prescribe a displacement in place of the load to go beyond"
 
@@ -196,6 +198,7 @@ def _advance(
     if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
         raise _end_at_limit(problem, stage, reached, ceiling, ceiling.error)
     target, proportional = ceiling.choose(reached, planned, least), is_proportional(problem, memory, stage, reached)
+    tries, alike = 0, is_proportional_at_last(problem, memory, stage, reached)
     while True:
         reporter.start_step(stage, reached, target)
         # From rest nothing is gained by an early end.
@@ -219,7 +222,8 @@ def _advance(
             if half < least:
                 raise _end_march(problem, memory, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
-            target = reached + half
+            tries += 1
+            target = reached + (least if alike and tries == TRIED_FROM_REST else half)
 
 
 def _never(_: Memory) -> ConvergenceError | None:

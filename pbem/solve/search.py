@@ -70,7 +70,7 @@ FEW_IN_ALL, MOST_IN_ALL = 60, 120
 MOST_WIDENED = 2
 # The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
 SWEPT = 4
-# Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations none fewer changed.
+# Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
 
 
@@ -138,11 +138,11 @@ class Search:
         return True
 
     def _is_stalled(self) -> bool:
-        """Whether no fewer pairs change than before at this level, most of which pivoting is not made for."""
+        """Whether hardly fewer pairs change than before at this level, most of which pivoting is not made for."""
         if not self.varying or self.level == len(CAUTIONS) - 1 or 2 * len(self.changed[-1]) > self.counts[-1]:
             return False
         before, lately = np.split(self.counts[self.entered :], [-STALLED])
-        return bool(len(before) and lately.min() >= max(1, before.min()))
+        return bool(len(before) and lately.min() > SLOW * before.min())
 
     def _enter(self, level: int) -> None:
         self.level, self.entered = level, len(self.counts)

@@ -28,9 +28,17 @@ def test_terms_with_few_ratios_end_in_a_few_iterations() -> None:
     assert min(errors) < 1e-6 * errors[0]
 
 
-def test_terms_that_run_away_are_left_alone() -> None:
+def test_terms_that_run_away_run_on_some_terms_at_a_time() -> None:
+    """The first as it was found; then terms of growing powers, never back to the state that they leave."""
     terms = iterate(np.full(COUNT, 1.5), 6)
-    np.testing.assert_allclose(terms[-1], 1.5**6 * terms[0], rtol=1e-12)
+    np.testing.assert_allclose(terms[1], 1.5 * terms[0], rtol=1e-12)
+    np.testing.assert_allclose(terms[2], 1.5**5 * terms[0], rtol=1e-12)
+    assert all(np.abs(after).min() > 0 and (after * terms[0] > 0).all() for after in terms)
+
+
+def test_terms_that_grow_in_turns_are_left_alone() -> None:
+    terms = iterate(np.full(COUNT, -1.5), 5)
+    np.testing.assert_allclose(terms[-1], (-1.5) ** 5 * terms[0], rtol=1e-12)
 
 
 def test_other_modes_begin_anew_and_other_pairs_take_what_was_found() -> None:

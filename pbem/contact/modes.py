@@ -206,6 +206,8 @@ class Proposal:
         return self.violation > 0
 
 
+# The trial stiffness is that of a whole crack; the surroundings of a single pair are stiffer than this many times that.
+STIFFEST = 100.0
 # Part of the largest trial traction within which rounding could decide and a mode is kept.
 ROUNDING = 1e-10
 
@@ -245,7 +247,9 @@ def propose_modes(
     bound = evaluate_strength(laws, admissible, slide, pressure).bound
     # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to the last stick.
     adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), slide, pressure).bound
-    excess = np.abs(tangential) - np.where(is_open, np.maximum(bound - adhesion, 0.0), bound)
+    # Not where even stiff surroundings would not reach it: cohesion far above all tractions would push them back.
+    weak = is_open & (np.abs(tangential) * STIFFEST > bound)
+    excess = np.abs(tangential) - np.where(weak, np.maximum(bound - adhesion, 0.0), bound)
     free = ~resists_slip(laws)
     # A pair that goes on slipping is held against the traction that it has, whatever its bound was taken at.
     ahead = modes.sign * tangential - np.abs(state.p_s)

@@ -14,11 +14,14 @@ from pbem.solve.ceiling import SAFE, Ceiling
 from pbem.solve.ends import end_at_limit, end_at_rest, end_march, find_balanced, refuse_load
 from pbem.solve.newton import Solution, solve_step
 from pbem.solve.problem import Problem
-from pbem.solve.proportional import is_proportional
+from pbem.solve.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.recovery import describe_step
 from pbem.solve.step import ContactState, Reporter, Step
 from pbem.solve.step_notes import note_imbalance, note_nonlinearity, note_passing
 from pbem.solve.tangent import AnyTangent
+
+# After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
+TRIED_FROM_REST = 2
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ def _advance(
     if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
         raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
     target, proportional = ceiling.choose(reached, planned, least), is_proportional(problem, memory, stage, reached)
+    tries, alike = 0, is_proportional_at_last(problem, memory, stage, reached)
     while True:
         reporter.start_step(stage, reached, target)
         # From rest nothing is gained by an early end.
@@ -114,7 +118,8 @@ def _advance(
             if half < least:
                 raise end_march(problem, memory, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
-            target = reached + half
+            tries += 1
+            target = reached + (least if alike and tries == TRIED_FROM_REST else half)
 
 
 def _never(_: Memory) -> ConvergenceError | None:

@@ -28,6 +28,7 @@ from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
 from pbem.solve.cascade import run_cascade
+from pbem.solve.fixed_point import FixedPoint
 from pbem.solve.groups import is_one_group
 from pbem.solve.hold import Hold
 from pbem.solve.nearby import MOST_ASKED, settle_parts
@@ -113,6 +114,7 @@ def _search_modes(
     modes = problem.decide(lambda: follow_leaders(
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
+    fixed_point, kept = FixedPoint(), (modes, normal_traction, slip)
     while True:
         begin = time.perf_counter()
         law = linearise(
@@ -153,9 +155,13 @@ def _search_modes(
         if refused:
             moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
             raise ConvergenceError(refused.reason, refused.detail + moves)
+        frozen, left = search.caution.frozen, search.leaves(outcome.law_error)
         search.note(proposal, outcome.law_error)
         if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
+        if left:
+            modes, normal_traction, slip = kept
+            continue
         chosen = cascade.modes if cascade else None
         # The first rank alone knows which pairs hold a body.
         share = broadcast(comm, max(search.caution.share, hold.share))
@@ -173,8 +179,12 @@ def _search_modes(
             lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
-        normal_traction = pairs.p_n
-        slip = choose_slip(laws, modes, memory, slip, plastic_slip(laws, pairs), former)
+        normal_traction, found = pairs.p_n, plastic_slip(laws, pairs)
+        if frozen == "slip" and not proposal.changed.any():
+            found = fixed_point.choose(modes.fingerprint(), slip, found, modes.mode == SLIP)
+        slip = choose_slip(laws, modes, memory, slip, found, former)
+        if search.just_returned:
+            kept = (modes, normal_traction, slip)
 
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
@@ -227,8 +237,11 @@ def _pivot(
         )
 
     found: Settled = problem.decide(settle)
+    ends = search.conclude(found)
+    if found.modes is None and search.widen(ends):
+        return _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
-    if search.conclude(found) and not broadcast(problem.comm, len(hold.pairs)):
+    if ends and not broadcast(problem.comm, len(hold.pairs)):
         raise _end(hold, "no admissible modes", search.proposal, search)
     if found.modes is None:
         return None

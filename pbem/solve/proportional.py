@@ -14,7 +14,26 @@ def is_proportional(problem: Problem, memory: Memory, stage: int, reached: float
     So it is from rest in the first stage, where all that is prescribed grows with the load from nothing, with laws that
     know no length and no stress of their own: friction alone, without gap, cohesion, tensile strength or fluid.
     """
-    if stage > 0 or reached > 0 or not _has_no_scale(problem.laws):
+    return _has_no_scale(problem.laws) and _grows_from_rest(problem, memory, stage, reached)
+
+
+def is_proportional_at_last(problem: Problem, memory: Memory, stage: int, reached: float) -> bool:
+    """Whether states of this step come to be proportional to its load, the smaller that is, and are not trivial there.
+
+    So it is as above with cohesion besides, which no traction reaches in the end: faces without tensile strength then
+    either part or stick, and where no choice of these is admissible no smaller step finds one.
+    """
+    laws = problem.laws
+    parts = ~(laws.bonded | laws.parted) & ~(laws.tensile_strength > 0)
+    plain = all(group.law.linear for group in laws.strengths if parts[group.pairs].any())
+    if laws.gap[parts].any() or not parts.any() or not plain or laws.brittle.any():
+        return False
+    return _grows_from_rest(problem, memory, stage, reached)
+
+
+def _grows_from_rest(problem: Problem, memory: Memory, stage: int, reached: float) -> bool:
+    """Whether this is the first step, with all that is prescribed growing from nothing, and no fluid."""
+    if stage > 0 or reached > 0:
         return False
     rest = start_memory(problem.laws)
     untouched = not memory.slip.any() and not memory.normal_traction.any()

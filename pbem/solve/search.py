@@ -52,6 +52,8 @@ CAUTIONS = (
 # Errors of the laws, as parts of the bound, up to which the full tangent comes back where friction changes with slip:
 # from further off its steps leave the states through which faces that run away come to rest.
 NEAR = 0.02
+# After an iteration with the full tangent that leads further off than that, only from nearer by this factor.
+NEARER = 0.1
 # Changes that fall to no less than this part of the fewest before are a sign of pairs that disturb each other.
 SLOW = 0.5
 # Iterations in which the number of changes should have fallen.
@@ -62,8 +64,14 @@ PLAIN = 3
 COSTLY = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
 FUTILE = 6
+# Where a group fails, all pairs of models with so few are pivoted at once; of those with so many at the end of all.
+FEW_IN_ALL, MOST_IN_ALL = 60, 120
+# So often in a search: where it first fails and before it ends.
+MOST_WIDENED = 2
 # The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
 SWEPT = 4
+# Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
+STALLED = 4
 
 
 class Search:
@@ -94,9 +102,11 @@ class Search:
         self.failed: Settled | None = None
         self.futile = self.solved = 0
         self.pause = self.paused = 0
+        self.widened, self.widening, self.narrow = 0, False, self.group
         self.level = 0
         self.sweeping = self.sweeps
-        self.returned = False
+        self.returned = self.just_returned = False
+        self.near, self.error, self.entered = NEAR, np.inf, 0
         self.seen: set[bytes] = set()
 
     @property
@@ -108,9 +118,35 @@ class Search:
         self.proposal = proposal
         self.changed.append(np.flatnonzero(proposal.changed & ~self.excluded))
         self.counts.append(int(proposal.changed.sum()))
-        near = law_error <= NEAR or not self.varying
+        self.just_returned = False
+        near = law_error <= self.near or not self.varying
         if not self.counts[-1] and self.level and near and not self.returned:
-            self.level, self.returned = 0, True
+            self.level, self.returned, self.just_returned, self.error = 0, True, True, law_error
+        elif self._is_stalled():
+            self._enter(self.level + 1)
+
+    def leaves(self, law_error: float) -> bool:
+        """Whether the first iteration with the full tangent again has led away from a state that was nearly settled.
+
+        Then the frozen bound comes back, from that state, until it is nearer.
+        """
+        error, self.error = self.error, np.inf
+        if not self.varying or not law_error > max(error, NEAR):
+            return False
+        self.near, self.returned = NEARER * min(self.near, error), False
+        self._enter(1)
+        return True
+
+    def _is_stalled(self) -> bool:
+        """Whether hardly fewer pairs change than before at this level, most of which pivoting is not made for."""
+        if not self.varying or self.level == len(CAUTIONS) - 1 or 2 * len(self.changed[-1]) > self.counts[-1]:
+            return False
+        before, lately = np.split(self.counts[self.entered :], [-STALLED])
+        return bool(len(before) and lately.min() > SLOW * before.min())
+
+    def _enter(self, level: int) -> None:
+        self.level, self.entered = level, len(self.counts)
+        self.seen.clear()
 
     def is_stuck(self) -> bool:
         """Whether in the last LONG iterations no fewer pairs changed than at best in as many or more before."""
@@ -127,6 +163,9 @@ class Search:
     def choose_group(self) -> Integer:
         """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
         nothing = np.zeros(0, dtype=np.int64)
+        if self.widening:
+            self.group = self._list_all()
+            return self.group
         if len(self.counts) <= PLAIN or not self.counts[-1]:
             return nothing
         if self.paused < self.pause:
@@ -159,6 +198,7 @@ class Search:
         of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
         """
         if found.modes is not None:
+            self.widening = False
             self.futile = self.pause = 0
             self.solved += 1
             return False
@@ -168,6 +208,26 @@ class Search:
         self.failed_group, self.failed = self.group, found
         self.futile += found.tried > 1
         return (again and found.exhaustive) or self.futile >= FUTILE
+
+    def widen(self, ends: bool) -> bool:
+        """After a group for which nothing was found: whether all pairs are to be pivoted at once, with the same states.
+
+        Pairs that keep their modes only because they did not change can stand in the way of the others. ends: whether
+        the search ends otherwise.
+        """
+        if self.widening:
+            self.widening, self.group = False, self.narrow
+            return False
+        most = MOST_IN_ALL if ends else FEW_IN_ALL
+        if self.widened == MOST_WIDENED - (not ends) or not len(self.group) < len(self._list_all()) <= most:
+            return False
+        self.widened, self.widening, self.narrow = self.widened + 1, True, self.group
+        return True
+
+    def _list_all(self) -> Integer:
+        """All pairs that may be in a group; none where many cost much."""
+        count = 0 if self.interface is None else len(self.interface)
+        return np.flatnonzero(~np.broadcast_to(self.excluded, (count,)) if count else np.zeros(0, dtype=bool))
 
     def returns(self, fingerprint: bytes) -> bool:
         """Note a state of modes; whether it was there before at this level of caution."""
@@ -189,6 +249,5 @@ class Search:
             return False
         if self.level == len(CAUTIONS) - 1:
             return False
-        self.level += 1
-        self.seen.clear()
+        self._enter(self.level + 1)
         return True

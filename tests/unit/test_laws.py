@@ -223,6 +223,8 @@ TABLE = {
     "overlap closes and slips": ({}, OPEN, (0.0, 0.0, -0.01, 0.02), 0, 0, 1, SLIP, 1),
     "overlap closes and slips the other way": ({}, OPEN, (0.0, 0.0, -0.01, -0.02), 0, 0, 1, SLIP, -1),
     "touching again counts from the last slip": ({}, OPEN, (0.0, 0.0, -0.01, 0.02), 0.02, 0, 1, STICK, None),
+    "overlap closes and slips without cohesion": ({"cohesion": 1.0}, OPEN, (0.0, 0.0, -0.01, 0.02), 0, 0, 1, SLIP, 1),
+    "cohesion far above what moved it sticks": ({"cohesion": 1e5}, OPEN, (0.0, 0.0, -0.01, 0.02), 0, 0, 1, STICK, None),
     "tension within the strength sticks": ({"tensile_strength": 0.2, "cohesion": 1.0}, STICK, (0.19, 0, 0, 0), 0, 0, 1,
                                            STICK, None),
     "tension beyond the strength opens": ({"tensile_strength": 0.2, "cohesion": 1.0}, STICK, (0.21, 0, 0, 0), 0, 0, 1,

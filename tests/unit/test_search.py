@@ -153,3 +153,49 @@ def test_the_full_tangent_waits_until_friction_that_changes_with_slip_is_near_it
         assert search.descend() and search.descend()
         search.note(propose([]), law_error)
         assert search.level == level
+
+
+def test_pairs_that_pivoting_is_not_made_for_are_met_with_caution_once_their_number_does_not_fall() -> None:
+    search = Search(50, excluded=np.arange(COUNT) < 60, varying=True)
+    follow(search, *(list(range(count)) for count in (40, 20, 9, 15, 30, 12)))
+    assert search.level == 0
+    follow(search, list(range(10)))
+    assert search.level == 1
+    # Not where those that can be pivoted are as many, nor with laws that are linear in each mode.
+    for other in (Search(50, excluded=np.arange(COUNT) < 4, varying=True), Search(50, excluded=np.arange(COUNT) < 60)):
+        follow(other, *(list(range(count)) for count in (40, 20, 9, 15, 30, 12, 10)))
+        assert other.level == 0
+
+
+def test_a_full_tangent_that_leads_away_gives_way_to_the_frozen_bound_until_that_is_nearer() -> None:
+    search = Search(50, varying=True)
+    search.descend()
+    search.note(propose([]), 0.01)
+    assert (search.level, search.just_returned) == (0, True)
+    assert search.leaves(0.9)
+    search.note(propose([1, 2]), 0.9)
+    assert search.level == 1
+    search.note(propose([]), 0.005)
+    assert search.level == 1
+    search.note(propose([]), 0.0009)
+    assert (search.level, search.just_returned) == (0, True)
+    assert not search.leaves(1e-5)
+
+
+def test_all_pairs_are_pivoted_at_once_where_a_group_fails_and_before_the_end() -> None:
+    interface, follows = np.zeros(COUNT, dtype=np.int64), np.arange(COUNT) >= 50
+    search = Search(90, interface, follows)
+    assert follow(search, [1, 2], [1, 2], [1, 2], [1, 2])[-1] == [1, 2]
+    assert not search.conclude(fail(False, 5)) and search.widen(False)
+    assert search.choose_group().tolist() == list(range(50))
+    assert not search.conclude(fail(False, 5)) and not search.widen(False)
+    # What disturbs each other goes on from the small group, until the search would end.
+    assert follow(search, [3]) == [[1, 2, 3]]
+    assert not search.conclude(fail(False, 5)) and not search.widen(False)
+    assert search.widen(True) and len(search.choose_group()) == 50
+    assert not search.widen(True) and not search.widen(True)
+    # Nor where each pair costs much, or where there are many and the search goes on.
+    for interface_of_pairs, ends in ((None, True), (interface, False)):
+        other = Search(90, interface_of_pairs)
+        follow(other, [1, 2], [1, 2], [1, 2], [1, 2])
+        assert not other.conclude(fail(False, 5)) and not other.widen(ends)

@@ -218,6 +218,63 @@ def test_cohesion_without_admissible_modes_is_named_and_the_advice_works() -> No
     assert step.factor == 1.0
 
 
+def test_cohesion_without_admissible_modes_at_small_loads_is_not_halved_towards() -> None:
+    """Loads far below the cohesion: faces part or stick, the same at every fraction, of which the least is tried."""
+    listener = Listener()
+    with pytest.raises(ConvergenceError, match=r"the step to 0\.0001 failed and is the smallest allowed") as caught:
+        run(write_cohesive_field(False).replace("min_step = 0.6, ", ""), listener)
+    assert caught.value.reason == "no admissible modes"
+    assert listener.tried == 3 and len(listener.rejected) == 2
+
+
+WEAKENING_INCLUSIONS = """
+[materials]
+rock = { young = 0.246, poisson = 0.375, plane = "stress" }
+grain = { young = 1.985, poisson = 0.154, plane = "stress" }
+[curves]
+bottom = { points = [[-30.022, -8.655], [-18.483, -4.377]], elements = 8 }
+right = { points = [[-18.483, -4.377], [-22.761, 7.163]], elements = 8 }
+top = { points = [[-22.761, 7.163], [-34.301, 2.884]], elements = 8 }
+left = { points = [[-34.301, 2.884], [-30.022, -8.655]], elements = 8 }
+i0 = { center = [-24.858, 1.214], radius = 1.771, angles = [20.0, 380.0], elements = 20 }
+i1 = { points = CORNERS, elements = 20 }
+i2 = { center = [-29.068, -1.039], radius = 1.703, angles = [20.0, 380.0], elements = 24 }
+[regions]
+g0 = { material = "grain", boundary = ["i0"] }
+g1 = { material = "grain", boundary = ["i1"] }
+g2 = { material = "grain", boundary = ["i2"] }
+body = { material = "rock", boundary = ["bottom", "right", "top", "left", "i0", "i1", "i2"] }
+[interfaces]
+i0 = { law = "coulomb", friction = 0.766, friction_dynamic = 0.343, slip_distance = 4.67e-5, gap = 2.62e-4, JOINT }
+i1 = { law = "coulomb", friction = 0.766, friction_dynamic = 0.343, slip_distance = 4.67e-5, gap = 4.31e-5, JOINT }
+i2 = { law = "coulomb", friction = 0.766, friction_dynamic = 0.343, slip_distance = 4.67e-5, gap = 1.22e-4, JOINT }
+[boundary]
+bottom = { un = 0.0, us = 0.0 }
+left = { tn = -2.83e-5, ts = 0.0 }
+right = { tn = -2.83e-5, ts = 0.0 }
+top = { tn = -2.93e-5, ts = 0.0 }
+[analysis]
+order = 2
+scheme = "DBEM"
+steps = 1
+""".replace(
+    "CORNERS", "[[-26.85, -2.39], [-27.03, -4.18], [-25.39, -4.91], [-24.19, -3.57], [-25.09, -2.01], [-26.85, -2.39]]"
+).replace("JOINT", "normal_stiffness = 1.087, tangential_stiffness = 0.653")
+
+
+def test_steep_weakening_on_loose_bodies_settles_with_frozen_bounds() -> None:
+    """Friction that falls by half in a fifth of the slip: Newton's steps do not end, nor do their states come back."""
+    listener = Listener()
+    (step,) = run(WEAKENING_INCLUSIONS, listener)
+    assert not listener.rejected and len(step.iterations) <= 25
+    contact = step.contact
+    slips = contact.mode == SLIP
+    slid = np.abs(contact.slip - contact.traction_s / 0.653)
+    friction = 0.766 - (0.766 - 0.343) * np.minimum(slid / 4.67e-5, 1.0)
+    error = np.abs(np.abs(contact.traction_s) + friction * contact.traction_n)[slips]
+    assert slips.sum() > 10 and error.max() <= 1e-7 * np.abs(contact.traction_n).max()
+
+
 def test_elements_that_cannot_carry_contact_are_named() -> None:
     # Two faces at a fifteenth of an element's length from each other.
     curves = {"upper": line(-1 + 0.03j, 1 + 0.03j, 4, "none"), "lower": line(-0.8 + 0j, 1.1 + 0j, 5, "none")}

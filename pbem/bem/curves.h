@@ -35,7 +35,7 @@ typedef struct {
     double reach;                   /* half the chord of half a panel */
     cplx middle[MOST_PANELS];       /* of the panels */
     double jacobian;                /* unit of |dzeta/ds|: of moments for tractions */
-    double node_weight[MAX_SHAPES]; /* |dzeta/ds| at the nodes in that unit; by it nodal tractions become coefficients */
+    double node_weight[MAX_SHAPES]; /* |dzeta/ds| at the nodes in that unit: nodal tractions to coefficients */
 } Curve;
 
 #define MOST_CURVE_BYTES 4096

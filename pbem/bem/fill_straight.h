@@ -58,7 +58,7 @@ INLINE void turn_to_group(Variant v, double *row_H, double *row_G, const int64_t
     }
 }
 
-/* The lanes of a group that are nearer than the limit join the near pairs; they are done once more, in their own way. */
+/* The lanes of a group that are nearer than the limit join the near pairs, which are done in their own way. */
 INLINE void note_near(NearPairs *near, Py_ssize_t point, int group, const int64_t *element, Lanes r2, double limit)
 {
     for (int lane = 0; lane < LANES; lane++) {
@@ -69,7 +69,7 @@ INLINE void note_near(NearPairs *near, Py_ssize_t point, int group, const int64_
     }
 }
 
-/* Near pairs side by side: their elements, points as the elements see them, and whether they lie off these (1) or on (0). */
+/* Near pairs side by side: their elements, points as these see them, and whether they lie off (1) or on them (0). */
 typedef struct {
     Frame frame;
     Pairs pairs;

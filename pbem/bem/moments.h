@@ -97,7 +97,7 @@ static void evaluate_moments(cplx w, int on_element, int order, Moments *m)
     }
 }
 
-/* Moments of t^(k + 1/2) seen from the tip; brought to the element's own coordinate, units and direction (theory, 24). */
+/* Moments of t^(k + 1/2) seen from the tip, in the element's own coordinate, units and direction (theory, 24). */
 static void evaluate_tip_moments(cplx w, int on_element, int order, int tip, Moments *m)
 {
     const double sign = point_inward(tip);

@@ -1,4 +1,4 @@
-/* What is asked for: rows of points on elements; the variants of the code that fills them, and how blocks are stored. */
+/* What is asked for: rows of points on elements; the variants of the code that fills them; how blocks are stored. */
 #ifndef PBEM_ROWS_H
 #define PBEM_ROWS_H
 #include "complex_lanes.h"

@@ -12,13 +12,13 @@
 #include "fill_curves.h"
 #include "fill_straight.h"
 
-/*           kind          its elements                                   rows are filled by  curve */
+/*       kind          its elements, if not of a line above          filled by      functions of the curve */
 #define KINDS(LINE)                                                                                    \
-    LINE(STRAIGHT,     r->sweep[j] == 0 && !is_tip(r->family[j]),     fill_straight,      NULL)    \
-    LINE(STRAIGHT_TIP, r->sweep[j] == 0,                              fill_tips,          NULL)    \
-    LINE(ARC,          1,                                             fill_curves,        &ARCS)
+    LINE(STRAIGHT,     r->sweep[j] == 0 && !is_tip(r->family[j]),    fill_straight, NULL)              \
+    LINE(STRAIGHT_TIP, r->sweep[j] == 0,                             fill_tips,     NULL)              \
+    LINE(ARC,          1,                                            fill_curves,   &ARCS)
 
-/*           function       densities */
+/*       function       densities */
 #define FILLS(LINE)                                                                                    \
     LINE(fill_straight, WITH_TRACTIONS)                                                                \
     LINE(fill_tips,     JUMPS)                                                                         \

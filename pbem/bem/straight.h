@@ -95,8 +95,8 @@ INLINE void evaluate_far(Variant is, int terms, Complex w, Lanes ends, LaneMomen
 {
     const int top = is.order + 1;
     const Lanes r2 = c_norm(w), both = 1 / (r2 * ends);
-    const Complex v = c_scale(both * ends, c_conj(w)), q = c_square(v);           /* 1/w, 1/w^2 */
-    const Complex d0 = c_scale(2 * both * r2, c_conj(multiply_ends(w)));          /* 2/(w^2 - 1) */
+    const Complex v = c_scale(both * ends, c_conj(w)), q = c_square(v);  /* 1/w, 1/w^2 */
+    const Complex d0 = c_scale(2 * both * r2, c_conj(multiply_ends(w))); /* 2/(w^2 - 1) */
     const Complex sum = sum_series(series + (top + 1) / 2, terms, q);
     m->y = w.im;
     m->c[top] = c_mul(sum, top % 2 ? q : v);
@@ -136,7 +136,7 @@ INLINE void evaluate_near(Variant is, Complex w, Lanes log_ratio, Lanes angle, L
 /* A point's place as a tip sees it: distance along and across from it, in lengths of the element. */
 INLINE Complex locate_from_tip(int tip, Complex w) { return c_shift(c_scale(0.5 * point_inward(tip), w), 0.5); }
 
-/* Far from a tip element, q counted from the tip; moments in the element's own coordinate as the others (theory, 25). */
+/* Far from a tip element, q counted from the tip; moments in the element's coordinate as the others (theory, 25). */
 INLINE void evaluate_far_tip(Variant is, int terms, int tip, Complex q, LaneMoments *m)
 {
     const int with_e = is.equation == TRACTION_EQUATION;

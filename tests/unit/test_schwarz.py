@@ -14,7 +14,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve import assembly, groups
+from pbem.solve import dense_system, groups
 from pbem.solve.assembly import assemble_problem
 from pbem.solve.groups import Group
 from pbem.solve.krylov import KrylovTangent
@@ -129,7 +129,7 @@ def test_each_group_has_the_exact_rows_of_its_own_tangent(
 
     What makes B of a body's rotation zero is left to groups that contain the body.
     """
-    for module in (assembly, hierarchical):
+    for module in (dense_system, hierarchical):
         monkeypatch.setattr(module, "find_rigid_motions", lambda mesh, finite, needed: ())
     problem = assemble(name)
     preconditioner = precondition(problem)

@@ -27,10 +27,10 @@ MOST_WORKSPACE = 10_000  # per cent
 # PETSc's codes with which LAPACK and ScaLAPACK report a pivot that is zero; MUMPS sets the solver's reason instead.
 ZERO_PIVOT, LIBRARY_ERROR = 71, 76
 
-# What is taken beside the operations of the factorisation, in those of a large one (a tenth of a nanosecond a core): to
-# form and store an entry of the matrix, and to order and analyse a row of a sparse one; a call for any columns; an
-# operation on one column (it waits for memory), one on many columns at a time, and such a one of several ranks.
-OPERATIONS_OF_AN_ENTRY, OPERATIONS_OF_A_ROW, OPERATIONS_OF_A_CALL = 200.0, 4e5, 2e7
+# What an operation takes, in those of a large LU factorisation (a tenth of a nanosecond a core): to form and store an
+# entry of the matrix, a call for any columns; an operation on one column (it waits for memory), one on many columns at
+# a time, and such a one of several ranks.
+OPERATIONS_OF_AN_ENTRY, OPERATIONS_OF_A_CALL = 200.0, 2e7
 SINGLE, MANY, MANY_BY_RANKS = 12.0, 1.0, 4.0
 
 
@@ -152,12 +152,11 @@ class LinearSolver:
         entries, stored, operations = rows**2, rows**2, 2 / 3 * rows**3
         if self.factor_type == "mumps":
             entries = float(self.matrix.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"])
-            stored, operations = entries, OPERATIONS_OF_A_ROW * rows
+            stored, operations = entries, 0.0
             if self._find_mumps_code() is not None:
                 factor = self.solver.getPC().getFactorMatrix()
                 size = factor.getMumpsInfog(29)  # below zero: in millions
-                stored = float(size if size >= 0 else -1e6 * size)
-                operations += factor.getMumpsRinfog(3)
+                stored, operations = float(size if size >= 0 else -1e6 * size), factor.getMumpsRinfog(3)
         # A product is one of known and unknown values: twice the matrix's entries.
         return Work(
             operations + OPERATIONS_OF_AN_ENTRY * entries,

@@ -169,7 +169,7 @@ def test_old_factors_are_given_up_when_they_have_cost_as_much_as_new_ones() -> N
 
 
 def test_operations_are_those_of_the_textbook() -> None:
-    """Of a dense operator 2/3 n^3, 2 n^2 a column; of a sparse one of two regions less, but for what a row takes."""
+    """Of a dense operator 2/3 n^3, 2 n^2 a column; of a sparse one of two regions less, but some."""
     work = {}
     for linear in ("lu", "mumps"):
         problem = make_blocks(linear)
@@ -181,7 +181,7 @@ def test_operations_are_those_of_the_textbook() -> None:
     assert work["lu"].factors == pytest.approx(2 / 3 * rows**3 + forming, rel=1e-12)
     assert work["lu"].column == pytest.approx(2 * rows**2, rel=1e-12)
     assert work["lu"].call == pytest.approx(2e7 + 24 * rows**2, rel=1e-12)
-    assert 0.3 * forming < work["mumps"].factors - 4e5 * rows < work["lu"].factors
+    assert 0.3 * forming < work["mumps"].factors < work["lu"].factors
     assert 0.3 < work["mumps"].column / work["lu"].column < 1.0
 
 

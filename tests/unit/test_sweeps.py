@@ -85,7 +85,8 @@ def test_tractions_are_those_of_the_solution_and_of_the_stiffness(many_groups: N
     load, law_now = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
     constraints = problem.constrain(law_now, load)
     solved = tangent.solve(constraints, load, law_now)
-    state, found = evaluate_pairs(problem.mesh, law_now, solved.unknowns), Sweeps(problem, tangent.preconditioner, load)
+    state = evaluate_pairs(problem.mesh, law_now, solved.unknowns)
+    found = Sweeps(problem, tangent.preconditioner, problem.system.groups, load)
     jumps = np.column_stack([state.g_n, state.g_s])
     exact = np.column_stack([state.p_n, state.p_s]) / problem.traction_scale
     tractions = found.find_tractions(constraints, load, solved, jumps)

@@ -20,7 +20,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
 from pbem.model.refinement import bisect_elements, impose_fractions
-from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_first, world
+from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_first, lacks_memory, world
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.estimator import Estimator
 from pbem.results.output import check_output_path
@@ -257,7 +257,8 @@ def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | No
     """Close the file. A pass that was stopped can be gone on with, one that has failed gives way to the former one."""
     reached = isinstance(error, ConvergenceError) and error.reason == "accuracy"
     stopped = isinstance(error, StopError | KeyboardInterrupt) and writer.steps_stored > 0
-    reasons = writer.abandon(error)
+    # PETSc and what lies below it have errors of their own for want of memory.
+    reasons = writer.abandon(MemoryError(" ".join(str(error).split())) if lacks_memory(error) else error)
     if former and (reached or stopped):
         former.drop()
     elif former:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 import threading
@@ -22,7 +23,9 @@ Integer = NDArray[np.int64]
 
 T = TypeVar("T")
 
-PETSC_ERR_MEM = 55
+PETSC_ERR_MEM, PETSC_ERR_LIB = 55, 76
+# How PETSc tells that MUMPS could not allocate what it needs to solve.
+MUMPS_LACKS_MEMORY = re.compile(r"\bMUMPS\b.*INFOG\(1\) ?= ?-(5|7|13|19|22|29)\b")
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 world: MPI.Intracomm = MPI.COMM_WORLD
@@ -56,8 +59,10 @@ def abort_if_unexpected(comm: MPI.Intracomm, expected: type[Exception]) -> Itera
 
 
 def lacks_memory(error: BaseException) -> bool:
-    """Whether it is Python's error of too little memory, or PETSc's."""
-    return isinstance(error, MemoryError) or getattr(error, "ierr", None) == PETSC_ERR_MEM
+    """Whether it is Python's error of too little memory, PETSc's, or that of a library below PETSc."""
+    code = getattr(error, "ierr", None)
+    below = code == PETSC_ERR_LIB and MUMPS_LACKS_MEMORY.search(str(error)) is not None
+    return isinstance(error, MemoryError) or code == PETSC_ERR_MEM or below
 
 
 def describe_lack(error: BaseException) -> str:

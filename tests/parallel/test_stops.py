@@ -14,6 +14,7 @@ from types import ModuleType
 import pytest
 
 import pbem
+from pbem.parallel import lacks_memory
 from pbem.results.reader import Results, open_results
 from tests.parallel.launch import launch_snippet
 from tests.parallel.test_resume import CASE, STEPS, expect_equal
@@ -144,6 +145,20 @@ def test_too_little_memory_for_the_first_product_is_told(
     done = launch_snippet(ranks, LIMITED, str(megabytes), str(rank), "run", "case.toml", "--quiet", cwd=folder)
     assert done.returncode == 1, done.stderr
     assert done.stderr.count("out of memory") == 1 and "Traceback" not in done.stderr, done.stderr
+
+
+class LibraryError(RuntimeError):
+    """As PETSc's of a library that it calls."""
+
+    ierr = 76
+
+
+@pytest.mark.parametrize(("code", "lacks"), [(-13, True), (-7, True), (-10, False), (-130, False)])
+def test_mumps_without_memory_while_it_solves_is_no_unexpected_error(code: int, lacks: bool) -> None:
+    """The codes are those of MUMPS' manual: -13 and -7 are failed allocations, -10 is a singular matrix."""
+    lines = ("error code 76", "[0] MatMatSolve_MUMPS() at ./src/mat/impls/aij/mpi/mumps/mumps.c:1311",
+             f"[0] Error reported by MUMPS in solve phase: INFOG(1)={code}")
+    assert lacks_memory(LibraryError("\n".join(lines))) is lacks
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

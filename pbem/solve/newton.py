@@ -89,6 +89,13 @@ def solve_step(
             if not search.swept:
                 raise
     search = _make_search(problem, tangent, False)
+    search.wary = False
+    try:
+        return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+    except ConvergenceError as error:
+        if not search.varying or error.reason not in ("iteration limit", "mode cycle"):
+            raise
+    search = _make_search(problem, tangent, False)  # wary of friction that changes with slip
     return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
 
 
@@ -180,7 +187,7 @@ def _search_modes(
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
         normal_traction, found = pairs.p_n, plastic_slip(laws, pairs)
-        if frozen == "slip" and not proposal.changed.any():
+        if search.wary and frozen == "slip" and not proposal.changed.any():
             found = fixed_point.choose(modes.fingerprint(), slip, found, modes.mode == SLIP)
         slip = choose_slip(laws, modes, memory, slip, found, former)
         if search.just_returned:

@@ -91,6 +91,7 @@ class Search:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.excluded: NDArray[np.bool_] = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept = sweeps, False
+        self.wary = True  # whether changes that stall, and a full tangent that leads away, are met with caution
         self.restart()
 
     def restart(self) -> None:
@@ -131,7 +132,7 @@ class Search:
         Then the frozen bound comes back, from that state, until it is nearer.
         """
         error, self.error = self.error, np.inf
-        if not self.varying or not law_error > max(error, NEAR):
+        if not (self.varying and self.wary) or not law_error > max(error, NEAR):
             return False
         self.near, self.returned = NEARER * min(self.near, error), False
         self._enter(1)
@@ -139,7 +140,9 @@ class Search:
 
     def _is_stalled(self) -> bool:
         """Whether hardly fewer pairs change than before at this level, most of which pivoting is not made for."""
-        if not self.varying or self.level == len(CAUTIONS) - 1 or 2 * len(self.changed[-1]) > self.counts[-1]:
+        if not (self.varying and self.wary) or self.level == len(CAUTIONS) - 1:
+            return False
+        if 2 * len(self.changed[-1]) > self.counts[-1]:
             return False
         before, lately = np.split(self.counts[self.entered :], [-STALLED])
         return bool(len(before) and lately.min() > SLOW * before.min())

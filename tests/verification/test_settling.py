@@ -263,10 +263,11 @@ steps = 1
 
 
 def test_steep_weakening_on_loose_bodies_settles_with_frozen_bounds() -> None:
-    """Friction that falls by half in a fifth of the slip: Newton's steps do not end, nor do their states come back."""
+    """Friction that falls by half in a fifth of the slip: Newton's steps do not end, nor do their states come back; a
+    second search, with more caution, ends in half as many."""
     listener = Listener()
     (step,) = run(WEAKENING_INCLUSIONS, listener)
-    assert not listener.rejected and len(step.iterations) <= 25
+    assert not listener.rejected and len(step.iterations) <= 50 + 25
     contact = step.contact
     slips = contact.mode == SLIP
     slid = np.abs(contact.slip - contact.traction_s / 0.653)

@@ -10,9 +10,7 @@ from itertools import count
 from pathlib import Path
 from typing import get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pbem.arrays import Integer, Real
 from pbem.case.build import Source, find_file, make_checked_model
 from pbem.description.case import UNNAMED
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
@@ -176,7 +174,7 @@ def _solve(
 
 
 def _open(
-    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], region: NDArray[np.int64] | None, one: Pass
+    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], region: Integer | None, one: Pass
 ) -> _Output:
     """The result file to go on with, or a new one beside which the former pass is kept."""
     flat = [f"{name}={value}" for name, value in options.items()]
@@ -280,7 +278,7 @@ def _end_pass(writer: ResultWriter, decision: Decision) -> None:
 
 
 def _append(
-    writer: ResultWriter | None, step: Step, rows: Mapping[str, NDArray[np.float64]] | None, missing: str
+    writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | None, missing: str
 ) -> tuple[str, ...]:
     if writer is None:
         return ()

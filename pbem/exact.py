@@ -17,11 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import polynomial
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ellipe, ellipk
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from pbem.arrays import Complex, Real
 
 
 class Potentials(NamedTuple):

@@ -14,12 +14,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.errors import LaunchError, StopError, printable
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 T = TypeVar("T")
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.model.material import Material
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 Stress = tuple[float, float, float]
 
 

@@ -6,15 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.expansion import carry_over, gather_from_children, pass_to_children, shift_matrices
 from pbem.bem.tree import Forest
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 # Pairs of clusters that are treated at once: their coefficients fit into the caches.
 CHUNK = 1024

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestors, prepare_shifts
 from pbem.bem.leaf import Medium, source_matrix, target_matrix
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
@@ -23,11 +23,6 @@ from pbem.bem.tree import Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
 
 # Elements in a leaf at most: fewer make more work of the expansions, more make more of the near elements.
 LEAF_ELEMENTS = 16

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.background import Background
 from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_nodes, split_faces
 from pbem.mesh.mesh import Mesh, second_face_nodes
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Directions that differ by less (radians) are one: rounding of places far from the origin.
 SMOOTH = 1e-6

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.location import Location
 from pbem.bem.operator import collect_sources
 from pbem.bem.rigid import RigidMotions, take_off_rotations
@@ -16,10 +16,6 @@ from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes,
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import split_components
 from pbem.model.material import Material
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Scratch memory of one call of the kernels, and the most that is kept for the next step, in bytes.
 CHUNK_BYTES = 32_000_000

@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.mesh import Mesh
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # A point lies on an element if it is nearer to it than this part of half its length, or if it is inside and this near
 # to one of the element's ends, where the polynomials of neighbours differ.

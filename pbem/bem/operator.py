@@ -15,17 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.mesh import Mesh
 from pbem.model.material import Material
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
 
 # Scratch memory of one call of the kernels, in bytes: about that of the caches.
 CHUNK_BYTES = 2_000_000

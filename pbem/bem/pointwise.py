@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
 from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_columns, log_lengths
 from pbem.bem.interior import Values
@@ -16,10 +16,6 @@ from pbem.bem.rigid import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.tree import Interactions, build_forest, find_interactions
 from pbem.mesh.numbering import list_nodes, split_components
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Points in a leaf at most.
 LEAF_POINTS = 32

@@ -8,13 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem import _kernels
 from pbem.geometry.elements import Elements
 from pbem.mesh.shapes import interpolate_shapes, tip_shapes
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,8 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from pbem.arrays import Bool, Complex, Integer, Real
 
 
 @dataclass(frozen=True)

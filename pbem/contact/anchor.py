@@ -10,14 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.mesh.mesh import Mesh
 from pbem.model.support import FreeMotion
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -95,7 +91,7 @@ class _Nodes:
     mesh: Mesh
     numbers: Mapping[str, int]
     bounds: Integer
-    crack: NDArray[np.bool_]
+    crack: Bool
 
     def find(self, region: int) -> Integer:
         """The nodes of a region, cracks left out."""

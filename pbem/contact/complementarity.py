@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -34,10 +34,6 @@ from pbem.contact.laws import (
 )
 from pbem.contact.modes import tensile_limit
 from pbem.contact.pivoting import solve_by_pivoting
-
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
 ROUNDING, PERTURBATION = 1e-12, 1e-10

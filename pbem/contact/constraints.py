@@ -11,17 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.contact.laws import PairState
 from pbem.contact.loads import Load, OuterNodes
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation
 from pbem.mesh.mesh import Mesh
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.contact.declaration import FrictionLaw, Slide
 from pbem.contact.strength_type import Strength
-
-Real = NDArray[np.float64]
 
 PARTS = ("bound", "by_traction", "by_slip")
 EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays of the shape of p_n"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.contact.laws import OPEN, STICK, ModeState
 from pbem.contact.loads import OuterNodes
 from pbem.mesh.mesh import Mesh
@@ -14,10 +14,6 @@ from pbem.mesh.parts import Parts
 from pbem.model.model import Model
 from pbem.model.rigid import GROUND, Link, find_moving_bodies
 from pbem.model.support import describe_motion, find_least_stiffness
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 
 def describe_cut_motions(model: Model, mesh: Mesh, outer: OuterNodes, parts: Parts, modes: ModeState) -> str | None:

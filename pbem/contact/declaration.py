@@ -15,10 +15,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.strength_type import Strength
 
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 Parameters = Mapping[str, Real]
 
 
@@ -86,7 +85,7 @@ class Slide:
         """The brittle bonds (k,) that are lost."""
         return self.start[BROKEN.name]
 
-    def take(self, pairs: NDArray[np.int64]) -> Slide:
+    def take(self, pairs: Integer) -> Slide:
         """That of some pairs."""
         return Slide(self.ahead[pairs], {name: values[pairs] for name, values in self.start.items()}, self.duration)
 

@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool
 from pbem.contact.laws import OPEN
 from pbem.contact.modes import Proposal
-
-Bool = NDArray[np.bool_]
 
 # Choices of detached pairs that are followed from one to the next, and beyond that tried one by one. Those of more
 # pairs than are pivoted quickly are the fewer, as pivoting costs the cube of their number.

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
 from pbem.contact.strength import choose_strength
 from pbem.contact.strength_type import Strength
@@ -20,9 +21,6 @@ from pbem.geometry.expression import evaluate_expression
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
 
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
 Modes = NDArray[np.int8]
 
 STICK, SLIP, OPEN = np.int8(0), np.int8(1), np.int8(2)

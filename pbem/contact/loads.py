@@ -6,17 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.background import Background
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Region, Stage
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -28,7 +23,7 @@ class OuterNodes:
     """
 
     node: Integer
-    direction: NDArray[np.complex128]
+    direction: Complex
     displacement_known: Bool
     condition: Integer
     stiffness: Real

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from pbem.arrays import Integer, Real
 from pbem.mesh.numbering import number_components
 
-Real = NDArray[np.float64]
 Single = NDArray[np.float32]
-Integer = NDArray[np.int64]
 
 
 def solve_laws(

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -25,9 +25,6 @@ from pbem.contact.laws import (
     plastic_slip,
     resists_slip,
 )
-
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 Frozen = Literal["nothing", "slip", "strength"]
 P_N, P_S, G_N, G_S = range(4)
@@ -43,7 +40,7 @@ class Linearisation:
 
     tangent: Real
     offset: Real
-    leader: NDArray[np.int64]
+    leader: Integer
 
     def evaluate(self, unknowns: Real) -> PairState:
         """State of the pairs from their unknowns (m, 2)."""

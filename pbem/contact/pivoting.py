@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.blas import dger
 
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from pbem.arrays import Bool, Integer, Real
 
 # Pivots and ratios this small, relative to the largest of their column, are rounding.
 ROUNDING = 1e-11
@@ -71,7 +69,7 @@ def _exchange(table: Real, row: int, column: int) -> None:
     dger(-1.0, table[row].copy(), others, a=table.T, overwrite_a=1)
 
 
-def _choose_row(table: Real, basis: NDArray[np.int64], entering: int, scale: float) -> int | None:
+def _choose_row(table: Real, basis: Integer, entering: int, scale: float) -> int | None:
     """The row whose variable is the first to reach zero; None if none does: a ray.
 
     Of several the artificial variable leaves first, else the one of the largest pivot.
@@ -88,7 +86,7 @@ def _choose_row(table: Real, basis: NDArray[np.int64], entering: int, scale: flo
     return int(last[0]) if len(last) else int(tied[np.argmax(column[tied])])
 
 
-def _finish(ended: Literal["solution", "ray", "limit"], table: Real, basis: NDArray[np.int64], pivots: int) -> Pivoted:
+def _finish(ended: Literal["solution", "ray", "limit"], table: Real, basis: Integer, pivots: int) -> Pivoted:
     count = len(basis)
     own = (basis >= count) & (basis < 2 * count)
     z, basic = np.zeros(count), np.zeros(count, dtype=bool)

@@ -14,12 +14,10 @@ exactly, and friction is that at the end of the step.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide
 from pbem.contact.strength_type import Strength
-
-Real = NDArray[np.float64]
 
 # Slips below this part of the slip distance are in a series.
 SMALL = 1e-3

@@ -13,16 +13,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Real
 from pbem.contact.custom import CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
 from pbem.contact.rate_and_state import RateAndState
 from pbem.contact.strength_type import Strength
 from pbem.errors import Fault
 from pbem.model.model import Law, Model
-
-Real = NDArray[np.float64]
 
 
 class Coulomb(FrictionLaw):
@@ -34,7 +32,7 @@ class Coulomb(FrictionLaw):
         """See FrictionLaw (theory, 48)."""
         return _evaluate_cone(p_n, friction, cohesion)
 
-    def resists(self, parameters: Parameters) -> NDArray[np.bool_]:
+    def resists(self, parameters: Parameters) -> Bool:
         """Whether there is any friction or cohesion."""
         return (parameters["friction"] > 0) | (parameters["cohesion"] > 0)
 

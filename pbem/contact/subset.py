@@ -14,8 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Real
 from pbem.contact.complementarity import (
     PairProblem,
     Response,
@@ -33,10 +33,6 @@ from pbem.contact.laws import (
     PairState,
 )
 from pbem.contact.modes import Proposal, limit_changes, tensile_limit
-
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
 
 # The most pairs that are pivoted; Newton's steps among them cost a hundredth of it.
 MOST_PIVOTED = 300

@@ -6,16 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.contact.anchor import Anchor, group_motions, see_motions
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, resists_slip
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.support import FreeMotion, PairTie, Tie, find_free_motions
-
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 # Two sticking pairs that are further apart than this part of their interface's extent hold all three motions.
 APART = 1e-6
@@ -46,7 +43,7 @@ def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie | Pai
     return ties
 
 
-def _measure_span(mesh: Mesh, chosen: NDArray[np.int64]) -> Real:
+def _measure_span(mesh: Mesh, chosen: Integer) -> Real:
     """Largest distance (interfaces,) of chosen pairs from the first of them on the same interface."""
     of, first = np.unique(mesh.pairs.interface[chosen], return_index=True)
     start = np.zeros(len(mesh.interface_names), dtype=complex)
@@ -115,7 +112,7 @@ def _is_spanned(
     return bool((np.abs(whole - known @ parts).max(axis=0) <= ANCHORED * np.abs(whole).max(axis=0)).all())
 
 
-def _list_velocities(mesh: Mesh, motions: Sequence[FreeMotion]) -> NDArray[np.complex128]:
+def _list_velocities(mesh: Mesh, motions: Sequence[FreeMotion]) -> Complex:
     """Velocities of a point of every region that moves, and of another one against it, (2 regions, motions)."""
     names = {name: row for row, name in enumerate(sorted({name for motion in motions for name in motion.regions}))}
     size = float(np.abs(mesh.start - mesh.start[0]).max())
@@ -132,7 +129,7 @@ CLOSED_AT_LEAST = 3
 
 
 def close_nearest_pairs(
-    mesh: Mesh, laws: PairLaws, modes: ModeState, opening: NDArray[np.float64], least: int = CLOSED_AT_LEAST
+    mesh: Mesh, laws: PairLaws, modes: ModeState, opening: Real, least: int = CLOSED_AT_LEAST
 ) -> ModeState:
     """Modes with the nearest pairs of every interface on which fewer than `least` are closed, for a body that is free.
 
@@ -158,9 +155,9 @@ ALIKE = 1e-6
 
 
 def stick_calmest_pairs(
-    mesh: Mesh, laws: PairLaws, modes: ModeState, slip: NDArray[np.float64], overloaded: NDArray[np.int64],
+    mesh: Mesh, laws: PairLaws, modes: ModeState, slip: Real, overloaded: Integer,
     holds: Callable[[ModeState], bool],
-) -> tuple[ModeState, NDArray[np.int64]]:
+) -> tuple[ModeState, Integer]:
     """Modes with the calmest pairs of one interface after the other sticking until `holds` says enough, and the pairs.
 
     Only of interfaces on which all closed pairs slip; there the pair of the least slip (m,), and those that are its

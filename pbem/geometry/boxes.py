@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.geometry.curve import Leg
 from pbem.geometry.elements import Elements
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Cells are at most so many times finer than the extent of all boxes.
 FINEST = 2.0**20

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.geometry.elements import Kind, choose_kind
 
 
@@ -49,7 +49,7 @@ class Leg:
         """Signed angle (radians) that it turns through."""
         return float(self.kind.turn(self))
 
-    def point(self, t: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def point(self, t: Real) -> Complex:
         """Points at the fractions t (any shape) of the leg's length, as complex numbers."""
         return np.asarray(self.kind.place_fraction(self, t))
 
@@ -57,7 +57,7 @@ class Leg:
         """Unit tangent in the direction of travel at the start or the end."""
         return complex(1j * self.kind.normal_at(self, self.end if at_end else self.start))
 
-    def normals(self, points: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def normals(self, points: Complex) -> Complex:
         """Unit normals to the right of travel, outward of a region on the left, at points of the leg."""
         return np.broadcast_to(self.kind.normal_at(self, points), points.shape)
 
@@ -86,13 +86,13 @@ class Leg:
         piece = self.kind.cut(self, first, last)
         return replace(self, **piece._replace(start=start, end=end)._asdict(), elements=elements)
 
-    def element_fractions(self) -> NDArray[np.float64]:
+    def element_fractions(self) -> Real:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
         if self.fractions is not None:
             return np.array(self.fractions)
         return self.divide(self.elements, self.refine_start, self.refine_end)
 
-    def divide(self, elements: int, refine_start: bool, refine_end: bool) -> NDArray[np.float64]:
+    def divide(self, elements: int, refine_start: bool, refine_end: bool) -> Real:
         """Fractions (elements + 1,) at t^power from every refined end, whatever elements the leg has (theory, 79)."""
         t = np.linspace(0.0, 1.0, elements + 1)
         if refine_start and refine_end:
@@ -103,7 +103,7 @@ class Leg:
             t = 1 - (1 - t) ** self.power
         return t
 
-    def element_ends(self) -> NDArray[np.complex128]:
+    def element_ends(self) -> Complex:
         """The elements + 1 ends of the elements along the leg."""
         return self.point(self.element_fractions())
 

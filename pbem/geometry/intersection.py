@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.geometry.curve import Leg
 from pbem.geometry.elements import Elements, cross_carriers
 
@@ -28,7 +28,7 @@ def project(leg: Leg, point: complex) -> tuple[float, float]:
     return t, abs(complex(leg.point(np.array(t))) - point)
 
 
-def measure_distances(legs: Sequence[Leg], points: NDArray[np.complex128]) -> NDArray[np.float64]:
+def measure_distances(legs: Sequence[Leg], points: Complex) -> Real:
     """Distance of each point from the nearest of some legs."""
     nearest = np.full(points.shape, np.inf)
     for leg in legs:
@@ -62,12 +62,12 @@ def coincide(first: Leg, second: Leg, tolerance: float) -> bool:
     return abs(middles[0] - middles[1]) <= 10 * tolerance
 
 
-def enclosed_angle(leg: Leg, points: NDArray[np.complex128]) -> NDArray[np.float64]:
+def enclosed_angle(leg: Leg, points: Complex) -> Real:
     """Angle by which the ray from each point (off the leg) to the leg turns along it; exact, also close to an arc."""
     return np.asarray(leg.kind.subtend(leg, points))
 
 
-def winding_number(legs: list[Leg], points: NDArray[np.complex128]) -> NDArray[np.int64]:
+def winding_number(legs: list[Leg], points: Complex) -> Integer:
     """How often closed chains of legs run counter-clockwise around each point."""
     total = np.zeros(points.shape)
     for leg in legs:
@@ -85,6 +85,6 @@ def enclosed_area(legs: list[Leg]) -> float:
     return total
 
 
-def inner_points(leg: Leg, count: int = 5) -> NDArray[np.complex128]:
+def inner_points(leg: Leg, count: int = 5) -> Complex:
     """Points spread over the interior of the leg."""
     return leg.point((np.arange(count) + 0.5) / count)

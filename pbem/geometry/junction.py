@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer
 from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
@@ -34,7 +34,7 @@ def format_point(point: complex) -> str:
     return f"({point.real:.6g}, {point.imag:.6g})"
 
 
-def _pair(found: tuple[NDArray[np.int64], NDArray[np.int64]]) -> Iterator[tuple[int, int]]:
+def _pair(found: tuple[Integer, Integer]) -> Iterator[tuple[int, int]]:
     return zip(found[0].tolist(), found[1].tolist(), strict=True)
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer
 from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
@@ -63,15 +63,15 @@ def loop_legs(curves: Mapping[str, Curve], loops: tuple[Loop, ...]) -> list[Leg]
 
 
 def is_inside(
-    curves: Mapping[str, Curve], loops: tuple[Loop, ...], points: NDArray[np.complex128]
-) -> NDArray[np.bool_]:
+    curves: Mapping[str, Curve], loops: tuple[Loop, ...], points: Complex
+) -> Bool:
     """Which points (off the loops) lie in the region of these loops, which is infinite if none of them is outer."""
     around = 1 if any(loop.outer for loop in loops) else 0
     legs = [loop_legs(curves, (loop,)) for loop in loops]
     return wind_around(legs, points) == around
 
 
-def wind_around(loops: Sequence[list[Leg]], points: NDArray[np.complex128]) -> NDArray[np.int64]:
+def wind_around(loops: Sequence[list[Leg]], points: Complex) -> Integer:
     """How often all of some loops run counter-clockwise around each point (n,); none does that lies beside it."""
     total = np.zeros(len(points), dtype=np.int64)
     at, number = Boxes.of_corners([surround(legs) for legs in loops]).find_around(points)
@@ -209,7 +209,7 @@ def _pair_sectors(
     return [(ends[i], ends[(i + 1) % len(ends)]) for i in range(len(ends)) if inside[i]]
 
 
-def _is_enclosed_oddly(legs: list[Leg], points: NDArray[np.complex128]) -> list[bool]:
+def _is_enclosed_oddly(legs: list[Leg], points: Complex) -> list[bool]:
     """Even-odd rule for legs whose directions are not yet sorted out: count the cuts with a ray to the left."""
     far = 10 * max(abs(leg.start - points[0]) + leg.length for leg in legs)
     # An odd direction, so that the ray passes no vertex.

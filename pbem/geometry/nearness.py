@@ -7,15 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Two legs that meet at less than this angle (degrees) enclose a wedge, in which lengths fall with the distance from
 # its corner; wider corners are ordinary ones, towards which legs are graded.
@@ -106,7 +102,7 @@ class Surroundings:
             nearest[at[head[better]]] = self.pieces.leg[seen[head[better]]]
         return distance, nearest
 
-    def _are_blind(self, one: Integer, other: Integer) -> NDArray[np.bool_]:
+    def _are_blind(self, one: Integer, other: Integer) -> Bool:
         code = np.minimum(one, other) * len(self.legs) + np.maximum(one, other)
         return np.isin(code, self._unseen)
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex
 from pbem.geometry.curve import Curve
 from pbem.geometry.intersection import inner_points
 from pbem.geometry.loop import Side, side_legs
-
-Complex = NDArray[np.complex128]
 
 
 def sample_side(curves: Mapping[str, Curve], side: Side) -> tuple[Complex, Complex]:

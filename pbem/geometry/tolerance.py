@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Complex
 from pbem.geometry.curve import Curve
 
 # Points nearer to each other than this part of the shorter of their curves are the same point.
@@ -60,7 +60,7 @@ def make_tolerance(
     return Tolerance({name: curve.length for name, curve in curves.items()}, rounding, regions or {}, contacts)
 
 
-def join_points(points: NDArray[np.complex128], owners: list[str], tolerance: Tolerance) -> NDArray[np.complex128]:
+def join_points(points: Complex, owners: list[str], tolerance: Tolerance) -> Complex:
     """For each point (n,) of the curves `owners` the first of the list that is the same, directly or by way of others.
     """
     tree = cKDTree(np.stack([points.real, points.imag], axis=1))

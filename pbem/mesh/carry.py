@@ -5,18 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.elements import divide_curve
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import group_elements
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Nodes this far beyond an element's end, in half-lengths, still lie on it: rounding of places far from the origin.
 BEYOND = 1e-2

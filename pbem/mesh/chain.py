@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.geometry.elements import Elements
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,7 @@ class Chain:
     curve: str
     forward: bool
     crack: bool
-    traction: NDArray[np.bool_]
+    traction: Bool
     elements: Elements
     first_node: int
     order: int

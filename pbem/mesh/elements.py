@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.geometry.curve import Curve
 from pbem.geometry.elements import Elements
 from pbem.mesh.shapes import integrate_shapes
-
-Real = NDArray[np.float64]
 
 
 def divide_curve(curve: Curve) -> Elements:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer
 from pbem.geometry.elements import Elements
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import weigh_nodes
@@ -15,9 +15,6 @@ from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
 from pbem.model.support import ROUNDINGS
 
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 Columns = dict[str, np.ndarray]
 
 # Fewer elements than these do not resolve the pressure of a contact.

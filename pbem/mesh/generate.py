@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
@@ -59,7 +59,7 @@ def generate_mesh(model: Model) -> Mesh:
     )
 
 
-def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: Links) -> NDArray[np.bool_]:
+def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: Links) -> Bool:
     """Elements (elements,) of curves in contact that meet nothing of the other curve.
 
     They are free surface, and with HST and DBEM keep the displacement equation like any other.

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.mesh.mesh import Mesh, second_face_nodes
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 
 def locate_nodes(mesh: Mesh) -> Real:

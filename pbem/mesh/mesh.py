@@ -8,12 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.elements import Elements
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -189,7 +185,7 @@ def second_face_nodes(mesh: Mesh) -> Integer:
     return (crack[:, None] * per_element + np.arange(per_element)[::-1]).ravel()
 
 
-def sort_pairs(mesh: Mesh) -> dict[str, NDArray[np.int64]]:
+def sort_pairs(mesh: Mesh) -> dict[str, Integer]:
     """Per interface that has contact pairs, their indices into Mesh.pairs, by arc length."""
     pairs = mesh.pairs
     order = np.lexsort((pairs.arc_length, pairs.interface))

@@ -15,16 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.geometry.elements import Elements
 from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.projection import find_hidden, project_nodes
 from pbem.mesh.shapes import interpolate_shapes
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Gauss points on every piece of an element that faces one element of the other side.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.mesh import Mesh
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def list_nodes(mesh: Mesh, elements: Integer) -> Integer:

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbem.mesh.chain import Chain
 from pbem.mesh.facing import Columns, pair_contact, place_pairs
 from pbem.mesh.mesh import Links, Pairs
 from pbem.model.model import Contact, Interface, Model
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 
 def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:

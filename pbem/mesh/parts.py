@@ -10,16 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 
 # End points nearer to each other than this part of the shorter of their curves are one, as in the case file; and so are
 # those that differ by the rounding of the coordinates.
@@ -44,7 +41,7 @@ class Parts:
     first: Integer
     second: Integer
     region: Integer
-    cut: NDArray[np.bool_]
+    cut: Bool
 
 
 def find_parts(mesh: Mesh) -> Parts:
@@ -99,7 +96,7 @@ def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
     return part[label], len(outer) + (not bounded)
 
 
-def _measure_reach(mesh: Mesh, own: Integer, cracks: Integer) -> NDArray[np.float64]:
+def _measure_reach(mesh: Mesh, own: Integer, cracks: Integer) -> Real:
     """Of every way along the elements of a region: how near its ends are to points that are the same."""
     length = np.abs(mesh.end - mesh.start)
     of_curve = np.bincount(mesh.curve[own], length[own], len(mesh.curve_names))
@@ -111,7 +108,7 @@ def _measure_reach(mesh: Mesh, own: Integer, cracks: Integer) -> NDArray[np.floa
     return np.maximum(reach, rounding)
 
 
-def _number_vertices(points: Complex, reach: NDArray[np.float64]) -> Integer:
+def _number_vertices(points: Complex, reach: Real) -> Integer:
     """Numbers (n,) of points, the same for those that are nearer to each other than both of their reaches."""
     places = np.stack([points.real, points.imag], axis=1)
     near = cKDTree(places).query_pairs(float(reach.max()), output_type="ndarray")
@@ -122,7 +119,7 @@ def _number_vertices(points: Complex, reach: NDArray[np.float64]) -> Integer:
     return np.asarray(connected_components(links, directed=False)[1])
 
 
-def _follow(leaves: Integer, reaches: Integer, leaving: NDArray[np.float64], coming: NDArray[np.float64]) -> Integer:
+def _follow(leaves: Integer, reaches: Integer, leaving: Real, coming: Real) -> Integer:
     """The way (k,) that follows each: at its end the first clockwise of where it comes from (angles, radians)."""
     order = np.argsort(leaves, kind="stable")
     bounds = np.searchsorted(leaves[order], np.arange(max(leaves.max(), reaches.max()) + 2))
@@ -138,7 +135,7 @@ def _follow(leaves: Integer, reaches: Integer, leaving: NDArray[np.float64], com
     return follower
 
 
-def _is_inside(points: Complex, start: Complex, end: Complex) -> NDArray[np.bool_]:
+def _is_inside(points: Complex, start: Complex, end: Complex) -> Bool:
     """Whether points lie inside of the polygon of edges: by crossings of a ray."""
     inside = np.zeros(len(points), dtype=bool)
     for number, point in enumerate(points):

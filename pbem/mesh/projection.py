@@ -5,14 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.elements import Elements
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 # Overshoot of an element's end, in half-lengths, that a normal may have: ends may coincide but for rounding.
 OVERSHOOT = 1e-6

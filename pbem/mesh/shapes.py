@@ -6,9 +6,8 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from pbem.arrays import Real
 
 
 @cache

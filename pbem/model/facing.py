@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
@@ -16,10 +16,6 @@ from pbem.geometry.intersection import inner_points, measure_distances, project,
 from pbem.geometry.junction import format_point, split_leg
 from pbem.geometry.loop import Loops, Side, side_legs
 from pbem.model.model import Contact, Model, Region
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Points on a leg from which its surroundings are looked at.
 SAMPLES = 9

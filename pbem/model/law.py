@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.description.case import Case
 from pbem.description.effects import NEEDED, OPTIONAL, OWN_KEYS, WITHOUT_EFFECT, Kind
 from pbem.description.schema import LawTable
@@ -92,7 +92,7 @@ def check_gap(loc: KeyPath, law: Law, curve: Curve) -> list[Fault]:
     if not isinstance(law.gap, str):
         return []
 
-    def evaluate(points: NDArray[np.complex128]) -> NDArray[np.float64]:
+    def evaluate(points: Complex) -> Real:
         gap = sample_gap(law, points)
         return np.where(np.isfinite(gap), gap, np.nan)  # the least of numbers with a nan among them is nan
 

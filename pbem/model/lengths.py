@@ -6,17 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Surroundings
 from pbem.model.sliver import Wedges
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Bool = NDArray[np.bool_]
 
 # Longest element, as a multiple of the distance to the next face, by the order of the polynomials. Measured by pairs
 # that open when they are pressed: none at order 2 up to 2.5; order 1 needs half of that.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.description.case import Case
 from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
@@ -26,8 +26,6 @@ from pbem.geometry.loop import Loop, Loops, loop_legs
 from pbem.geometry.tolerance import Tolerance
 from pbem.model.roles import Roles
 
-Complex = NDArray[np.complex128]
-
 
 @dataclass(frozen=True)
 class _Body:
@@ -40,7 +38,7 @@ class _Body:
     low: complex
     high: complex
 
-    def find_depth(self, points: Complex) -> NDArray[np.float64]:
+    def find_depth(self, points: Complex) -> Real:
         """How deep points lie inside; zero on the boundary and outside."""
         depths = measure_distances(self.legs, points)
         off = depths > 0

@@ -9,15 +9,11 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.shape import WIDEST_ARC
 from pbem.model.model import Model
-
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Per curve the fractions of the length at which the elements of each of its legs end.
 Fractions = Mapping[str, tuple[tuple[float, ...], ...]]

@@ -6,9 +6,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from pbem.arrays import Real
 
 # First body, second body, rows (k, 3): rows @ (motion of the first - motion of the second) = 0.
 Link = tuple[int, int, Real]

@@ -17,16 +17,13 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.nearness import Surroundings
 from pbem.model.lengths import Cells, LengthField
 from pbem.model.sliver import Wedges, find_wedges
 from pbem.model.slot import Side, divide_alike, find_slots
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # A model is refused when the rule would add more elements than this, and more than ten times those asked for.
 MOST_ADDED = 100_000

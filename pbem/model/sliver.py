@@ -22,12 +22,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.geometry.curve import Leg
 from pbem.geometry.nearness import Corner, Surroundings
-
-Real = NDArray[np.float64]
 
 # Length of the last bit, as a part of the shortest leg of the wedges at a corner: at 8 degrees, from where it changes
 # with the power of the angle, and its bounds. What it spoils grows in proportion to it, and as slender bodies bend.

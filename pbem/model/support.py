@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.junction import format_point
 from pbem.geometry.loop import Side
 from pbem.geometry.sampling import sample_side
@@ -37,9 +37,9 @@ class PairTie:
     of the jump there, others hold the one along the normal.
     """
 
-    position: NDArray[np.complex128]
-    normal: NDArray[np.complex128]
-    sticks: NDArray[np.bool_]
+    position: Complex
+    normal: Complex
+    sticks: Bool
 
 
 @dataclass(frozen=True)
@@ -109,12 +109,12 @@ def find_least_stiffness(model: Model, region: Region) -> float:
     return LEAST_STIFFNESS * region.material.plane_modulus / model.size
 
 
-def _motions(points: NDArray[np.complex128], center: complex, scale: float) -> NDArray[np.complex128]:
+def _motions(points: Complex, center: complex, scale: float) -> Complex:
     """Displacements (points x 3) of the unit motions along x, along y, and about the center."""
     return np.stack([np.ones_like(points), np.full_like(points, 1j), 1j * (points - center) / scale], axis=1)
 
 
-def _constrain(motions: NDArray[np.complex128], directions: list[NDArray[np.complex128]]) -> NDArray[np.float64]:
+def _constrain(motions: Complex, directions: list[Complex]) -> Real:
     """At most 3 rows of 3: what prescribed components at many points demand of the unit motions."""
     components = [(motions * direction.conj()[:, None]).real for direction in directions]
     return np.asarray(np.linalg.qr(np.concatenate(components), mode="r"))
@@ -163,7 +163,7 @@ def _link_regions(
             yield numbers[first], numbers[second], _constrain(_motions(points, center, scale), directions)
 
 
-def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> NDArray[np.float64]:
+def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> Real:
     """At most 3 rows of 3: one pair that sticks leaves the rotation about it, pairs that slip leave what is along s."""
     motions = _motions(tie.position, center, scale)
     along = np.concatenate([tie.normal, 1j * tie.normal[tie.sticks]])
@@ -181,7 +181,7 @@ def _touches(model: Model, joint: Interface | Contact) -> bool:
 
 
 def describe_motion(
-    vector: NDArray[np.float64], names: list[str], center: complex, scale: float, origin: complex
+    vector: Real, names: list[str], center: complex, scale: float, origin: complex
 ) -> FreeMotion:
     """A motion (3 bodies,) of named bodies: along x, along y, and the angle times scale about the center.
 

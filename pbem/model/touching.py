@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.expression import evaluate_expression
 from pbem.geometry.intersection import measure_distances, project
 from pbem.model.model import Contact, Interface, Law, Model
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 Opening = Callable[[Complex], Real]
 
 

@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Real
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import count_elements
 from pbem.results.estimator import Estimator
-
-Bool = NDArray[np.bool_]
-Real = NDArray[np.float64]
 
 # What `analysis.accuracy` is asked of, and how it is called.
 ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"}

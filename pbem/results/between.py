@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.contact.declaration import SLIP_PATH, Slide
 from pbem.contact.laws import PairLaws, collect_laws, evaluate_strength, find_creeping
 from pbem.contact.loads import evaluate_pressure
@@ -14,9 +14,6 @@ from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.solve.step import Step
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Places between a node and the next one on its element, as parts of the way.
 PLACES = (0.25, 0.5, 0.75)

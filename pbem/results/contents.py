@@ -6,13 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
+from pbem.arrays import Bool, Integer, Real
 from pbem.geometry import elements as geometry
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Elements:
     sweep: Real
     region: Integer
     curve: Integer
-    crack: NDArray[np.bool_]
+    crack: Bool
     tip: Integer
 
     @cached_property

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.solve.beside import Beside
 from pbem.solve.step import Step
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 
 def sum_reactions(model: Model, mesh: Mesh, step: Step) -> Complex:

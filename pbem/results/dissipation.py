@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Real
 from pbem.contact.declaration import BROKEN, SLIP_PATH, Slide
 from pbem.contact.laws import OPEN, SLIP, PairLaws, StrengthGroup, evaluate_strength, start_memory
 from pbem.mesh.mesh import Mesh
 from pbem.solve.step import ContactState
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class PairRecord:
     internal: Mapping[str, NDArray[Any]]
 
     @property
-    def broken(self) -> NDArray[np.bool_]:
+    def broken(self) -> Bool:
         """Bonds that are lost."""
         return self.internal[BROKEN.name]
 

@@ -29,8 +29,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.background import Background
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
@@ -47,10 +47,6 @@ from pbem.results.dissipation import (
 )
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Step
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Gauss points along tip elements, in the root of the distance from the tip.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Real
 from pbem.contact.laws import collect_laws
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
@@ -16,9 +17,6 @@ from pbem.results.rates import EndFinder, choose_jump_divisors
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.beside import Beside
 from pbem.solve.step import ContactState, Step
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
 # 5; with the order lowered by one. Measured over the problems with known answers by scripts/bench_estimate.py.
@@ -308,7 +306,7 @@ def _worst(values: Real) -> float:
     return float(values.max()) if values.size else 0.0
 
 
-def _worst_known(values: Real, is_tip: NDArray[np.bool_]) -> float:
+def _worst_known(values: Real, is_tip: Bool) -> float:
     # The tips of cracks come first, then those of cracks along interfaces, which have no K.
     return _worst(values.ravel()[is_tip[: values.size]])
 

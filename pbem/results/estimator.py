@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.errors import ConvergenceError, LawError
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
@@ -15,8 +15,6 @@ from pbem.results.between import BetweenNodes
 from pbem.results.estimates import VIOLATIONS, Comparison, to_rows
 from pbem.solve.beside import Beside
 from pbem.solve.step import Step
-
-Real = NDArray[np.float64]
 
 # Of sound models (scripts/bench_estimate.py) at most 3 %, where contact ends within an element.
 NOTABLE = 0.05

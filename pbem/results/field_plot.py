@@ -10,14 +10,12 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.errors import ResultFileError
 from pbem.results.outline import trace_outlines
 from pbem.results.plot_style import describe_step, label, style
 from pbem.results.reader import Results
-
-Real = NDArray[np.float64]
 
 # Displacement (q, 2), stress sxx, syy, sxy (q, 3) and szz (q,) to the field (q,).
 Formula = Callable[[Real, Real, Real], Real]

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.background import Background
 from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
@@ -25,10 +25,6 @@ from pbem.results.tip_field import place_gauss
 from pbem.results.tip_shape import differentiate_at
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import Step
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 ON_ARC = 32
 ON_ELEMENT = 10

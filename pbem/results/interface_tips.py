@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.results.tip_path import KINK, measure_clearance
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # Radius of the circle at most: parts of the distance to what else is there, and of the length of the crack or the bond.
 REACH = 0.5
@@ -72,8 +68,8 @@ def find_interface_tips(model: Model, mesh: Mesh) -> tuple[InterfaceTip, ...]:
 
 
 def _make_tip(
-    mesh: Mesh, name: str, end: int, point: complex, here: Integer, own: NDArray[np.bool_],
-    touching: dict[complex, list[int]], bonded: NDArray[np.bool_],
+    mesh: Mesh, name: str, end: int, point: complex, here: Integer, own: Bool,
+    touching: dict[complex, list[int]], bonded: Bool,
 ) -> InterfaceTip | None:
     ahead = int(here[~own][0])
     at_start = bool(mesh.start[ahead] == point)
@@ -102,7 +98,7 @@ def _tangent(mesh: Mesh, element: int, at_start: bool) -> complex:
 
 
 def _follow(
-    mesh: Mesh, element: int, forward: bool, touching: dict[complex, list[int]], bonded: NDArray[np.bool_]
+    mesh: Mesh, element: int, forward: bool, touching: dict[complex, list[int]], bonded: Bool
 ) -> Integer:
     """The elements of the region's boundary from the tip on, as far as the bond, or what is not bonded, goes on without
     a corner and meets nothing else."""

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.contact.laws import find_joint
 from pbem.contact.strength import LAWS, list_model_variables
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
@@ -43,12 +44,12 @@ def list_pair_datasets(model: Model) -> dict[str, str]:
     return SHOWN | {variable.name: variable.kind for variable in list_model_variables(model)}
 
 
-def join_pairs(interfaces: Mapping[str, NDArray[np.int64]]) -> NDArray[np.int64]:
+def join_pairs(interfaces: Mapping[str, Integer]) -> Integer:
     """The indices of `sort_pairs`, one interface after the other: the order of the columns under /all/contact."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *interfaces.values()])
 
 
-def to_columns(points: NDArray[np.complex128]) -> NDArray[np.float64]:
+def to_columns(points: Complex) -> Real:
     """(..., 2) x and y components of complex points or vectors (...)."""
     return np.stack([points.real, points.imag], axis=-1)
 
@@ -70,7 +71,7 @@ def write_attributes(
             del file.attrs[name]
 
 
-def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: NDArray[np.int64]) -> None:
+def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Integer) -> None:
     """Write all that does not change with the steps, and create the datasets that grow, without entries.
 
     interior_region (q,): index of the region of every interior point, -1 outside of all.

@@ -14,12 +14,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.errors import ResultFileError
 from pbem.results.journal import OverlaidFile
 from pbem.results.tail import DamageError, find_unapplied
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

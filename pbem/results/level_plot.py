@@ -7,8 +7,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer
 from pbem.case.build import parse_model
 from pbem.errors import ResultFileError
 from pbem.mesh.carry import list_curve_elements
@@ -18,8 +18,6 @@ from pbem.model.model import Model
 from pbem.model.refinement import count_levels, impose_fractions
 from pbem.results.outline import choose_points, to_columns
 from pbem.results.reader import Results
-
-Integer = NDArray[np.int64]
 
 
 def read_refined(results: Results) -> tuple[Model, Mesh, Integer]:

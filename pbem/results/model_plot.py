@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as OutlinePath
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model
@@ -23,20 +23,19 @@ from pbem.results.level_plot import draw_levels
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
 
-Complex = NDArray[np.complex128]
 MOST_NAMES = 30
 CRACK = "#A51C30"
 
 
 def plot_model(
-    model: Model, mesh: Mesh, path: str | os.PathLike[str], levels: NDArray[np.int64] | None = None
+    model: Model, mesh: Mesh, path: str | os.PathLike[str], levels: Integer | None = None
 ) -> None:
     """Write the picture of a model; the ending of `path` says the format. levels (e,): see `draw_model`."""
     with style():
         draw_model(model, mesh, levels).savefig(path, dpi=200)
 
 
-def draw_model(model: Model, mesh: Mesh, levels: NDArray[np.int64] | None = None) -> Figure:
+def draw_model(model: Model, mesh: Mesh, levels: Integer | None = None) -> Figure:
     """The figure of `plot_model`; levels (e,): how often each element was halved, to be shown by colours."""
     if model.origin:
         model = move_back(model)
@@ -149,7 +148,7 @@ def _draw_ticks(axes: Axes, model: Model, mesh: Mesh) -> None:
     axes.add_collection(LineCollection(ticks, colors="0.35", linewidths=0.5, zorder=3))
 
 
-def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, elements: NDArray[np.int64]) -> None:
+def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, elements: Integer) -> None:
     """Supports where displacements are held, arrows for displacements and tractions that are not zero."""
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
     place, normal = _spread_points(mesh, elements)
@@ -178,7 +177,7 @@ def _pick_last(values: list[float]) -> float:
     return next((value for value in reversed(values) if value), 0.0)
 
 
-def _spread_points(mesh: Mesh, elements: NDArray[np.int64], most: int = 6) -> tuple[Complex, Complex]:
+def _spread_points(mesh: Mesh, elements: Integer, most: int = 6) -> tuple[Complex, Complex]:
     """About `most` points spread along a curve by length, and the outward normals there."""
     length = np.abs(mesh.end[elements] - mesh.start[elements])
     along = np.concatenate([[0.0], np.cumsum(length)])
@@ -190,7 +189,7 @@ def _spread_points(mesh: Mesh, elements: NDArray[np.int64], most: int = 6) -> tu
     return place, -1j * step / np.abs(step)
 
 
-def _draw_clamp(axes: Axes, model: Model, mesh: Mesh, elements: NDArray[np.int64]) -> None:
+def _draw_clamp(axes: Axes, model: Model, mesh: Mesh, elements: Integer) -> None:
     place, normal = _spread_points(mesh, elements, 24)
     stroke = 0.03 * model.size * normal * np.exp(0.25j * np.pi)
     lines = np.stack([to_columns(place), to_columns(place + stroke)], axis=1)
@@ -226,7 +225,7 @@ def _draw_arrows(axes: Axes, size: float, place: Complex, normal: Complex, vecto
     axes.update_datalim(to_columns(tips))
 
 
-def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: NDArray[np.int64]) -> None:
+def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: Integer) -> None:
     """The curve's name at its middle, with what is prescribed there; beside a steep curve the text runs upwards."""
     one_side = elements[mesh.region[elements] == mesh.region[elements[0]]]
     # Curves inside are named off their middle, where other names are likelier to be.

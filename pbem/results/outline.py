@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.interpolation import interpolate, interpolate_tips
 from pbem.results.contents import Elements, Nodes, Tips
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 POINTS_PER_ELEMENT = 9
 # In pictures of more elements than this their shapes cannot be seen: they are drawn with fewer points, without ticks.
 MANY_ELEMENTS = 4000
@@ -105,7 +103,7 @@ def find_tips(elements: Elements, curve_names: Sequence[str], tips: Mapping[str,
     return points
 
 
-def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
+def find_chains(elements: Elements) -> list[Integer]:
     """Elements that follow each other along a loop or one face of a crack, in the order of travel; cracks come last."""
     start, end = elements.vertices[:, 0], elements.vertices[:, 1]
     # Second faces are stored in the order of the first ones; their travel goes the other way.
@@ -122,7 +120,7 @@ def find_chains(elements: Elements) -> list[NDArray[np.int64]]:
     return chains
 
 
-def _part_loops(elements: Elements, run: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+def _part_loops(elements: Elements, run: Integer) -> list[Integer]:
     """Loops that touch where one ends and the next begins; a crack is left as it is."""
     start, end = elements.vertices[:, 0], elements.vertices[:, 1]
     parts = []
@@ -134,7 +132,7 @@ def _part_loops(elements: Elements, run: NDArray[np.int64]) -> list[NDArray[np.i
     return [*parts, *([run] if len(run) else [])]
 
 
-def join_tips(elements: Elements, chains: list[NDArray[np.int64]], values: Real) -> None:
+def join_tips(elements: Elements, chains: list[Integer], values: Real) -> None:
     """Let both faces of a crack have their mean displacement at the ends where nothing else meets it; in place."""
     vertices = elements.vertices.reshape(-1, 2)
     _, which, counts = np.unique(to_complex(vertices), return_inverse=True, return_counts=True)

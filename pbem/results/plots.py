@@ -12,9 +12,9 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as OutlinePath
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Real
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
 from pbem.results.outline import Outline, find_tips, trace_outlines
@@ -23,7 +23,6 @@ from pbem.results.reader import Results
 
 __all__ = ["draw_results", "plot_model", "plot_results"]
 
-Real = NDArray[np.float64]
 MOST_PANELS = 4
 MOST_MARKS = 300
 

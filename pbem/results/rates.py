@@ -9,16 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.solve.beside import Beside
 from pbem.solve.step import SLIP, ContactState
-
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # The error of the second solution's tractions over that of the run, less one, on the elements beside an end. Of a root
 # that begins where two elements meet the mean error falls with the length (2 - 1). Within an element it depends on

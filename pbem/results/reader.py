@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.description.generation import Group
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
@@ -34,9 +35,6 @@ from pbem.results.lazy import (
 )
 from pbem.results.linearity import read_linearity
 from pbem.results.trial import check_contents
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 STATUSES = ("running", "finished", "failed", "stopped")
 ATTEMPTS = 5

@@ -8,11 +8,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.geometry.elements import Elements
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -68,9 +66,9 @@ class Field:
         on, local = self._list_nodes()
         return self._evaluate(self.nodes.ravel(), on, None, local)
 
-    def _list_nodes(self) -> tuple[NDArray[np.int64], Real]:
+    def _list_nodes(self) -> tuple[Integer, Real]:
         return np.repeat(np.arange(self.elements.count), len(self.local)), np.tile(self.local, self.elements.count)
 
-    def _evaluate(self, points: Complex, on: NDArray[np.int64], normal: Complex | None, local: Real) -> Complex:
+    def _evaluate(self, points: Complex, on: Integer, normal: Complex | None, local: Real) -> Complex:
         rows = evaluate_rows(self._sources, points, on, normal, False, local)[0]
         return rows[0::2] + 1j * rows[1::2]

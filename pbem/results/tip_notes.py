@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer
 from pbem.results.reader import Results
 from pbem.wording import list_names
 
@@ -100,7 +100,7 @@ def _find_reason(results: Results, name: str, touching: list[int]) -> str:
     return ""
 
 
-def _find_shared(curve: NDArray[np.int64], region: NDArray[np.int64]) -> list[int]:
+def _find_shared(curve: Integer, region: Integer) -> list[int]:
     return [int(each) for each in np.unique(curve) if len(np.unique(region[curve == each])) > 1]
 
 

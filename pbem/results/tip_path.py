@@ -5,16 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.elements import Elements
 from pbem.mesh.mesh import Mesh
-
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # The circle has this part of the distance to whatever else is there as its radius, and this part of the distance to
 # the crack's other tip, at most; and so many elements in it.

@@ -19,13 +19,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Real
 from pbem.mesh.interpolation import interpolate_tips
 from pbem.mesh.shapes import interpolate_shapes
 from pbem.results.eigenfield import evaluate_eigenfield
 from pbem.results.tip_field import Field, TipShape, place_gauss
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 # Points on the circle, and on each element within it.
 ON_CIRCLE = 32

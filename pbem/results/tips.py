@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.background import Background
 from pbem.contact.laws import collect_laws
 from pbem.geometry.elements import Elements
@@ -21,10 +21,6 @@ from pbem.results.tip_path import TipPaths, trace_paths, view_outward
 from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
 from pbem.solve.backgrounds import evaluate_backgrounds
 from pbem.solve.step import ContactState, Step
-
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # A straight crack of more elements is not taken as a whole.
 MOST_WHOLE = 100
@@ -60,7 +56,7 @@ class TipRules:
     """
 
     cracks: tuple[str, ...]
-    is_tip: NDArray[np.bool_]
+    is_tip: Bool
     gap: Real
     model: Model
     mesh: Mesh
@@ -221,7 +217,7 @@ def _find_directions(elements: Elements) -> Complex:
     return np.asarray(-leading / np.abs(leading))
 
 
-def _list_outward(mesh: Mesh, elements: Integer, outward: NDArray[np.bool_]) -> Integer:
+def _list_outward(mesh: Mesh, elements: Integer, outward: Bool) -> Integer:
     """The nodes (k, m (p + 1)) of elements (k, m) in the order in which they are met when leaving the tip."""
     within = np.arange(mesh.order + 1)
     along = np.where(outward[..., None], within, within[::-1])

@@ -11,8 +11,8 @@ from types import MappingProxyType, TracebackType
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.contact.custom import find_fault
 from pbem.errors import ConvergenceError, LawError, ResultFileError, StopError, StorageError
@@ -68,7 +68,7 @@ class ResultWriter:
 
     def __init__(
         self, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
-        petsc_options: Sequence[str] = (), interior_region: NDArray[np.int64] | None = None, *, force: bool = False,
+        petsc_options: Sequence[str] = (), interior_region: Integer | None = None, *, force: bool = False,
     ) -> None:
         """force: the file takes the place of results that are there.
 
@@ -94,7 +94,7 @@ class ResultWriter:
     @classmethod
     def resume(
         cls, path: str | os.PathLike[str], model: Model, mesh: Mesh, ranks: int, petsc_version: str,
-        petsc_options: Sequence[str] = (), interior_region: NDArray[np.int64] | None = None,
+        petsc_options: Sequence[str] = (), interior_region: Integer | None = None,
     ) -> ResultWriter:
         """A writer that goes on after the last step stored in an existing file of the same case.
 
@@ -147,7 +147,7 @@ class ResultWriter:
         return self._storage.file
 
     def append(
-        self, step: Step, estimates: Mapping[str, NDArray[np.float64]] | None = None
+        self, step: Step, estimates: Mapping[str, Real] | None = None
     ) -> tuple[str, ...]:
         """Store the step if it is its turn, and its iterations in any case; all of it is on the disk, or nothing.
 
@@ -235,7 +235,7 @@ class ResultWriter:
         return count_steps(self._file) if self._storage.is_open else 0
 
     @property
-    def relative_errors(self) -> dict[str, NDArray[np.float64]]:
+    def relative_errors(self) -> dict[str, Real]:
         """The estimated relative errors (k,) of the steps stored so far, by kind."""
         if self._pending is not None:
             self._store(self._pending)
@@ -243,7 +243,7 @@ class ResultWriter:
         group = self._file["estimates"]
         return {name.removeprefix("relative_"): group[name][...] for name in group if name.startswith("relative_")}
 
-    def _evaluate_hoop_stress(self, step: Step) -> NDArray[np.float64]:
+    def _evaluate_hoop_stress(self, step: Step) -> Real:
         """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
         initial = [balanced for balanced, _ in evaluate_backgrounds(self._model, step.stage, step.factor)]
         kinds: dict[Hashable, int] = {}
@@ -254,7 +254,7 @@ class ResultWriter:
             initial = [initial[kind_of.index(number)] for number in range(len(kinds))]
         return evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
 
-    def _sum_reactions(self, traction: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def _sum_reactions(self, traction: Complex) -> Complex:
         """Integral (c,) of the traction over every outer curve."""
         outer = self._condition >= 0
         force, of = (self._weight * traction)[outer], self._condition[outer]

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from pbem.arrays import Real
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.operator import scale_equations
 from pbem.bem.rigid import take_off_rotations
 from pbem.bem.rows import evaluate_rows
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.parallel import add_up
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # Collocation points whose rows are evaluated exactly, spread over the whole model.
 SAMPLES = 64

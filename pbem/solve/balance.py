@@ -10,17 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.anchor import group_motions
 from pbem.contact.loads import Load
 from pbem.contact.support import Support
 from pbem.model.support import FreeMotion
 from pbem.solve.problem import Problem
 from pbem.solve.step import Balance
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
 ROUNDING, FAINT = 1e-9, 1e-6
@@ -68,12 +65,12 @@ class _Faces:
     node: their numbers. bounding: those of boundaries, as opposed to cracks, of which both faces are listed.
     """
 
-    node: NDArray[np.int64]
+    node: Integer
     position: Complex
     weight: Real
     traction: Complex
     known: Complex
-    bounding: NDArray[np.bool_]
+    bounding: Bool
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ class _Sums:
         return np.stack([self.force.real, self.force.imag, self.moment], axis=1)
 
 
-def _collect_faces(problem: Problem, whole: Complex, known: Complex) -> tuple[_Faces, NDArray[np.int64]]:
+def _collect_faces(problem: Problem, whole: Complex, known: Complex) -> tuple[_Faces, Integer]:
     """All faces, and the regions that they bound (n,), in rising order; tractions are given at the nodes."""
     mesh = problem.mesh
     node = np.concatenate([np.arange(mesh.nodes), np.flatnonzero(mesh.node_crack)])
@@ -131,7 +128,7 @@ def _find_carried_weight(problem: Problem, known: Complex) -> complex:
 
 
 def _add_up(
-    faces: _Faces, of: NDArray[np.int64], count: int, least: float, middle: complex | None = None
+    faces: _Faces, of: Integer, count: int, least: float, middle: complex | None = None
 ) -> _Sums:
     """The sums over the faces of bodies; of (n,): number of the body of each face, in rising order.
 
@@ -191,7 +188,7 @@ def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: floa
 
 
 def _measure_whole(
-    problem: Problem, faces: _Faces, of: NDArray[np.int64], least: float, carried_weight: complex
+    problem: Problem, faces: _Faces, of: Integer, least: float, carried_weight: complex
 ) -> tuple[_Sums, float]:
     """The sums over outer curves, and the weight: what acts on all bodies together from outside.
 

@@ -6,18 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.bem.choice import choose_operator
 from pbem.mesh.carry import Carry, carry_nodes
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import coarsen_model
-
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 # The second solution starts from the modes of the first, so that it settles soon or never.
 MOST_ITERATIONS = 8

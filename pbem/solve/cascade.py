@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
@@ -25,11 +25,6 @@ from pbem.contact.subset import settle_subset
 from pbem.solve.problem import Problem
 from pbem.solve.response import find_response
 from pbem.solve.tangent import AnyTangent, Solved
-
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
-Integer = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 # Newton's steps among the broken pairs alone before they are settled by pivoting.
 MOST_STEPS = 15

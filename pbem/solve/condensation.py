@@ -19,13 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from pbem.arrays import Integer, Real
 from pbem.mesh.numbering import number_components
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

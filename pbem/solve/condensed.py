@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import G_N, P_N, P_S, Linearisation
@@ -24,10 +24,6 @@ from pbem.solve.pair_columns import PairColumns, start_columns
 from pbem.solve.problem import Problem
 from pbem.solve.reference import Reference, TangentRows, apply_narrow
 from pbem.solve.tangent import AnyTangent, Solved, describe_residual, size_residual
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 # A condensed system of a worse reciprocal condition is not trusted: the factors are made anew in the present modes.
 LEAST_RCOND = 1e-11

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
 from pbem.bem.operator import Block, RowOperator, add_anchor, assemble_displacement_rows, assemble_rows
@@ -29,10 +29,6 @@ from pbem.solve.reference import TangentRows
 from pbem.solve.release import ReleasedTangent
 from pbem.solve.shares import cut_equally, refuse_shares
 from pbem.solve.tangent import AnyTangent
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 # Contact unknowns are few up to this part of all: all their columns then cost less than the factors.
 FEW = 0.25

@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
+from pbem.arrays import Bool, Real
 
 # A column or a block of a node this small, relative to the largest entry of the free terms, is none.
 NOTHING = 1e-12

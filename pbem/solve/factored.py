@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
@@ -15,9 +15,6 @@ from pbem.solve.problem import Problem
 from pbem.solve.reference import Reference, TangentRows
 from pbem.solve.response import select_states
 from pbem.solve.tangent import AnyTangent, Solved, describe_residual, size_residual
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # Of GMRES with old factors: fewer are not worth a try, more take too much storage.
 LEAST_ITERATIONS, MOST_ITERATIONS = 4, 100

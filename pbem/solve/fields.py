@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex
 from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.bem.interior import Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
@@ -21,8 +21,6 @@ from pbem.solve.dense_system import place_directly
 from pbem.solve.problem import InteriorRows, System
 from pbem.solve.step import Interior, Step
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 PlaceInterior = Callable[[Model, Mesh, Complex, Location], InteriorRows]
 
 

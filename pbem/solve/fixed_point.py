@@ -10,10 +10,8 @@ to the state that they left. Where they do so along one line they are sent some 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Bool = NDArray[np.bool_]
+from pbem.arrays import Bool, Real
 
 # So many differences of the last terms are combined at most; combinations that are alike to this part are one.
 MOST_COMBINED, ALIKE = 8, 1e-10

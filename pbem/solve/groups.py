@@ -5,19 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.tree import build_forest
 from pbem.mesh.mesh import Mesh
 from pbem.parallel import share_nodes
-
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Bool = NDArray[np.bool_]
 
 # A model of so few unknowns is one group, whose matrix is the whole tangent operator.
 ONE_GROUP = 1500

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.hierarchical import (
     HierarchicalOperator,
     anchor_rows,
@@ -34,10 +34,6 @@ from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
 from pbem.solve.shares import cut_equally
 from pbem.solve.tangent import AnyTangent
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 # Beyond this rounding in the expansions outweighs what further terms bring.
 MOST_TERMS = 60
@@ -129,7 +125,7 @@ def place_nodes_on_cracks(operator: HierarchicalOperator, nodes: Integer) -> Poi
 
 
 def _reach_tolerance(
-    comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: NDArray[np.bool_], nodes: Integer
+    comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: Bool, nodes: Integer
 ) -> tuple[HierarchicalOperator, float]:
     """The operator of the given nodes with enough terms for the tolerance, and its measured relative error.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.cut_parts import describe_cut_motions
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, stick_creeping
@@ -17,9 +17,6 @@ from pbem.parallel import broadcast
 from pbem.solve.balance import measure_balance
 from pbem.solve.imbalance import DRIVEN
 from pbem.solve.problem import Problem
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # A body that slips on all its contacts is held by single pairs at most so often in one step.
 MOST_HELD = 12

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
@@ -22,9 +22,6 @@ from pbem.solve.response import select_states
 from pbem.solve.schwarz import SchwarzPreconditioner
 from pbem.solve.sweeps import Sweeps
 from pbem.solve.tangent import MOST_SETTLED, AnyTangent, Judge, Settling, Solved, size_residual
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # Most iterations of GMRES for one linear system, without restart.
 MOST_ITERATIONS = 300
@@ -301,7 +298,7 @@ class _Preconditioning:
         y.setArray(result)
 
 
-def _find_order(problem: Problem) -> NDArray[np.int64]:
+def _find_order(problem: Problem) -> Integer:
     """Unknowns of all ranks, one rank after the other."""
     own = problem.system.nodes.astype(float)
     nodes = gather_parts(problem.comm, own).astype(np.int64)

@@ -10,16 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import Memory, PairLaws
 from pbem.contact.loads import Load
 from pbem.contact.modes import P_N, P_S, Linearisation, tensile_limit
 from pbem.solve.problem import Problem
-
-Real = NDArray[np.float64]
 
 # What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.
 BALANCED = 1e-3
@@ -77,7 +75,7 @@ def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target:
 
 
 def _sum_up(
-    problem: Problem, loads: list[Load], regions: NDArray[np.int64]
+    problem: Problem, loads: list[Load], regions: Integer
 ) -> tuple[sparse.csr_matrix, Real, Real]:
     """Force and moment over length of every region (3 k,): what unknown tractions add (3 k, 2 nodes), and loads."""
     mesh, count = problem.mesh, problem.laws.count
@@ -134,7 +132,7 @@ def _maximise(
     count, last = len(own), np.full(len(own), columns)
     pair = np.arange(count)
 
-    def build(blocks: list[tuple[Real, NDArray[np.int64]]]) -> sparse.csr_matrix:
+    def build(blocks: list[tuple[Real, Integer]]) -> sparse.csr_matrix:
         parts = [sparse.csr_matrix((value, (pair, column)), shape=(count, columns + 1)) for value, column in blocks]
         return sum(parts[1:], parts[0])
 

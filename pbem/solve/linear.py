@@ -7,16 +7,14 @@ from typing import Any, Literal
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
 from pbem.solve.effort import Work
 from pbem.solve.petsc import PREFIX, PETSc, factor_in_place, pass_over_divergence
 from pbem.solve.shares import change_shares, find_own_blocks, share_equally
 
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 Method = Literal["lu", "mumps"]
 
 # MUMPS' codes (INFOG(1)) for too little work space, which can be asked for again, and for too little memory.

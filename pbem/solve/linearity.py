@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.hoop import evaluate_stretch
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.solve.step import Linearity
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 # Strains and rotations (radians) beyond which linear theory no longer holds.
 LARGEST_STRAIN = 0.1
@@ -38,7 +35,7 @@ def measure_linearity(mesh: Mesh, displacement: Complex, slip: Real) -> Linearit
     return Linearity(strain, rotation, relative)
 
 
-def _find_exceeded(values: Real, region: NDArray[np.int64], weight: Real, regions: int) -> Real:
+def _find_exceeded(values: Real, region: Integer, weight: Real, regions: int) -> Real:
     """Per region the value that is exceeded on the part EXCEEDED_ON of its boundary; 0 where there is none."""
     order = np.lexsort((-values, region))
     length = np.bincount(region, weight, regions)

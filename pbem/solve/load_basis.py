@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from pbem.arrays import Real
 
 # Part of a load vector by which rounding can leave the span of the others.
 IN_SPAN = 1e-14

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import ModeState, PairState
@@ -28,9 +28,6 @@ from pbem.parallel import add_up
 from pbem.solve.groups import connect_cracks, find_nearest
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # So few pairs are answered for by the whole model: what is left at the end can hang on what is far away.
 MOST_ASKED = 12
@@ -116,5 +113,5 @@ def part_by_distance(mesh: Mesh, nodes: Integer) -> list[Integer]:
     return [np.flatnonzero(label == k) for k in range(count)]
 
 
-def _at(points: NDArray[np.complex128]) -> Real:
+def _at(points: Complex) -> Real:
     return np.column_stack([points.real, points.imag])

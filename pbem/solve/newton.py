@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Real
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
@@ -38,8 +38,6 @@ from pbem.solve.search import Caution, Search
 from pbem.solve.step import Iteration, Reporter
 from pbem.solve.tangent import AnyTangent, Solved
 from pbem.solve.unsettled import describe_unsettled
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -277,7 +275,7 @@ class _Outcome:
     pairs: PairState
     proposal: Proposal
     settled: bool
-    failing: NDArray[np.bool_]
+    failing: Bool
     law_error: float
 
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Integer, Real
 from pbem.parallel import gather_rows
 from pbem.solve.reference import Reference, apply_narrow, form_columns
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # Right-hand sides that are solved together; they and their solutions are held beside the factors.
 COLUMNS_AT_ONCE = 1024

@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.geometry.boxes import Boxes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
 
 # Depths below this part of the largest displacement come from the outlines, which are polygons here.
 SLIGHT = 1e-2

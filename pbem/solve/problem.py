@@ -9,9 +9,9 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Complex, Integer, Real
 from pbem.bem.interior import Values
 from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
@@ -30,9 +30,6 @@ from pbem.model.support import FreeMotion, find_plane_translations
 from pbem.parallel import do_on_first, gather_parts, norm_of_parts
 from pbem.solve.tangent import AnyTangent
 
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 T = TypeVar("T")
 
 

@@ -15,17 +15,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from pbem.arrays import Integer, Real
 from pbem.bem.operator import Block, RowOperator
 from pbem.parallel import gather_parts
 from pbem.solve.linear import LinearSolver, choose_method
 from pbem.solve.problem import Problem
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 # Columns that are formed at a time: little beside the matrix, much beside the cost of a call.
 COLUMNS_AT_ONCE = 512

@@ -13,8 +13,8 @@ Woodbury identity. Its residual is that of the equations without these anchors.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
@@ -22,9 +22,6 @@ from pbem.errors import ConvergenceError
 from pbem.solve.problem import Problem
 from pbem.solve.response import select_states
 from pbem.solve.tangent import AnyTangent, Solved, describe_residual, size_residual
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # Solutions are corrected until they are as good as this, though the tolerance may be weaker.
 GOOD_RESIDUAL = 1e-12

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.contact.complementarity import Response
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.loads import Load
@@ -12,9 +12,6 @@ from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
 from pbem.solve.problem import Problem
 from pbem.solve.tangent import AnyTangent, Solved
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 
 def find_response(

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import lapack
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid import RigidMotions
 from pbem.bem.rows import Sources, evaluate_rows
@@ -25,11 +25,6 @@ from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.elimination import Elimination, eliminate_tractions
 from pbem.solve.groups import Group
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
-Bool = NDArray[np.bool_]
-
 
 # Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
 MOST_LEFT = 900
@@ -295,8 +290,8 @@ class SchwarzPreconditioner:
 
 
 def _look_up(
-    known: Integer, value: NDArray[np.complex128], nodes: Integer
-) -> tuple[Integer, NDArray[np.complex128]]:
+    known: Integer, value: Complex, nodes: Integer
+) -> tuple[Integer, Complex]:
     """Places in nodes (k,) of those that are known (sorted), and their values."""
     place, there = _find_places(known, nodes)
     at = np.flatnonzero(there)

@@ -20,12 +20,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Integer
 from pbem.contact.modes import Frozen, Proposal
 from pbem.contact.subset import Settled
-
-Integer = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -85,11 +83,11 @@ class Search:
     """
 
     def __init__(
-        self, most_pivoted: int, interface: Integer | None = None, excluded: NDArray[np.bool_] | None = None,
+        self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
         varying: bool = False, sweeps: bool = False,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
-        self.excluded: NDArray[np.bool_] = np.zeros(1, dtype=bool) if excluded is None else excluded
+        self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept = sweeps, False
         self.wary = True  # whether changes that stall, and a full tangent that leads away, are met with caution
         self.restart()

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
+from pbem.arrays import Integer, Real
 
 # Rows and columns of the blocks in which PETSc's ScaLAPACK matrices are dealt to the ranks.
 BLOCK = 64

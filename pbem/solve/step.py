@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Real
 from pbem.contact.declaration import BROKEN, SLIP_PATH
 from pbem.model.model import Model
 
@@ -42,19 +43,19 @@ class ContactState:
     """
 
     mode: NDArray[np.int8]
-    opening: NDArray[np.float64]
-    slip: NDArray[np.float64]
-    traction_n: NDArray[np.float64]
-    traction_s: NDArray[np.float64]
+    opening: Real
+    slip: Real
+    traction_n: Real
+    traction_s: Real
     internal: Mapping[str, NDArray[Any]]
 
     @property
-    def slip_path(self) -> NDArray[np.float64]:
+    def slip_path(self) -> Real:
         """The accumulated length of the plastic slip."""
         return self.internal[SLIP_PATH.name]
 
     @property
-    def broken(self) -> NDArray[np.bool_]:
+    def broken(self) -> Bool:
         """Brittle bonds that are lost."""
         return self.internal[BROKEN.name]
 
@@ -74,14 +75,14 @@ class Balance:
     sums of the body on which most acts.
     """
 
-    resultant: NDArray[np.float64]
-    relative: NDArray[np.float64]
-    carried: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    part_resultant: NDArray[np.float64]
-    part_relative: NDArray[np.float64]
-    part_weight: NDArray[np.float64]
-    whole: NDArray[np.float64]
+    resultant: Real
+    relative: Real
+    carried: Real
+    weight: Real
+    part_resultant: Real
+    part_relative: Real
+    part_weight: Real
+    whole: Real
     whole_relative: float
 
 
@@ -93,17 +94,17 @@ class Linearity:
     one, to the mean length of the interface's elements.
     """
 
-    strain: NDArray[np.float64]
-    rotation: NDArray[np.float64]
-    slip: NDArray[np.float64]
+    strain: Real
+    rotation: Real
+    slip: Real
 
 
 @dataclass(frozen=True)
 class Interior:
     """At the model's interior points (q,): displacement (q,) complex; stress sxx, syy, sxy (q, 3). NaN outside."""
 
-    displacement: NDArray[np.complex128]
-    stress: NDArray[np.float64]
+    displacement: Complex
+    stress: Real
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,8 @@ class Step:
     factor: float
     iterations: tuple[Iteration, ...]
     residual: float
-    displacement: NDArray[np.complex128]
-    traction: NDArray[np.complex128]
+    displacement: Complex
+    traction: Complex
     contact: ContactState
     interior: Interior | None = None
     balance: Balance | None = None

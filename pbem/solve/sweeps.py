@@ -14,9 +14,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
@@ -31,9 +31,6 @@ from pbem.solve.groups import Group, find_nearest
 from pbem.solve.problem import Problem
 from pbem.solve.schwarz import SchwarzPreconditioner
 from pbem.solve.tangent import Judge, Solved
-
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 
 # The groups of a network are divided into parts of so many elements at most, which settle with the elements nearest to
 # them, so many times as many: what they take grows with the square of these numbers.
@@ -175,7 +172,7 @@ def _divide(mesh: Mesh, groups: Iterable[Group]) -> Iterator[tuple[Integer, Inte
             yield part, np.union1d(part, find_nearest(mesh, part, tree, int(AROUND * len(part))))
 
 
-def _halve(middle: NDArray[np.complex128], elements: Integer) -> Iterator[Integer]:
+def _halve(middle: Complex, elements: Integer) -> Iterator[Integer]:
     """Elements by place in parts of at most PART_ELEMENTS, each rising."""
     if len(elements) <= PART_ELEMENTS:
         yield elements
@@ -193,7 +190,7 @@ def _find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer
     return np.sort(pairs[pairs >= 0])
 
 
-def _free(problem: Problem, jumps: NDArray[np.bool_]) -> Linearisation:
+def _free(problem: Problem, jumps: Bool) -> Linearisation:
     """The law of pairs that are free to have any jumps, without tractions, where jumps (m,); else any tractions."""
     tangent = np.zeros((problem.laws.count, 4, 2))
     tangent[jumps, G_N, 0] = tangent[jumps, G_S, 1] = 1.0

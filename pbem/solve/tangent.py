@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState, PairLaws, PairState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
 from pbem.errors import ConvergenceError
 
-Real = NDArray[np.float64]
-Integer = NDArray[np.int64]
 # The modes that states of some pairs ask for: of their laws, modes, states, memory and pressure.
 Judge = Callable[[PairLaws, ModeState, PairState, Memory, Real], Proposal]
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Integer
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
 from pbem.geometry.junction import format_point
 from pbem.solve.problem import Problem
-
-Integer = NDArray[np.int64]
 
 # So many pairs, or interfaces, are named.
 MOST_NAMED = 5

@@ -8,16 +8,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.elements.arc import Arc
 from pbem.geometry.elements.kind import Crossing, Kind, Piece, Shape
 from pbem.geometry.elements.straight import Straight
-
-Bool = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
-Integer = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 STRAIGHT, ARC = Straight(), Arc()
 KINDS: tuple[Kind, ...] = (STRAIGHT, ARC)

@@ -6,9 +6,6 @@ from abc import ABC, abstractmethod
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
-
-Real = NDArray[np.float64]
 
 
 class Shape(Protocol):

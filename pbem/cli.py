@@ -25,13 +25,13 @@ from pbem.errors import (
     StorageError,
     printable,
 )
-from pbem.make import add_make_commands, make, read_finite
+from pbem.make_command import add_make_commands, make, read_finite
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
 from pbem.version import __version__
 
 if TYPE_CHECKING:
     from pbem.results.reader import Results
-    from pbem.solve.step import Reporter
+    from pbem.solve.problem.step import Reporter
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.

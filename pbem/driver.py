@@ -26,16 +26,16 @@ from pbem.results.passes import KeptPass, keep_pass, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.beside import NOTHING_COARSER, put_beside
-from pbem.solve.fields import InteriorField
-from pbem.solve.march import march, start_from
-from pbem.solve.options import check_options
-from pbem.solve.petsc import petsc_options, petsc_version
-from pbem.solve.second import SecondSolution
-from pbem.solve.start import check_shares, check_start
-from pbem.solve.step import Reporter, SilentReporter, Step
-from pbem.solve.watch import Watch
+from pbem.solve.estimate.beside import NOTHING_COARSER, put_beside
+from pbem.solve.estimate.second import SecondSolution
+from pbem.solve.launch.start import check_shares, check_start
+from pbem.solve.launch.watch import Watch
+from pbem.solve.petsc.options import check_options
+from pbem.solve.petsc.session import petsc_options, petsc_version
+from pbem.solve.problem.step import Reporter, SilentReporter, Step
+from pbem.solve.steps.march import march, start_from
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.system.interior import InteriorField
 
 
 def run(

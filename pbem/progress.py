@@ -8,7 +8,7 @@ from typing import Any, TextIO
 
 from pbem.errors import printable
 from pbem.model.model import Model, Stage
-from pbem.solve.step import OPEN, SLIP, STICK, Iteration, Reporter, SilentReporter, Step
+from pbem.solve.problem.step import OPEN, SLIP, STICK, Iteration, Reporter, SilentReporter, Step
 
 
 class Plan:

@@ -27,7 +27,9 @@ from bench_field import make_field
 
 from pbem import driver
 from pbem.model import build
-from pbem.solve import hold, march, problem
+from pbem.solve.nonlinear import hold
+from pbem.solve.problem.problem import problem
+from pbem.solve.steps import march
 
 MOST = 0.03
 # Of the model, when it is read; and after each step.

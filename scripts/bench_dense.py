@@ -27,8 +27,8 @@ import pbem
 from pbem.case.build import read_model
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.step import Iteration, SilentReporter, Step
+from pbem.solve.problem.step import Iteration, SilentReporter, Step
+from pbem.solve.system.assembly import assemble_problem
 
 SIDE = 10.0
 # Tractions on the top and on the right at the end of each stage.

@@ -42,7 +42,7 @@ from pbem.model.model import Model
 from pbem.model.refinement import bisect_elements, count_elements
 from pbem.results.accuracy import Pass, decide
 from pbem.results.estimates import Comparison, Relative
-from pbem.solve.beside import relate_meshes
+from pbem.solve.estimate.beside import relate_meshes
 from tests.verification.proofs import PROOFS, Proof, proof
 from tests.verification.proofs.proof import Solved
 

@@ -23,9 +23,9 @@ from typing import Any
 import pbem
 from pbem.cli import main as run_command
 from pbem.parallel import world
-from pbem.solve.linear import LinearSolver
-from pbem.solve.pair_columns import PairColumns
-from pbem.solve.step import Iteration, SilentReporter
+from pbem.solve.petsc.linear import LinearSolver
+from pbem.solve.problem.step import Iteration, SilentReporter
+from pbem.solve.tangent.pair_columns import PairColumns
 
 FRACTION = 0.2  # of the area
 FRICTION = 0.3

@@ -65,7 +65,7 @@ class Clock:
 def make_step(mesh, laws, number: int):
     """A step with numbers that are not zero: every third pair open, the others slipping or sticking in turn."""
     from pbem.mesh.mesh import list_faces
-    from pbem.solve.step import ContactState, Iteration, Step
+    from pbem.solve.problem.step import ContactState, Iteration, Step
 
     faces = len(list_faces(mesh).position)
     wave = np.sin(np.arange(faces) + number)
@@ -89,7 +89,7 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
     from pbem.contact.support import close_nearest_pairs, find_support, find_ties
     from pbem.mesh.generate import generate_mesh
     from pbem.model.build import build_model
-    from pbem.model.support import find_free_motions
+    from pbem.model.rigid_body_modes import find_rigid_body_modes
     from pbem.results.describe import describe_model, describe_results
     from pbem.results.plots import plot_model, plot_results
     from pbem.results.reader import open_results
@@ -119,7 +119,7 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
             evaluate_load(model, mesh, outer, 0, (1 + number) / STEPS)
         find_needed_columns(model, mesh, outer)
     with clock.measure("support"):
-        anchored = find_free_motions(model)
+        anchored = find_rigid_body_modes(model)
         anchors = anchor_motions(mesh, anchored)
         modes = start_memory(laws).modes
         for _ in range(STEPS):

@@ -28,13 +28,13 @@ from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.model.model import Model
 from pbem.parallel import gather_parts, world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.factored import FactoredTangent
-from pbem.solve.march import start_from_rest
-from pbem.solve.newton import solve_step
-from pbem.solve.problem import Problem
-from pbem.solve.step import SilentReporter
-from pbem.solve.tangent import AnyTangent
+from pbem.solve.nonlinear.newton import solve_step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import SilentReporter
+from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.steps.march import start_from_rest
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.factored import FactoredTangent
 
 Real = NDArray[np.float64]
 T = TypeVar("T", bound=AnyTangent)

@@ -41,7 +41,8 @@ import errno, os, resource, signal, sys, time
 from pbem.cli import main
 from pbem.parallel import world
 from pbem.results import journal
-from pbem.solve import assembly, problem
+from pbem.solve.system import assembly
+from pbem.solve.problem.problem import problem
 
 phase, end, rank, *arguments = sys.argv[1:]
 rank, calls, processes = int(rank), 0, world.allgather(os.getpid())

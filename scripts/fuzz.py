@@ -41,7 +41,7 @@ from pbem.errors import CaseError, ConvergenceError, PbemError, is_control
 from pbem.mesh.generate import generate_mesh
 from pbem.results.describe import describe_model, describe_results
 from pbem.results.reader import Results
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.problem.step import SilentReporter, Step
 
 ROOT = Path(__file__).resolve().parent.parent
 PATIENCE = 60

@@ -71,8 +71,9 @@ def measure(case: Path, operator_only: bool, output: str | None = None) -> dict[
     begin = time.perf_counter()
     from pbem import driver
     from pbem.parallel import world
-    from pbem.solve import march, schwarz
-    from pbem.solve.problem import Problem
+    from pbem.solve.preconditioner import schwarz
+    from pbem.solve.problem.problem import Problem
+    from pbem.solve.steps import march
 
     clock = Clock()
     problems: list[Any] = []

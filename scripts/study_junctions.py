@@ -31,10 +31,10 @@ from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model import sliver
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.problem import Problem
-from pbem.solve.step import SilentReporter
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import SilentReporter
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 from tests.verification.proofs.proof import line, write_case
 
 KINDS = ("crossing", "t", "edge")

@@ -14,9 +14,9 @@ from pbem.case.build import parse_model
 from pbem.mesh import shapes
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.step import SilentReporter
+from pbem.solve.problem.step import SilentReporter
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 
 GAUSS = {order: tuple(shapes.place_nodes(order)) for order in (1, 2, 3)}
 TRIALS = {

@@ -56,7 +56,7 @@ def shift_matrices(offset: Complex, inner: Real, outer: Real, terms: int) -> Com
     return moved * _binomials(terms) * scaled[:, None, :]
 
 
-def gather_from_children(moments: Complex, shift: Complex, offset: Complex, inner: Real, outer: Real) -> Complex:
+def apply_m2m(moments: Complex, shift: Complex, offset: Complex, inner: Real, outer: Real) -> Complex:
     """What children's coefficients (n, 2, p + 1) are about their parents' centres; offset: from parent to child.
 
     (theory, 39)
@@ -74,7 +74,7 @@ def gather_from_children(moments: Complex, shift: Complex, offset: Complex, inne
     return result
 
 
-def pass_to_children(fields: Complex, shift: Complex, offset: Complex, outer: Real) -> Complex:
+def apply_l2l(fields: Complex, shift: Complex, offset: Complex, outer: Real) -> Complex:
     """What the parents' fields (n, 2, p + 1) are about their children's centres; offset: from parent to child.
 
     (theory, 41)
@@ -87,7 +87,7 @@ def pass_to_children(fields: Complex, shift: Complex, offset: Complex, outer: Re
     return result
 
 
-def carry_over(moments: Complex, distance: Complex, source: Real, target: Real, length: Real) -> Complex:
+def apply_m2l(moments: Complex, distance: Complex, source: Real, target: Real, length: Real) -> Complex:
     """Fields (n, 2, p + 1) about targets from coefficients of sources; distance: from source to target centre.
 
     source, target: radii of the circles; length: unit of the logarithm.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.expansion import carry_over, gather_from_children, pass_to_children, shift_matrices
+from pbem.bem.expansion import apply_l2l, apply_m2l, apply_m2m, shift_matrices
 from pbem.bem.tree import Forest
 
 # Pairs of clusters that are treated at once: their coefficients fit into the caches.
@@ -64,7 +64,7 @@ class SourceTree:
         flat[own] = self.add_up(flat[own])
         moments = flat.view(complex).reshape(forest.clusters, 2, self.terms + 1)
         for clusters in reversed(forest.levels):
-            moved = gather_from_children(
+            moved = apply_m2m(
                 moments[clusters], self.shifts.matrix[clusters], self.shifts.offset[clusters],
                 forest.radius[clusters], self.shifts.outer[clusters],
             )  # fmt: skip
@@ -95,7 +95,7 @@ class TargetTree:
         fields = np.zeros((forest.clusters, 2, self.terms + 1), dtype=complex)
         for begin in range(0, len(self.target), CHUNK):
             target, source = self.target[begin : begin + CHUNK], self.source[begin : begin + CHUNK]
-            carried = carry_over(
+            carried = apply_m2l(
                 moments[source], forest.center[target] - sources.center[source], sources.radius[source],
                 forest.radius[target], self.length[target],
             )  # fmt: skip
@@ -103,7 +103,7 @@ class TargetTree:
             fields[reached] += np.add.reduceat(carried, first, axis=0)
         for clusters in forest.levels:
             own = clusters[self.wanted[clusters]]
-            fields[own] += pass_to_children(
+            fields[own] += apply_l2l(
                 fields[forest.parent[own]], self.shifts.matrix[own], self.shifts.offset[own], self.shifts.outer[own]
             )
         return fields

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestors, prepare_shifts
-from pbem.bem.leaf import Medium, source_matrix, target_matrix
+from pbem.bem.leaf import Medium, form_l2p, form_p2m
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid import RigidMotions, find_rigid_motions, take_off_rigid_motions
 from pbem.bem.rows import Sources, evaluate_rows
@@ -110,7 +110,7 @@ def prepare_sources(
         elements = forest.items(leaf)
         region = int(forest.region[leaf])
         chosen = parts.sources[region].select(elements - parts.first_element[region])
-        matrix = source_matrix(chosen, forest.center[leaf], forest.radius[leaf], parts.terms)
+        matrix = form_p2m(chosen, forest.center[leaf], forest.radius[leaf], parts.terms)
         columns = list_columns(mesh, list_nodes(mesh, elements), matrix.shape[1])
         kept = needed[columns]
         made.append(LeafSources(int(leaf), columns[kept], np.ascontiguousarray(matrix[:, kept])))
@@ -236,7 +236,7 @@ def _evaluate_leaf(
         values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, parts.node_local[own])
         whole = np.concatenate([value for value in values if value is not None], axis=1)
         near[where] = whole[:, kept]
-        far[where] = target_matrix(
+        far[where] = form_l2p(
             mesh.position[own], normal, Medium(material.kappa, material.shear_modulus),
             forest.center[leaf], forest.radius[leaf], parts.terms,
         )  # fmt: skip

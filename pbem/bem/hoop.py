@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.background import Background
+from pbem.bem.particular_solution import ParticularSolution
 from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_nodes, split_faces
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
@@ -16,7 +16,7 @@ SMOOTH = 1e-6
 
 
 def evaluate_hoop_stress(
-    mesh: Mesh, initial: Sequence[Background], displacement: Complex, traction: Complex
+    mesh: Mesh, initial: Sequence[ParticularSolution], displacement: Complex, traction: Complex
 ) -> Real:
     """Normal stress along the boundary (f,) at the nodes of `list_faces(mesh)` (theory, 71).
 
@@ -40,7 +40,7 @@ def evaluate_hoop_stress(
     for number, background in enumerate(initial):
         own = order[bounds[number] : bounds[number + 1]]
         n, e = normal[own], direction[own]
-        at_rest = Background(background.material, initial=background.initial)
+        at_rest = ParticularSolution(background.material, initial=background.initial)
         rest_n = (np.conj(n) * at_rest.traction(position[own], n)).real
         rest_s = (np.conj(e) * at_rest.traction(position[own], e)).real
         kappa = background.material.kappa

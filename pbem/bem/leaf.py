@@ -24,7 +24,7 @@ class Medium:
     shear_modulus: float
 
 
-def source_matrix(sources: Sources, center: complex, radius: float, terms: int) -> Real:
+def form_p2m(sources: Sources, center: complex, radius: float, terms: int) -> Real:
     """Coefficients of elements about a centre: matrix (4 (p + 1), columns) on nodal values (theory, 35, 37, 38).
 
     Rows: real and imaginary part of a_0 .. a_p, then of b_0 .. b_p. Columns: x and y of the displacement (or jump) of
@@ -111,12 +111,12 @@ def _traction_density(sources: Sources, terms: int) -> Real:
     return density
 
 
-def target_matrix(
+def form_l2p(
     point: Complex, normal: Complex | None, medium: Medium, center: complex, radius: float, terms: int
 ) -> Real:
     """Values at points (n,) from the field's coefficients about a centre: matrix (2 n, 4 (p + 1)) (theory, 2, 4, 36).
 
-    The displacement, or the traction on the normals (n,). Columns as the rows of source_matrix.
+    The displacement, or the traction on the normals (n,). Columns as the rows of form_p2m.
     """
     number = np.arange(terms + 1)
     h = (point - center)[:, None]

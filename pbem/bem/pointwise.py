@@ -10,7 +10,7 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
 from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_columns, log_lengths
 from pbem.bem.interior import Values
-from pbem.bem.leaf import Medium, target_matrix
+from pbem.bem.leaf import Medium, form_l2p
 from pbem.bem.location import Location
 from pbem.bem.rigid import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
@@ -83,7 +83,7 @@ class PointRows:
         forest = self.targets.forest
         material = self.parts.materials[int(forest.region[leaf])]
         normals = None if normal is None else np.full(len(chosen), normal, dtype=complex)
-        matrix = target_matrix(
+        matrix = form_l2p(
             self.point[chosen], normals, Medium(material.kappa, material.shear_modulus),
             forest.center[leaf], forest.radius[leaf], self.parts.terms,
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """Bodies that only the balance of their loads keeps at rest: their mean displacement and rotation are set to zero.
 
 Anchors are for the motions that are free at the start. Where contact comes to hold such a motion its anchor has to be
-taken off, or it would carry a part of the load: see pbem.contact.support and pbem.solve.release.
+taken off, or it would carry a part of the load: see pbem.contact.support and pbem.solve.tangent.release.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.mesh.mesh import Mesh
-from pbem.model.support import FreeMotion
+from pbem.model.rigid_body_modes import RigidBodyMode
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Anchor:
     functional: Complex
 
 
-def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, ...]:
+def anchor_motions(mesh: Mesh, motions: Sequence[RigidBodyMode]) -> tuple[Anchor, ...]:
     """One anchor for each free motion, on regions chosen so that the anchors tell all motions apart (theory, 61)."""
     numbers = {name: number for number, name in enumerate(mesh.region_names)}
     bounds = np.searchsorted(mesh.region, np.arange(len(numbers) + 1)) * (mesh.order + 1)
@@ -38,7 +38,7 @@ def anchor_motions(mesh: Mesh, motions: Sequence[FreeMotion]) -> tuple[Anchor, .
     return tuple(anchor for group in group_motions(motions) for anchor in _anchor_group(nodes, group))
 
 
-def see_motions(mesh: Mesh, anchors: Sequence[Anchor], motions: Sequence[FreeMotion]) -> Real:
+def see_motions(mesh: Mesh, anchors: Sequence[Anchor], motions: Sequence[RigidBodyMode]) -> Real:
     """Values (a, c) of the anchors' functionals for free motions."""
     seen = np.zeros((len(anchors), len(motions)))
     for row, anchor in enumerate(anchors):
@@ -53,7 +53,7 @@ def see_motions(mesh: Mesh, anchors: Sequence[Anchor], motions: Sequence[FreeMot
     return seen
 
 
-def group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
+def group_motions(motions: Sequence[RigidBodyMode]) -> list[list[RigidBodyMode]]:
     """Motions that have regions in common, directly or by way of others."""
     members: dict[int, list[int]] = {}
     group_of: dict[str, int] = {}
@@ -68,7 +68,7 @@ def group_motions(motions: Sequence[FreeMotion]) -> list[list[FreeMotion]]:
     return [[motions[at] for at in group] for group in groups]
 
 
-def _anchor_group(nodes: _Nodes, motions: Sequence[FreeMotion]) -> list[Anchor]:
+def _anchor_group(nodes: _Nodes, motions: Sequence[RigidBodyMode]) -> list[Anchor]:
     anchors: list[Anchor] = []
     remaining = np.eye(len(motions))  # combinations of motions that the anchors so far do not see
     for _ in motions:
@@ -99,7 +99,7 @@ class _Nodes:
         return first + np.flatnonzero(~self.crack[first:last])
 
 
-def _anchor_region(nodes: _Nodes, motion: FreeMotion, name: str) -> Anchor:
+def _anchor_region(nodes: _Nodes, motion: RigidBodyMode, name: str) -> Anchor:
     region = nodes.numbers[name]
     own = nodes.find(region)
     velocity = _move(nodes, motion, own, name)
@@ -108,10 +108,10 @@ def _anchor_region(nodes: _Nodes, motion: FreeMotion, name: str) -> Anchor:
     return Anchor(region, own, pattern, weighted / float((np.conj(weighted) * pattern).real.sum()))
 
 
-def _apply(nodes: _Nodes, anchor: Anchor, name: str, motion: FreeMotion) -> float:
+def _apply(nodes: _Nodes, anchor: Anchor, name: str, motion: RigidBodyMode) -> float:
     return float((np.conj(anchor.functional) * _move(nodes, motion, anchor.nodes, name)).real.sum())
 
 
-def _move(nodes: _Nodes, motion: FreeMotion, own: Integer, name: str) -> Complex:
+def _move(nodes: _Nodes, motion: RigidBodyMode, own: Integer, name: str) -> Complex:
     shift, spin = motion.velocities.get(name, (0j, 0.0))
     return shift + 1j * spin * nodes.mesh.position[own]

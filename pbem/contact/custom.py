@@ -1,7 +1,7 @@
 """Friction laws from users' Python files: what they are given cannot be changed, and what they answer is checked.
 
 On several ranks a law that fails on one of them must not leave the others waiting. So a `CustomLaw` does not raise: it
-keeps what went wrong and answers with no strength, until all ranks ask together (`pbem.solve.watch`).
+keeps what went wrong and answers with no strength, until all ranks ask together (`pbem.solve.launch.watch`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.declaration import FrictionLaw, Slide
-from pbem.contact.strength_type import Strength
+from pbem.contact.friction_bound import Strength
 
 PARTS = ("bound", "by_traction", "by_slip")
 EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays of the shape of p_n"

@@ -13,7 +13,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import Parts
 from pbem.model.model import Model
 from pbem.model.rigid import GROUND, Link, find_moving_bodies
-from pbem.model.support import describe_motion, find_least_stiffness
+from pbem.model.rigid_body_modes import describe_motion, find_least_stiffness
 
 
 def describe_cut_motions(model: Model, mesh: Mesh, outer: OuterNodes, parts: Parts, modes: ModeState) -> str | None:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.strength_type import Strength
+from pbem.contact.friction_bound import Strength
 
 Parameters = Mapping[str, Real]
 

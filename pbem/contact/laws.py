@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
+from pbem.contact.friction_bound import Strength
 from pbem.contact.strength import choose_strength
-from pbem.contact.strength_type import Strength
 from pbem.geometry.expression import evaluate_expression
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.background import Background
+from pbem.bem.particular_solution import ParticularSolution
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Region, Stage
@@ -95,7 +95,7 @@ def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Re
     return np.array(values, dtype=float)[mesh.pairs.interface]
 
 
-def _sample(mesh: Mesh, backgrounds: Sequence[Background]) -> Complex:
+def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
     """Displacement and traction (2, nodes) of the regions' background fields at all nodes."""
     fields = np.zeros((2, mesh.nodes), dtype=complex)
     ends = np.searchsorted(mesh.node_region, np.arange(len(backgrounds) + 1))
@@ -107,11 +107,12 @@ def _sample(mesh: Mesh, backgrounds: Sequence[Background]) -> Complex:
     return fields
 
 
-def balanced_background(model: Model, region: Region, gravity: complex) -> Background:
+def balanced_background(model: Model, region: Region, gravity: complex) -> ParticularSolution:
     """In-situ stress and weight of a region."""
     initial = model.initial_stress.get(region.material.name, (0.0, 0.0, 0.0))
     force = region.material.density * gravity
-    return Background(region.material, initial=initial, force=force, center=_find_center(model, region) if force else 0)
+    center = _find_center(model, region) if force else 0
+    return ParticularSolution(region.material, initial=initial, force=force, center=center)
 
 
 def _find_center(model: Model, region: Region) -> complex:
@@ -121,15 +122,15 @@ def _find_center(model: Model, region: Region) -> complex:
     return complex(0.5 * (min(x) + max(x)), 0.5 * (min(y) + max(y)))
 
 
-def far_background(model: Model, region: Region, remote: Real) -> Background:
+def far_background(model: Model, region: Region, remote: Real) -> ParticularSolution:
     """The field to which an infinite region tends; none in a finite region.
 
     Its displacement is that about the middle of all curves, wherever the model lies.
     """
     if not region.infinite:
-        return Background(region.material)
+        return ParticularSolution(region.material)
     sxx, syy, sxy = (float(value) for value in remote)
-    return Background(region.material, remote=(sxx, syy, sxy), center=model.middle)
+    return ParticularSolution(region.material, remote=(sxx, syy, sxy), center=model.middle)
 
 
 def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:

@@ -209,7 +209,7 @@ STIFFEST = 100.0
 ROUNDING = 1e-10
 
 
-def propose_modes(
+def update_active_set(
     laws: PairLaws,
     modes: ModeState,
     state: PairState,

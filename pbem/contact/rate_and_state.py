@@ -17,7 +17,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide
-from pbem.contact.strength_type import Strength
+from pbem.contact.friction_bound import Strength
 
 # Slips below this part of the slip distance are in a series.
 SMALL = 1e-3

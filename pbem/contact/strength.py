@@ -17,8 +17,8 @@ import numpy as np
 from pbem.arrays import Bool, Real
 from pbem.contact.custom import CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
+from pbem.contact.friction_bound import Strength
 from pbem.contact.rate_and_state import RateAndState
-from pbem.contact.strength_type import Strength
 from pbem.errors import Fault
 from pbem.model.model import Law, Model
 

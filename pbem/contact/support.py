@@ -12,7 +12,7 @@ from pbem.contact.anchor import Anchor, group_motions, see_motions
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, resists_slip
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.support import FreeMotion, PairTie, Tie, find_free_motions
+from pbem.model.rigid_body_modes import PairTie, RigidBodyMode, Tie, find_rigid_body_modes
 
 # Two sticking pairs that are further apart than this part of their interface's extent hold all three motions.
 APART = 1e-6
@@ -63,7 +63,7 @@ class Support:
     that would carry a part of what the pairs carry, and are taken off.
     """
 
-    motions: tuple[FreeMotion, ...]
+    motions: tuple[RigidBodyMode, ...]
     unheld: str | None
     acting: Real
     released: Real
@@ -75,11 +75,11 @@ class Support:
 
 
 def find_support(
-    model: Model, mesh: Mesh, anchors: tuple[Anchor, ...], anchored: tuple[FreeMotion, ...],
+    model: Model, mesh: Mesh, anchors: tuple[Anchor, ...], anchored: tuple[RigidBodyMode, ...],
     ties: Mapping[str, Tie | PairTie],
 ) -> Support:
     """Which rigid motions are free with these ties, and which of the anchors, made for `anchored`, hold them."""
-    motions = find_free_motions(model, ties)
+    motions = find_rigid_body_modes(model, ties)
     whole = np.eye(len(anchors))
     acting, released, unheld = [whole[:, :0]], [whole[:, :0]], []
     region_of = np.array([anchor.region for anchor in anchors], dtype=np.int64)
@@ -103,7 +103,7 @@ def find_support(
 
 
 def _is_spanned(
-    mesh: Mesh, anchors: Sequence[Anchor], anchored: Sequence[FreeMotion], motions: Sequence[FreeMotion]
+    mesh: Mesh, anchors: Sequence[Anchor], anchored: Sequence[RigidBodyMode], motions: Sequence[RigidBodyMode]
 ) -> bool:
     """Whether all motions are combinations of the anchored ones; the anchors tell which."""
     parts = np.linalg.solve(see_motions(mesh, anchors, anchored), see_motions(mesh, anchors, motions))
@@ -112,7 +112,7 @@ def _is_spanned(
     return bool((np.abs(whole - known @ parts).max(axis=0) <= ANCHORED * np.abs(whole).max(axis=0)).all())
 
 
-def _list_velocities(mesh: Mesh, motions: Sequence[FreeMotion]) -> Complex:
+def _list_velocities(mesh: Mesh, motions: Sequence[RigidBodyMode]) -> Complex:
     """Velocities of a point of every region that moves, and of another one against it, (2 regions, motions)."""
     names = {name: row for row, name in enumerate(sorted({name for motion in motions for name in motion.regions}))}
     size = float(np.abs(mesh.start - mesh.start[0]).max())

@@ -13,7 +13,7 @@ from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.mortar import LEAST_COVER, OVERLAP, Coupling, couple_curves, measure_contrast
 from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
-from pbem.model.support import ROUNDINGS
+from pbem.model.rigid_body_modes import ROUNDINGS
 
 Columns = dict[str, np.ndarray]
 

@@ -9,14 +9,14 @@ import numpy as np
 from pbem.geometry.junction import format_point
 from pbem.geometry.loop import loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage
-from pbem.model.support import FreeMotion
+from pbem.model.rigid_body_modes import RigidBodyMode
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
 BALANCED = 1e-9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
-def describe_unbalance(model: Model, motion: FreeMotion, moving: Sequence[Region]) -> str | None:
+def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Region]) -> str | None:
     """What drives a free motion: the first stage whose loads do work on it, with their resultant; None if none.
 
     moving: the motion's regions.
@@ -34,7 +34,7 @@ def describe_unbalance(model: Model, motion: FreeMotion, moving: Sequence[Region
 
 
 def _sum_tractions(
-    model: Model, motion: FreeMotion, moving: Sequence[Region], stage: Stage
+    model: Model, motion: RigidBodyMode, moving: Sequence[Region], stage: Stage
 ) -> tuple[complex, float, float, float]:
     """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs.
 

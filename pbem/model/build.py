@@ -31,9 +31,9 @@ from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
+from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
-from pbem.model.support import find_free_motions, find_least_stiffness, find_plane_translations
 from pbem.wording import list_names
 
 # Faults shown of what one table [[generate]] made.
@@ -234,7 +234,7 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults, balanced = [], []
     regions = {region.name: region for region in model.regions}
-    for motion in find_free_motions(model):
+    for motion in find_rigid_body_modes(model):
         found = f"a free rigid motion ({motion.text})"
         unbalance = describe_unbalance(model, motion, [regions[name] for name in motion.regions])
         if unbalance is None:

@@ -10,10 +10,10 @@ from pbem.description.case import Case
 from pbem.description.effects import TIMED
 from pbem.description.schema import LawTable, StageConditionTable
 from pbem.errors import Fault, KeyPath
-from pbem.model.background import Backgrounds, read_backgrounds
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage
 from pbem.model.roles import Roles, unknown_name
+from pbem.model.stress_fields import Backgrounds, read_backgrounds
 
 # Key to frame, direction and quantity.
 _KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {

@@ -13,7 +13,7 @@ from pbem.contact.loads import evaluate_pressure
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
-from pbem.solve.step import Step
+from pbem.solve.problem.step import Step
 
 # Places between a node and the next one on its element, as parts of the way.
 PLACES = (0.25, 0.5, 0.75)

@@ -8,8 +8,8 @@ from pbem.arrays import Complex, Real
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.solve.beside import Beside
-from pbem.solve.step import Step
+from pbem.solve.estimate.beside import Beside
+from pbem.solve.problem.step import Step
 
 
 def sum_reactions(model: Model, mesh: Mesh, step: Step) -> Complex:

@@ -13,7 +13,7 @@ from pbem.arrays import Bool, Complex, Real
 from pbem.contact.declaration import BROKEN, SLIP_PATH, Slide
 from pbem.contact.laws import OPEN, SLIP, PairLaws, StrengthGroup, evaluate_strength, start_memory
 from pbem.mesh.mesh import Mesh
-from pbem.solve.step import ContactState
+from pbem.solve.problem.step import ContactState
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.background import Background
+from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.interpolation import interpolate_tips, locate_nodes
@@ -45,8 +45,8 @@ from pbem.results.dissipation import (
     record_pairs,
     record_pairs_at_rest,
 )
-from pbem.solve.backgrounds import evaluate_backgrounds
-from pbem.solve.step import Step
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import Step
 
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 # Gauss points along tip elements, in the root of the distance from the tip.
@@ -132,11 +132,11 @@ class EnergyBalance:
         self._by_region = np.argsort(self._faces.region, kind="stable")
         self._bounds = np.searchsorted(self._faces.region[self._by_region], np.arange(len(model.regions) + 1))
         self._forces = [
-            self._refer(number, [Background(each.material, force=force) for force in (1, 1j)], within=True)
+            self._refer(number, [ParticularSolution(each.material, force=force) for force in (1, 1j)], within=True)
             for number, each in enumerate(model.regions) if each.material.density and not each.infinite
         ]  # fmt: skip
         self._stresses = [
-            self._refer(number, [Background(each.material, remote=stress) for stress in UNIT_STRESSES])
+            self._refer(number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
             for number, each in enumerate(model.regions) if each.infinite
         ]  # fmt: skip
         self._in_situ = self._sample_in_situ()
@@ -213,7 +213,7 @@ class EnergyBalance:
         self, traction: Complex, displacement: Complex, stage: int, factor: float, pairs: PairRecord
     ) -> _State:
         """The energy that is stored, and what weights and far stresses work on (theory, 73, 74)."""
-        backgrounds = evaluate_backgrounds(self._model, stage, factor)
+        backgrounds = evaluate_particular_solutions(self._model, stage, factor)
         elastic = traction - self._in_situ
         loads, conjugates = [np.zeros(0)], [np.zeros(0)]
         stored = 0.5 * _dot(self._weight, traction + self._in_situ, displacement)
@@ -243,8 +243,8 @@ class EnergyBalance:
     def _sample_in_situ(self) -> Complex:
         """Traction of the in-situ stress on all faces (f,)."""
         traction = np.zeros(len(self._weight), dtype=complex)
-        for number, (balanced, _) in enumerate(evaluate_backgrounds(self._model, 0, 0.0)):
-            at_rest = Background(balanced.material, initial=balanced.initial)
+        for number, (balanced, _) in enumerate(evaluate_particular_solutions(self._model, 0, 0.0)):
+            at_rest = ParticularSolution(balanced.material, initial=balanced.initial)
             if at_rest.is_zero:
                 continue
             own = self._find_faces(number)
@@ -254,7 +254,7 @@ class EnergyBalance:
     def _find_faces(self, region: int) -> Integer:
         return self._by_region[self._bounds[region]:self._bounds[region + 1]]
 
-    def _refer(self, region: int, fields: Sequence[Background], within: bool = False) -> _Reference:
+    def _refer(self, region: int, fields: Sequence[ParticularSolution], within: bool = False) -> _Reference:
         """Fields about the origin, or about a point `within` a finite region, where rounding is smallest."""
         faces = self._find_faces(region)
         z, n = self._faces.position[faces], self._faces.normal[faces]

@@ -15,8 +15,8 @@ from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
 from pbem.results.rates import EndFinder, choose_jump_divisors
 from pbem.results.tips import collect_tip_rules
-from pbem.solve.beside import Beside
-from pbem.solve.step import ContactState, Step
+from pbem.solve.estimate.beside import Beside
+from pbem.solve.problem.step import ContactState, Step
 
 # The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
 # 5; with the order lowered by one. Measured over the problems with known answers by scripts/bench_estimate.py.

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.background import Background
 from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
+from pbem.bem.particular_solution import ParticularSolution
 from pbem.mesh.interpolation import differentiate, interpolate, split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
@@ -23,8 +23,8 @@ from pbem.model.model import Model
 from pbem.results.interface_tips import InterfaceTip, find_cut, find_interface_tips
 from pbem.results.tip_field import place_gauss
 from pbem.results.tip_shape import differentiate_at
-from pbem.solve.backgrounds import evaluate_backgrounds
-from pbem.solve.step import Step
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import Step
 
 ON_ARC = 32
 ON_ELEMENT = 10
@@ -56,7 +56,7 @@ class InterfaceRelease:
         J = np.full(len(self.tips), np.nan)
         if self.rows is None:
             return J
-        backgrounds = evaluate_backgrounds(self.model, step.stage, step.factor)
+        backgrounds = evaluate_particular_solutions(self.model, step.stage, step.factor)
         moved, carried = self._take_off(step, [balanced for balanced, _ in backgrounds])
         inside = self.rows.evaluate(moved, carried)
         materials = [region.material for region in self.model.regions]
@@ -79,7 +79,7 @@ class InterfaceRelease:
                     J[number] += _integrate_boundary(self.mesh, tip, elements, relative, carried, materials[region])
         return J
 
-    def _take_off(self, step: Step, balanced: list[Background]) -> tuple[Complex, Complex]:
+    def _take_off(self, step: Step, balanced: list[ParticularSolution]) -> tuple[Complex, Complex]:
         """Displacement and traction (nodes,) of the field without body force, in the regions that have tips."""
         mesh = self.mesh
         first, opposite = split_faces(mesh, step.displacement)

@@ -8,8 +8,8 @@ import numpy as np
 from pbem.mesh.mesh import Mesh
 from pbem.results.contents import Linearities
 from pbem.results.lazy import freeze, read_names
-from pbem.solve.linearity import describe_nonlinearity
-from pbem.solve.step import Linearity, Step
+from pbem.solve.problem.step import Linearity, Step
+from pbem.solve.steps.linearity import describe_nonlinearity
 
 QUANTITIES = ("strain", "rotation", "slip")
 

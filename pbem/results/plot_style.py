@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 
 from pbem.description.generation import Group
 from pbem.results.reader import Results
-from pbem.solve.step import OPEN, SLIP, STICK
+from pbem.solve.problem.step import OPEN, SLIP, STICK
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from pbem.results.layout import (
     list_pair_datasets,
     to_columns,
 )
-from pbem.solve.step import ContactState, Step
+from pbem.solve.problem.step import ContactState, Step
 
 # Places that differ by less than this part of the model's size and of its distance from the origin are one.
 SAME_PLACE = 1e-12

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.background import Background
+from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.laws import collect_laws
 from pbem.geometry.elements import Elements
 from pbem.mesh.interpolation import split_faces
@@ -19,8 +19,8 @@ from pbem.results.interface_tips import list_tip_curves
 from pbem.results.tip_field import TipShape
 from pbem.results.tip_path import TipPaths, trace_paths, view_outward
 from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
-from pbem.solve.backgrounds import evaluate_backgrounds
-from pbem.solve.step import ContactState, Step
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import ContactState, Step
 
 # A straight crack of more elements is not taken as a whole.
 MOST_WHOLE = 100
@@ -109,7 +109,7 @@ class TipRules:
         T = self._start()
         first, opposite = split_faces(self.mesh, step.displacement)
         mean = 0.5 * (first + opposite)[self.mesh.pairs.first]
-        backgrounds = evaluate_backgrounds(self.model, step.stage, step.factor)
+        backgrounds = evaluate_particular_solutions(self.model, step.stage, step.factor)
         for group in self.groups:
             forms, material = group.forms, group.material
             modulus = material.plane_modulus
@@ -133,7 +133,7 @@ class TipRules:
         turned = jump * group.sense * np.conj(group.direction)[:, None]
         return np.stack([turned.real, turned.imag], axis=2).reshape(len(turned), -1)
 
-    def _evaluate_initial(self, group: _Alike, backgrounds: list[Background]) -> Real:
+    def _evaluate_initial(self, group: _Alike, backgrounds: list[ParticularSolution]) -> Real:
         """In-situ stress, which has no displacement: what Hooke's law leaves out of the stress along the crack."""
         kappa = group.material.kappa
         initial = np.array([backgrounds[region].initial for region in group.region])

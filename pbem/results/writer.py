@@ -41,8 +41,8 @@ from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
-from pbem.solve.backgrounds import evaluate_backgrounds
-from pbem.solve.step import Interior, Iteration, Step
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import Interior, Iteration, Step
 
 # What ends a run though nothing is wrong with it.
 STOPPED = (MemoryError, StorageError, BrokenPipeError)
@@ -245,7 +245,7 @@ class ResultWriter:
 
     def _evaluate_hoop_stress(self, step: Step) -> Real:
         """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
-        initial = [balanced for balanced, _ in evaluate_backgrounds(self._model, step.stage, step.factor)]
+        initial = [balanced for balanced, _ in evaluate_particular_solutions(self._model, step.stage, step.factor)]
         kinds: dict[Hashable, int] = {}
         kind_of = [kinds.setdefault((each.material, each.initial), len(kinds)) for each in initial]
         mesh = self._mesh

@@ -18,7 +18,7 @@ from pbem.errors import CaseError, ConvergenceError, PbemError
 from pbem.model.sliver import Tie
 from pbem.parallel import world
 from pbem.results.reader import Results
-from pbem.solve.step import Iteration, SilentReporter, Step
+from pbem.solve.problem.step import Iteration, SilentReporter, Step
 
 from .conditions import is_finite, measure_balance, measure_contact, measure_energy, measure_scales
 from .equilibrium import can_balance, find_unloaded

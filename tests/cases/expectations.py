@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.results.reader import Contact, Results
-from pbem.solve.step import OPEN, SLIP, STICK
+from pbem.solve.problem.step import OPEN, SLIP, STICK
 from tests.cases.sampling import find_element_ends, sample_contact
 
 MODES = {"stick": STICK, "slip": SLIP, "open": OPEN}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbem.progress import BarReporter, LogReporter, make_reporter
-from pbem.solve.step import OPEN, SLIP, STICK, ContactState, Iteration, Reporter, SilentReporter, Step
+from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState, Iteration, Reporter, SilentReporter, Step
 from tests.unit.results_sample import make_model
 
 # Stages "press" of 2 and "shear" of 4 steps.

@@ -14,10 +14,10 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.problem import Problem
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 
 Real = NDArray[np.float64]
 

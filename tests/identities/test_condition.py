@@ -15,7 +15,7 @@ from pbem.exact import uniform_field
 from pbem.mesh.generate import generate_mesh
 from pbem.model.material import Material
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
+from pbem.solve.system.assembly import assemble_problem
 from tests.identities.bodies import ROCK, Body, draw_polygon, make_polygon, mesh_body, sample_field
 from tests.identities.solving import assemble_tangent, measure_condition, solve_for_field
 

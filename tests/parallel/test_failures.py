@@ -69,9 +69,9 @@ def expect_one_traceback(done: subprocess.CompletedProcess[str], rank: int, erro
 # Where: before anything is computed, in the assembly, in the third step, on the way to the file.
 PLACES = {
     "meshing": ("pbem.driver", "generate_mesh", 1, 0),
-    "assembly": ("pbem.solve.dense_system", "assemble_rows", 1, 0),
-    "a step": ("pbem.solve.march", "solve_step", 3, 2),
-    "the linear solver": ("pbem.solve.linear", "LinearSolver.solve_columns", 2, None),
+    "assembly": ("pbem.solve.system.dense", "assemble_rows", 1, 0),
+    "a step": ("pbem.solve.steps.march", "solve_step", 3, 2),
+    "the linear solver": ("pbem.solve.petsc.linear", "LinearSolver.solve_columns", 2, None),
 }
 
 
@@ -93,7 +93,8 @@ def test_an_exception_on_one_rank_ends_both(place: str, rank: int, folder: Path,
 
 
 def test_an_exception_on_all_ranks_ends_them(folder: Path, mpirun_snippet: Launch) -> None:
-    arguments = ("-1", "pbem.solve.march", "solve_step", "2", "MemoryError('all is full')", "blocks.toml", "--quiet")
+    full = "MemoryError('all is full')"
+    arguments = ("-1", "pbem.solve.steps.march", "solve_step", "2", full, "blocks.toml", "--quiet")
     done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
     assert done.returncode not in (0, 2, 3)
     # Whichever comes first ends the other, which may have spoken by then.
@@ -143,7 +144,8 @@ def test_all_ranks_return_3_alike(folder: Path, mpirun_snippet: Launch) -> None:
 def test_a_linear_solver_that_fails_ends_with_its_reason(
     error: str, reason: str, folder: Path, mpirun_snippet: Launch
 ) -> None:
-    arguments = ("-1", "pbem.solve.linear", "LinearSolver.solve_columns", "2", error, "run", "blocks.toml", "--quiet")
+    broken = "pbem.solve.petsc.linear", "LinearSolver.solve_columns"
+    arguments = ("-1", *broken, "2", error, "run", "blocks.toml", "--quiet")
     done = mpirun_snippet(2, BROKEN, *arguments, cwd=folder, timeout=SOON)
     assert done.returncode == 3, done.stderr
     assert done.stderr.count(f"pbem: not converged: {reason}") == 1
@@ -201,7 +203,7 @@ def test_what_forces_could_balance_is_asked_on_the_first_rank_alone(
     (folder / "away.toml").write_text(UNZIPS)
     told = []
     for rank in (0, 1):
-        arguments = (str(rank), "pbem.solve.ends", name, "1", "ConvergenceError('asked', 'on this rank')")
+        arguments = (str(rank), "pbem.solve.steps.ends", name, "1", "ConvergenceError('asked', 'on this rank')")
         done = mpirun_snippet(2, BROKEN, *arguments, "run", "away.toml", "--quiet", "--force", cwd=folder, timeout=SOON)
         assert done.returncode == 3, done.stderr
         told.append(done.stderr)

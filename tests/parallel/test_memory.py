@@ -18,11 +18,11 @@ from scipy import sparse
 from pbem.mesh.generate import generate_mesh
 from pbem.case.build import read_model
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
+from pbem.solve.system.assembly import assemble_problem
 from pbem.contact.laws import start_memory
 from pbem.contact.modes import linearise
-from pbem.solve.linear import LinearSolver
-from pbem.solve.reference import Reference
+from pbem.solve.petsc.linear import LinearSolver
+from pbem.solve.tangent.reference import Reference
 
 def list_arrays(item, seen):
     if id(item) in seen:

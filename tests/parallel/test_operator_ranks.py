@@ -38,7 +38,7 @@ import sys
 from pathlib import Path
 import pbem
 from pbem.bem import hierarchical
-from pbem.solve import groups
+from pbem.solve.preconditioner import subdomains as groups
 hierarchical.LEAF_ELEMENTS = hierarchical.SMALL_REGION = 4
 groups.ONE_GROUP, groups.GROUP_ELEMENTS = 0, 12
 for case in sys.argv[2:]:

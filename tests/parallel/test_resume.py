@@ -50,7 +50,7 @@ STEPS = 11
 STOPPING = """
 import os, signal, sys
 from pbem.cli import main
-import pbem.solve.march as solving
+import pbem.solve.steps.march as solving
 from pbem.errors import ConvergenceError
 from pbem.parallel import world
 

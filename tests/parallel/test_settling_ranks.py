@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pbem.results.reader import open_results
-from pbem.solve.search import Search
+from pbem.solve.nonlinear.search import Search
 from tests.verification.test_settling import make_junction, run, write_plane
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]

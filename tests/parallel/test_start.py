@@ -103,7 +103,7 @@ from dataclasses import replace
 import numpy as np
 from pbem.cli import main
 from pbem.parallel import world
-from pbem.solve import start
+from pbem.solve.launch import start
 whole = start.read_libraries
 bad = [int(rank) for rank in sys.argv[1].split(",")]
 start.read_libraries = lambda: replace(whole(), scalar=np.dtype(complex)) if world.rank in bad else whole()
@@ -141,7 +141,7 @@ def test_python_gets_the_refusal_as_an_error(folder: Path, mpirun_snippet: Launc
     code = """
 import pbem
 from pbem.parallel import world
-from pbem.solve import start
+from pbem.solve.launch import start
 start.refuse_libraries = lambda found, world: "not this one"
 try:
     pbem.run("blocks.toml")

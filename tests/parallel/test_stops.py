@@ -25,7 +25,7 @@ Launch = Callable[..., subprocess.CompletedProcess[str]]
 DISTURBED = """
 import os, resource, signal, subprocess, sys
 from pbem.cli import main
-import pbem.solve.march as solving
+import pbem.solve.steps.march as solving
 from pbem.parallel import world
 
 rank, number, what, *arguments = sys.argv[1:]

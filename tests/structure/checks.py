@@ -13,7 +13,7 @@ from pathlib import Path
 # The package itself comes last: it offers what they define.
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
-    "make", "bundled", "pages", "cli", "__main__", "__init__",
+    "make_command", "bundled", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact")
@@ -36,14 +36,14 @@ KINDS = (
 )
 # ... and their classes are known to those alone that make them, beside the modules that define them.
 MAKERS = {
-    "DenseSystem": ("pbem.solve.choice",),
-    "HierarchicalSystem": ("pbem.solve.choice",),
+    "DenseSystem": ("pbem.solve.system.choice",),
+    "HierarchicalSystem": ("pbem.solve.system.choice",),
     "DenseChoice": (),
     "HierarchicalChoice": (),
-    "CondensedTangent": ("pbem.solve.dense_system",),
-    "FactoredTangent": ("pbem.solve.dense_system",),
-    "ReleasedTangent": ("pbem.solve.dense_system",),
-    "KrylovTangent": ("pbem.solve.hierarchical_system",),
+    "CondensedTangent": ("pbem.solve.system.dense",),
+    "FactoredTangent": ("pbem.solve.system.dense",),
+    "ReleasedTangent": ("pbem.solve.system.dense",),
+    "KrylovTangent": ("pbem.solve.system.hierarchical",),
 }
 
 # What objects of these kinds are called.

@@ -29,7 +29,7 @@ def expect_none(faults: list[str]) -> None:
 
 def test_all_parts_are_read() -> None:
     # Else the tests below could pass because they look at nothing.
-    assert {"pbem", "pbem.errors", "pbem.model.model", "pbem.mesh.mesh", "pbem.solve.step"} <= MODULES.keys()
+    assert {"pbem", "pbem.errors", "pbem.model.model", "pbem.mesh.mesh", "pbem.solve.problem.step"} <= MODULES.keys()
 
 
 @each_module
@@ -128,7 +128,7 @@ SOUND = {
     "case/reader.py": '"""Reader."""\nimport tomllib\nfrom pbem.mesh import mesh\ndef read():\n    """Read."""',
     "solve/__init__.py": '"""Solving."""\nfrom . import newton',
     "solve/newton.py": '"""Newton."""\nfrom petsc4py import PETSc\nfrom pbem.mesh import mesh\nimport pbem.parallel',
-    "cli.py": '"""Command line."""\ndef main():\n    """Run."""\n    from pbem.solve.newton import mesh',
+    "cli.py": '"""Command line."""\ndef main():\n    """Run."""\n    from pbem.solve.nonlinear.newton import mesh',
 }
 
 
@@ -173,7 +173,7 @@ BREACHES = {
     "question, several": ("mesh/mesh.py", "isinstance(music, int | a.KrylovTangent)", "asks for KrylovTangent"),
     "question, attribute": ("mesh/mesh.py", "getattr(music.tangent, 'nearby', False)", "asks what music.tangent has"),
     "question, type": ("mesh/mesh.py", "type(music) is a.RowOperator", "compares types"),
-    "maker": ("solve/newton.py", "from pbem.solve.krylov import KrylovTangent", "KrylovTangent is made in"),
+    "maker": ("solve/newton.py", "from pbem.solve.tangent.krylov import KrylovTangent", "KrylovTangent is made in"),
     "name, variable": ("mesh/mesh.py", "mu = 0.5", "'mu' means several things"),
     "name, parameter": ("mesh/mesh.py", "def _f(mu): ...", "'mu' means several things"),
     "name, keyword": ("mesh/mesh.py", "_f(mu=1)", "'mu' means several things"),

@@ -23,7 +23,7 @@ from pbem.model.model import (
     SolverOptions,
     Stage,
 )
-from pbem.solve.step import OPEN, SLIP, STICK, ContactState, Iteration, Step
+from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState, Iteration, Step
 
 SOURCE = 'title = "Made-up blocks"\n'
 

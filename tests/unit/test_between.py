@@ -8,7 +8,7 @@ import pytest
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.results.between import BetweenNodes
-from pbem.solve.step import SLIP, ContactState, Step
+from pbem.solve.problem.step import SLIP, ContactState, Step
 from tests.cli.cli_sample import BLOCKS
 
 

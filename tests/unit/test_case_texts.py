@@ -16,7 +16,7 @@ from pbem.errors import CaseError, Fault, ResultFileError, is_control, printable
 from pbem.mesh.generate import generate_mesh
 from pbem.progress import LogReporter
 from pbem.results.describe import describe_model
-from pbem.solve.options import check_options
+from pbem.solve.petsc.options import check_options
 from tests.cli.cli_sample import BLOCKS
 
 CRACK = """\

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import pbem.solve.condensed as condensed
+import pbem.solve.tangent.condensed as condensed
 from pbem.case.build import parse_model
 from pbem.contact.laws import OPEN, STICK, ModeState
 from pbem.contact.loads import Load
@@ -16,15 +16,15 @@ from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.condensation import PairBases, Split, solve_pairs
-from pbem.solve.condensed import CondensedTangent
-from pbem.solve.effort import Effort, Work
-from pbem.solve.factored import FactoredTangent
-from pbem.solve.linear import LinearSolver
-from pbem.solve.load_basis import LoadBasis
-from pbem.solve.problem import Problem
-from pbem.solve.tangent import Solved
+from pbem.solve.petsc.effort import Effort, Work
+from pbem.solve.petsc.linear import LinearSolver
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import Solved
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.condensation import PairBases, Split, solve_pairs
+from pbem.solve.tangent.condensed import CondensedTangent
+from pbem.solve.tangent.factored import FactoredTangent
+from pbem.solve.tangent.load_basis import LoadBasis
 from tests.identities.solving import assemble_tangent, linearise_pairs
 from tests.unit.test_constraints import make_body
 

@@ -15,8 +15,8 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.problem import Problem
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system.assembly import assemble_problem
 from tests.identities.bodies import ROCK, Body, mesh_body
 from tests.identities.solving import linearise_pairs
 

@@ -10,8 +10,8 @@ import pytest
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.problem import Problem
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system.assembly import assemble_problem
 from tests.identities.solving import assemble_tangent, linearise_pairs
 from tests.unit.far_sample import read_sample
 

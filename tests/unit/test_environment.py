@@ -20,8 +20,8 @@ from pbem.environment import (
     refuse_copies,
     refuse_threads,
 )
-from pbem.solve.shares import fits_ranks, refuse_shares, share_equally
-from pbem.solve.start import Libraries, find_mpi_libraries, refuse_libraries
+from pbem.solve.launch.start import Libraries, find_mpi_libraries, refuse_libraries
+from pbem.solve.petsc.shares import fits_ranks, refuse_shares, share_equally
 
 BATCH = {"SLURM_JOB_ID": "7", "SLURM_NTASKS": "8", "SLURM_NPROCS": "8", "SLURM_PROCID": "0", "SLURM_LOCALID": "0"}
 STEP = BATCH | {"SLURM_STEP_ID": "0", "SLURM_STEP_NUM_TASKS": "8", "SLURM_PROCID": "3"}

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.bem.expansion import carry_over, gather_from_children, pass_to_children, shift_matrices
-from pbem.bem.leaf import Medium, source_matrix, target_matrix
+from pbem.bem.expansion import apply_l2l, apply_m2l, apply_m2m, shift_matrices
+from pbem.bem.leaf import Medium, form_l2p, form_p2m
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.shapes import place_crack_nodes, place_nodes
 
@@ -64,26 +64,26 @@ def evaluate_far(
 ) -> Real:
     """The same by expansions: about the first circle, moved to the next ones, carried over to the first of those seen,
     moved to the next, evaluated at the points."""
-    first = source_matrix(sources, around[0].center, around[0].radius, terms)
+    first = form_p2m(sources, around[0].center, around[0].radius, terms)
     columns = first.shape[1]
     moments = np.ascontiguousarray(first.T).view(complex).reshape(columns, 2, terms + 1)
     for inner, outer in pairwise(around):
         offset, small, large = (np.full(columns, value) for value in
                                 (inner.center - outer.center, inner.radius, outer.radius))  # fmt: skip
         shift = shift_matrices(offset, small, large, terms)
-        moments = gather_from_children(moments, shift, offset, small, large)
+        moments = apply_m2m(moments, shift, offset, small, large)
     source, target = around[-1], seen[0]
-    fields = carry_over(
+    fields = apply_m2l(
         moments, np.full(columns, target.center - source.center), np.full(columns, source.radius),
         np.full(columns, target.radius), np.full(columns, sources.length),
     )  # fmt: skip
     for outer, inner in pairwise(seen):
         offset, small, large = (np.full(columns, value) for value in
                                 (inner.center - outer.center, inner.radius, outer.radius))  # fmt: skip
-        fields = pass_to_children(fields, shift_matrices(offset, small, large, terms), offset, large)
+        fields = apply_l2l(fields, shift_matrices(offset, small, large, terms), offset, large)
     flat = np.ascontiguousarray(fields).view(float).reshape(columns, -1)
     last, medium = seen[-1], Medium(sources.kappa, sources.shear_modulus)
-    return target_matrix(point, normal, medium, last.center, last.radius, terms) @ flat.T
+    return form_l2p(point, normal, medium, last.center, last.radius, terms) @ flat.T
 
 
 def place_points(circle: Circle, count: int = 7) -> tuple[Complex, Complex]:
@@ -155,13 +155,13 @@ def test_moved_coefficients_are_those_about_the_other_centre(family: int, tracti
     sources, circle = make_elements(2, family, 0.8)
     terms, outer = 30, enclose(circle)[1]
     offset, small, large = np.array([circle.center - outer.center]), np.array([circle.radius]), np.array([outer.radius])
-    first = source_matrix(sources, circle.center, circle.radius, terms)
+    first = form_p2m(sources, circle.center, circle.radius, terms)
     moments = np.ascontiguousarray(first.T).view(complex).reshape(-1, 2, terms + 1)
     columns = len(moments)
     shift = np.tile(shift_matrices(offset, small, large, terms), (columns, 1, 1))
-    moved = gather_from_children(moments, shift, np.tile(offset, columns), np.tile(small, columns),
+    moved = apply_m2m(moments, shift, np.tile(offset, columns), np.tile(small, columns),
                                  np.tile(large, columns))  # fmt: skip
-    exact = source_matrix(sources, outer.center, outer.radius, terms).T
+    exact = form_p2m(sources, outer.center, outer.radius, terms).T
     exact = np.ascontiguousarray(exact).view(complex).reshape(-1, 2, terms + 1)
     # Moving multipoles is exact term by term; an arc's integrals by Gauss points are not.
     np.testing.assert_allclose(moved, exact, rtol=0, atol=1e-11 * np.abs(exact).max())
@@ -173,10 +173,10 @@ def test_moved_fields_are_the_same_at_points(traction: bool) -> None:
     terms, outer, inner = 17, Circle(0.4 - 0.3j, 1.3), Circle(0.1 + 0.2j, 0.5)
     fields = random.normal(size=(4, 2, terms + 1)) + 1j * random.normal(size=(4, 2, terms + 1))
     offset, small, large = np.full(4, inner.center - outer.center), np.full(4, inner.radius), np.full(4, outer.radius)
-    moved = pass_to_children(fields, shift_matrices(offset, small, large, terms), offset, large)
+    moved = apply_l2l(fields, shift_matrices(offset, small, large, terms), offset, large)
     point, normal = place_points(inner)
     values = [
-        target_matrix(point, normal if traction else None, Medium(KAPPA, MODULUS), each.center, each.radius, terms)
+        form_l2p(point, normal if traction else None, Medium(KAPPA, MODULUS), each.center, each.radius, terms)
         @ np.ascontiguousarray(part).view(float).reshape(4, -1).T
         for each, part in ((outer, fields), (inner, moved))
     ]
@@ -219,8 +219,8 @@ def test_elements_of_all_families_together() -> None:
         assert max(measure_errors(mixed, around, list_far(around[-1]), traction, 52)) < 3e-11
     # Tractions of crack elements count nothing.
     width = 4 * 2 * 3
-    matrix = source_matrix(mixed, circle.center, circle.radius, 10)
+    matrix = form_p2m(mixed, circle.center, circle.radius, 10)
     assert matrix.shape == (44, 2 * width)
     assert np.abs(matrix[:, width : width + 6]).max() > 0 and not matrix[:, width + 6 :].any()
     cracks = replace(mixed, family=np.array([1, 1, 2, 3], dtype=np.int8))
-    assert source_matrix(cracks, circle.center, circle.radius, 10).shape == (44, width)
+    assert form_p2m(cracks, circle.center, circle.radius, 10).shape == (44, width)

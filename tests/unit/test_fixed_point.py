@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.solve.fixed_point import FixedPoint
+from pbem.solve.nonlinear.fixed_point import FixedPoint
 
 COUNT = 12
 

@@ -9,8 +9,8 @@ import pytest
 
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
-from pbem.solve import groups
-from pbem.solve.groups import divide_model, share_groups, surround_groups
+from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.preconditioner.subdomains import divide_model, share_groups, surround_groups
 from tests.unit.far_sample import TEXTS, make_sample
 
 each_sample = pytest.mark.parametrize("name", TEXTS)

@@ -20,7 +20,7 @@ from pbem.bem.pointwise import place_points
 from pbem.bem.rows import evaluate_rows
 from pbem.contact.anchor import anchor_motions
 from pbem.contact.loads import collect_outer_nodes, find_needed_columns
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.far_sample import TEXTS, Sample, list_vectors, make_sample, read_sample, shrink_leaves
 
 TOLERANCES = [1e-4, 1e-6, 1e-8, 1e-10]
@@ -137,7 +137,7 @@ def test_leaves_shared_by_ranks_add_up() -> None:
 def test_anchors_are_those_of_the_dense_rows() -> None:
     model, sample = read_sample("floating"), make_sample("floating")
     mesh = sample.mesh
-    anchors = anchor_motions(mesh, find_free_motions(model))
+    anchors = anchor_motions(mesh, find_rigid_body_modes(model))
     assert len(anchors) == 3
     dense = assemble_rows(mesh, sample.materials, 0, mesh.nodes, sample.needed, model.size)
     nodes = np.random.default_rng(1).permutation(mesh.nodes)[:101]

@@ -14,11 +14,11 @@ from pbem.mesh.generate import generate_mesh
 from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.reader import Results
-from pbem.solve import groups
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent
-from pbem.solve.petsc import petsc_options
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.petsc.session import petsc_options
+from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
 from tests.cli.cli_sample import BLOCKS
 from tests.identities.solving import linearise_pairs
 from tests.unit.far_sample import CRACKS, TEXTS, shrink_leaves

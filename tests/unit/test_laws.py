@@ -33,7 +33,7 @@ from pbem.contact.modes import (
     limit_changes,
     linearise,
     measure_law_error,
-    propose_modes,
+    update_active_set,
 )
 from pbem.contact.strength import Strength, coulomb, slip_weakening
 
@@ -95,7 +95,7 @@ def choose(
     laws: PairLaws, mode: int, state: PairState, slip_before: float = 0.0, pressure: float = 0.0, sign: float = 1.0
 ) -> tuple[int, float, bool]:
     """Mode, sign and whether it changed, for one pair."""
-    proposal = propose_modes(laws, make_modes(mode, sign), state, remember(slip_before), np.array([pressure]))
+    proposal = update_active_set(laws, make_modes(mode, sign), state, remember(slip_before), np.array([pressure]))
     return int(proposal.modes.mode[0]), float(proposal.modes.sign[0]), bool(proposal.changed[0])
 
 
@@ -291,7 +291,7 @@ def test_rounding_does_not_change_a_mode(noise: float, size: float) -> None:
     modes = ModeState(np.array([STICK, STICK, SLIP, OPEN, STICK]), np.ones(count))
     states[:, :2] *= size
     laws = replace(laws, stiffness=laws.stiffness * size)
-    proposal = propose_modes(laws, modes, PairState(*states.T), remember(0.0, count), np.zeros(count))
+    proposal = update_active_set(laws, modes, PairState(*states.T), remember(0.0, count), np.zeros(count))
     assert not proposal.changed.any()
     np.testing.assert_array_equal(proposal.modes.mode, modes.mode)
 
@@ -303,15 +303,15 @@ def test_what_is_more_than_rounding_changes_a_mode(size: float) -> None:
     states = np.array([[excess, 0, 0, 0], [-1, 0.5 + excess, 0, 0], [-1, 0.5, 0, -excess], [0, 0, -excess, 0]])
     states[:, :2] *= size
     laws = replace(laws, stiffness=laws.stiffness * size)
-    proposal = propose_modes(laws, modes, PairState(*states.T), remember(0.0, 4), np.zeros(4))
+    proposal = update_active_set(laws, modes, PairState(*states.T), remember(0.0, 4), np.zeros(4))
     np.testing.assert_array_equal(proposal.modes.mode, [OPEN, SLIP, STICK, STICK])
 
 
 def test_softening_makes_jumps_count_less() -> None:
     # The jump alone would turn the slip around; a softer trial only lets it stick.
     state, none, before = make_state(-1.0, 0.5, 0.0, -0.2), np.zeros(1), remember(0.0)
-    hard = propose_modes(make_laws(), make_modes(SLIP), state, before, none)
-    soft = propose_modes(make_laws(), make_modes(SLIP), state, before, none, softening=0.1)
+    hard = update_active_set(make_laws(), make_modes(SLIP), state, before, none)
+    soft = update_active_set(make_laws(), make_modes(SLIP), state, before, none, softening=0.1)
     assert hard.modes.mode[0] == SLIP and hard.modes.sign[0] == -1
     assert soft.modes.mode[0] == STICK
 
@@ -319,7 +319,7 @@ def test_softening_makes_jumps_count_less() -> None:
 def test_the_violation_is_the_stress_by_which_a_mode_is_left() -> None:
     laws = make_laws(3)
     state = PairState(np.array([0.2, -1.0, -1.0]), np.array([0.0, -0.9, 0.1]), np.zeros(3), np.zeros(3))
-    proposal = propose_modes(laws, make_modes(STICK, count=3), state, remember(0.0, 3), np.zeros(3))
+    proposal = update_active_set(laws, make_modes(STICK, count=3), state, remember(0.0, 3), np.zeros(3))
     np.testing.assert_allclose(proposal.violation, [0.2, 0.4, 0.0])
     np.testing.assert_array_equal(proposal.changed, [True, True, False])
 
@@ -436,9 +436,9 @@ def test_broken_bonds_have_friction_left_but_no_cohesion_or_strength() -> None:
     bound = evaluate_strength(laws, np.array([-1.0]), broken.look_ahead(np.zeros(1)), np.zeros(1)).bound
     assert bound == pytest.approx(0.5)
     none = np.zeros(1)
-    assert propose_modes(laws, make_modes(STICK), make_state(0.1), broken, none).modes.mode[0] == OPEN
-    assert propose_modes(laws, make_modes(STICK), make_state(-1.0, 0.6), broken, none).modes.mode[0] == SLIP
-    assert propose_modes(laws, make_modes(STICK), make_state(-1.0, 0.4), broken, none).modes.mode[0] == STICK
+    assert update_active_set(laws, make_modes(STICK), make_state(0.1), broken, none).modes.mode[0] == OPEN
+    assert update_active_set(laws, make_modes(STICK), make_state(-1.0, 0.6), broken, none).modes.mode[0] == SLIP
+    assert update_active_set(laws, make_modes(STICK), make_state(-1.0, 0.4), broken, none).modes.mode[0] == STICK
 
 
 def test_memory_adds_up_the_way_of_slipping_pairs() -> None:

@@ -13,8 +13,8 @@ import sys
 import numpy as np
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts, share_nodes, world
-from pbem.solve.linear import LinearSolver
-from pbem.solve.petsc import petsc_options
+from pbem.solve.petsc.linear import LinearSolver
+from pbem.solve.petsc.session import petsc_options
 
 method, *options = sys.argv[1:]
 # A number that the ranks cannot share equally.

@@ -13,13 +13,13 @@ from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, find_ties
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
-from pbem.model.support import PairTie, find_free_motions
+from pbem.model.rigid_body_modes import PairTie, find_rigid_body_modes
 from pbem.results.describe import describe_model, describe_results
 from pbem.results.model_plot import draw_model
 from pbem.results.plots import draw_results
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.step import ContactState, Iteration, Step
+from pbem.solve.problem.step import ContactState, Iteration, Step
 from tests.unit.case_sample import build, change, find_faults, find_only_fault
 from tests.unit.test_generate import CRACKS, INCLUSIONS
 
@@ -174,7 +174,7 @@ def test_each_free_body_has_an_anchor_of_its_own() -> None:
     # Without friction every inclusion can turn in its place, whatever the others do.
     model = build(change(MANY_INCLUSIONS, ("count = 120", "count = 50"), ("friction = 0.6\n", "")))
     mesh = generate_mesh(model)
-    motions = find_free_motions(model)
+    motions = find_rigid_body_modes(model)
     anchors = anchor_motions(mesh, motions)
     assert sorted(anchor.region for anchor in anchors) == list(range(1, 51))
     for anchor, motion in zip(anchors, motions, strict=True):

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from pbem.model.model import Contact, Law
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.case_sample import MATERIAL, build, change, find_faults, find_only_fault
 
 
@@ -135,7 +135,7 @@ def test_size_and_direction_do_not_matter(scale: float, angle: float) -> None:
     model = build(write(angle, scale))
     assert len(model.curves["base_face"].legs) == 3
     loose = change(write(angle, scale), (HELD, ""))
-    assert find_free_motions(build(loose)) == ()
+    assert find_rigid_body_modes(build(loose)) == ()
     for lift in (-1e-6, -0.3):
         wide = write(angle, scale, lift, -1.0, 4.0)
         faults = find_faults(wide)
@@ -163,7 +163,7 @@ def test_cylinder_on_a_plane(order: str) -> None:
     fault = find_only_fault(lowered)
     assert "1e-06 deep at (0.3, " in fault
     raised = build(change(CYLINDER, ('"rim", "face"', order), ("center = [0, 1]", "center = [0.3, 1.1]")))
-    assert len(find_free_motions(raised)) == 3
+    assert len(find_rigid_body_modes(raised)) == 3
 
 
 def test_cap_that_grazes_between_all_samples() -> None:
@@ -222,7 +222,7 @@ def test_another_curve_of_the_punch_must_not_enter() -> None:
 
 def test_friction_holds_and_no_friction_lets_slide() -> None:
     loose = change(write(), (HELD, "[boundary.top]\npressure = 1.0\n"))
-    assert find_free_motions(build(loose)) == ()
+    assert find_rigid_body_modes(build(loose)) == ()
     pushed = change(loose, ("pressure = 1.0", "tx = 1.0"), ("friction = 0.3", "friction = 0"))
     assert "translation along x of 'punch'" in find_only_fault(pushed)
     assert len(find_faults(change(loose, ("pressure = 1.0", "tx = 1.0"), ("friction = 0.3", 'law = "open"')))) >= 1
@@ -235,12 +235,12 @@ def test_friction_holds_and_no_friction_lets_slide() -> None:
 )  # fmt: skip
 def test_motions_that_a_contact_leaves(law: str, motions: int) -> None:
     model = build(change(write(), (HELD, ""), ("friction = 0.3", law)))
-    assert len(find_free_motions(model)) == motions
+    assert len(find_rigid_body_modes(model)) == motions
 
 
 def test_ties_of_a_contact() -> None:
     model = build(change(write(lift=0.1), (HELD, "")))
-    assert [len(find_free_motions(model, {"seat": tie})) for tie in ("both", "normal", "none")] == [0, 1, 3]
+    assert [len(find_rigid_body_modes(model, {"seat": tie})) for tie in ("both", "normal", "none")] == [0, 1, 3]
 
 
 def test_pressure_of_a_contact_over_the_stages() -> None:

@@ -12,7 +12,7 @@ from pbem.geometry.curve import Leg
 from pbem.mesh.equations import choose_equations
 from pbem.mesh.generate import generate_mesh
 from pbem.model.facing import Surroundings
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.results.coverage import describe_sparse_contacts
 from tests.unit.case_sample import MATERIAL, SQUARE, add_curves, build, change, find_only_fault
 
@@ -118,7 +118,7 @@ def test_touching_is_measured_against_the_faces() -> None:
         text = change(write_blocks("top", "foot", gap), ("[boundary.left_upper]\nux = 0.0\nuy = 0.0\n", ""))
         body = '[regions.far]\nmaterial = "soft"\nboundary = ["far"]\n[boundary.far]\nux = 0.0\nuy = 0.0\n'
         text = change(add_curves(text, far), ("[boundary.left]", f"{body}[boundary.left]"))
-        motions = find_free_motions(build(text))
+        motions = find_rigid_body_modes(build(text))
         assert len(motions) == free and all(motion.regions == ("upper",) for motion in motions)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbem.model.model import Model
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.case_sample import MATERIAL, SQUARE, build, change, find_faults, find_only_fault
 
 PLANE = f"""{MATERIAL}
@@ -51,7 +51,7 @@ def test_plane_with_a_crack_only() -> None:
         assert region.infinite and region.loops == () and region.cracks == ("crack",)
         assert model.crack_tips == {"crack": (True, True)} and model.size == 2.0
         assert model.stages[0].remote == (0.0, 2.0, 0.5)
-        assert find_free_motions(model) == ()
+        assert find_rigid_body_modes(model) == ()
 
 
 def test_every_loop_of_an_infinite_region_is_inner() -> None:
@@ -221,7 +221,7 @@ def test_many_inclusions_side_by_side() -> None:
     listed = ", ".join(f'"{n}"' for n in names)
     host = f'[regions.host]\nmaterial = "soft"\ninfinite = true\nboundary = [{listed}]\n'
     model = build(MATERIAL + "[curves]\n" + "\n".join(curves) + "\n" + "".join([host, *regions, *laws]))
-    assert len(model.regions[0].loops) == 25 and len(find_free_motions(model)) == 25
+    assert len(model.regions[0].loops) == 25 and len(find_rigid_body_modes(model)) == 25
     (note,) = [note for note in model.notes if "Nothing prevents" in note]
     assert note.count("rotation about") == 6 and "; and 19 more. The loads balance" in note
 
@@ -244,5 +244,5 @@ law = "frictionless"
 """
     model = build(text)
     assert any("Nothing prevents: rotation about (2, 1) of 'inclusion'. The loads balance" in n for n in model.notes)
-    (motion,) = find_free_motions(model)
+    (motion,) = find_rigid_body_modes(model)
     assert motion.regions == ("inclusion",)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pbem.model.model import Law, Model
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only_fault
 
 DEFAULT = 'law = "coulomb"\nfriction = 0.5'
@@ -76,7 +76,7 @@ def test_faces_under_a_custom_law_hold_until_they_are_computed(tmp_path: Path) -
     text = change(with_law(lines), ("[boundary.top]\nux = 0.001\nuy = -0.001", "[boundary.top]\nty = -1"))
     from pbem.case.build import parse_model
 
-    assert find_free_motions(parse_model(text, str(tmp_path / "case.toml"))[1]) == ()
+    assert find_rigid_body_modes(parse_model(text, str(tmp_path / "case.toml"))[1]) == ()
 
 
 WRONG = {

@@ -9,7 +9,7 @@ from pbem.contact.laws import collect_laws
 from pbem.contact.rate_and_state import RateAndState
 from pbem.contact.strength import LAWS
 from pbem.mesh.generate import generate_mesh
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.results.describe import describe_law
 from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only_fault
 
@@ -42,7 +42,7 @@ def test_the_numbers_and_durations_reach_the_model() -> None:
         "initial_state": 2e-5 / 1e-6,
     }  # fmt: skip
     assert [stage.duration for stage in model.stages] == [2.0, 60.0]
-    assert not find_free_motions(model)
+    assert not find_rigid_body_modes(model)
     assert "rate effect 0.01" in describe_law(law)
     laws = collect_laws(model, generate_mesh(model))
     assert isinstance(laws.strengths[0].law, RateAndState) and laws.strengths[0].law is LAWS["rate_and_state"]

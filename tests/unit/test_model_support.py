@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, build, change, find_faults, find_only_fault
 
 HELD = "[boundary.bottom]\nux = 0.0\nuy = 0.0"
@@ -49,7 +49,7 @@ def test_springs_that_are_rounding_hold_nothing(modulus: float, size: float) -> 
         for old, new in scaled:
             text = text.replace(f"[{old}]", f"[{new}]")
         if held:
-            assert not find_free_motions(build(text))
+            assert not find_rigid_body_modes(build(text))
             continue
         fault = find_faults(text)[0]
         assert fault.place == "regions.body (line 11)" and "translation along y" in str(fault)
@@ -69,7 +69,7 @@ def test_springs_that_are_rounding_hold_nothing(modulus: float, size: float) -> 
     ],
 )
 def test_conditions_that_hold_a_body(conditions: str) -> None:
-    assert find_free_motions(build(change(SQUARE, ("ux = 0.0\nuy = 0.0", conditions)))) == ()
+    assert find_rigid_body_modes(build(change(SQUARE, ("ux = 0.0\nuy = 0.0", conditions)))) == ()
 
 
 def test_balanced_body_is_accepted_and_told() -> None:
@@ -146,7 +146,7 @@ def test_block_on_a_frictionless_interface_slides_off() -> None:
 @pytest.mark.parametrize("law", [FRICTION, 'law = "bonded"', 'law = "coulomb"\ncohesion = 1.0'])
 def test_block_that_is_tied_is_held(law: str) -> None:
     text = change(BLOCKS, (LOADED, "[boundary.top]\nty = -1"), (FRICTION, law))
-    assert find_free_motions(build(text)) == ()
+    assert find_rigid_body_modes(build(text)) == ()
 
 
 @pytest.mark.parametrize("law", ['law = "open"', 'law = "coulomb"\nfriction = 0.5\ngap = 0.1'])
@@ -163,7 +163,7 @@ def test_tied_blocks_move_together() -> None:
 def test_velocities_of_tied_blocks_are_equal() -> None:
     model = build(BLOCKS)
     free = {name: replace(condition, known=("traction", "traction")) for name, condition in model.conditions.items()}
-    motions = find_free_motions(replace(model, conditions=free), {"interface": "both"})
+    motions = find_rigid_body_modes(replace(model, conditions=free), {"interface": "both"})
     assert len(motions) == 3
     for motion in motions:
         (a, spin), (b, other) = motion.velocities["lower"], motion.velocities["upper"]
@@ -179,12 +179,12 @@ def test_moment_of_the_tractions() -> None:
 
 def test_ties_of_the_moment_replace_those_of_the_laws() -> None:
     model = build(change(BLOCKS, (LOADED, "[boundary.top]\nty = -1")))
-    assert find_free_motions(model) == ()
-    sliding = find_free_motions(model, {"interface": "normal"})
+    assert find_rigid_body_modes(model) == ()
+    sliding = find_rigid_body_modes(model, {"interface": "normal"})
     assert [motion.regions for motion in sliding] == [("upper",)]
     a, spin = sliding[0].velocities["upper"]
     assert abs(a.real) > 0.1 and abs(a.imag) < 1e-9 and abs(spin) < 1e-9
-    assert len(find_free_motions(model, {"interface": "none"})) == 3
+    assert len(find_rigid_body_modes(model, {"interface": "none"})) == 3
 
 
 def test_velocity_of_a_rotation_vanishes_at_its_centre() -> None:
@@ -200,6 +200,6 @@ uy = 0
 """
     model = build(text)
     condition = replace(model.conditions["outer"], frame="local", known=("displacement", "traction"))
-    (motion,) = find_free_motions(replace(model, conditions={"outer": condition}))
+    (motion,) = find_rigid_body_modes(replace(model, conditions={"outer": condition}))
     a, spin = motion.velocities["disc"]
     assert spin != 0 and a + 1j * spin * (3 + 1j) == pytest.approx(0, abs=1e-9)

@@ -12,12 +12,12 @@ from pbem.case.build import parse_model
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve import groups
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent
-from pbem.solve.nearby import MOST_ASKED, part_by_distance
-from pbem.solve.problem import Problem
-from pbem.solve.response import complete_states
+from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.response import complete_states
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
+from pbem.solve.tangent.nearby import MOST_ASKED, part_by_distance
 from tests.identities.solving import assemble_tangent, linearise_pairs
 
 Real = NDArray[np.float64]

@@ -7,7 +7,7 @@ import pytest
 
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
-from pbem.solve.passing import Passing, describe_passing, find_passing
+from pbem.solve.steps.passing import Passing, describe_passing, find_passing
 
 BLOCKS = """
 materials.m = {{ young = 100.0, poisson = 0.2 }}

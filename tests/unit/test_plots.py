@@ -18,7 +18,7 @@ from pbem.results.plot_style import FORCE, MODES, MOTION, label
 from pbem.results.plots import choose_magnification, draw_results, plot_model, plot_results
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.step import OPEN
+from pbem.solve.problem.step import OPEN
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 from tests.verification.planes import make_plane, make_straight, solve
 

@@ -15,7 +15,7 @@ from pbem.errors import ResultFileError
 from pbem.results.field_plot import FIELDS, draw_field, evaluate_field, find_grid, plot_field
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.step import Interior
+from pbem.solve.problem.step import Interior
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 
 Real = NDArray[np.float64]

@@ -18,7 +18,7 @@ from pbem.contact.modes import (
     choose_slip,
     linearise,
     measure_law_error,
-    propose_modes,
+    update_active_set,
 )
 from pbem.contact.rate_and_state import RateAndState, _age_by_slip, age_state
 from pbem.contact.strength import LAWS, coulomb
@@ -177,7 +177,7 @@ def test_creeping_pairs_never_stick_and_slip_in_the_sense_of_their_traction() ->
     modes = ModeState(np.array([SLIP, SLIP, SLIP, OPEN], dtype=np.int8), np.ones(4))
     p_s = np.array([1e-3, -1e-3, 0.3, 0.0])
     state = PairState(np.array([-1.0, -1.0, -1.0, 0.0]), p_s, np.array([0, 0, 0, -0.1]), np.full(4, 1e-9))
-    found = propose_modes(laws, modes, state, memory, np.zeros(4))  # type: ignore[arg-type]
+    found = update_active_set(laws, modes, state, memory, np.zeros(4))  # type: ignore[arg-type]
     assert found.modes.mode.tolist() == [SLIP] * 4
     assert found.modes.sign.tolist() == [1.0, -1.0, 1.0, 1.0]
     assert found.changed.tolist() == [False, True, False, True]

@@ -13,14 +13,14 @@ from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.support import find_support, find_ties
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
-from pbem.model.support import find_free_motions
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.balance import measure_balance
-from pbem.solve.hold import Hold
-from pbem.solve.imbalance import describe_imbalance
-from pbem.solve.problem import Problem
-from pbem.solve.release import ReleasedTangent
+from pbem.solve.nonlinear.balance import measure_balance
+from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.imbalance import describe_imbalance
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.release import ReleasedTangent
 from tests.identities.solving import assemble_tangent, linearise_pairs
 from tests.verification.test_loose_bodies import GAP, PRESSED, write_stack
 
@@ -70,7 +70,7 @@ def test_motions_that_no_anchor_sees_are_not_held(tmp_path: Path) -> None:
     problem = make_stack(tmp_path)
     ties = find_ties(problem.model, problem.mesh, choose_modes(problem, STICK, slice(0, 6)))
     free = replace(problem.model, conditions={**problem.model.conditions, "j3": problem.model.conditions["r2"]})
-    motions = find_free_motions(free, {**ties, "j1": "both", "j2": "none"})
+    motions = find_rigid_body_modes(free, {**ties, "j1": "both", "j2": "none"})
     assert len(motions) == 3 == len(problem.anchors)
     support = find_support(free, problem.mesh, problem.anchors, problem.anchored, {**ties, "j1": "both", "j2": "none"})
     assert support.unheld is not None and "'b2'" in support.unheld

@@ -13,9 +13,9 @@ from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.modes import linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent
-from pbem.solve.response import find_response
+from pbem.solve.problem.response import find_response
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
 
 CRACKS = """
 materials.m = { young = 1000.0, poisson = 0.2 }

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from pbem.bem.choice import estimate_dense_memory
+from pbem.bem.operator_choice import estimate_dense_memory
 from pbem.model.model import Condition
 from pbem.results.describe import describe_model, describe_results
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.step import OPEN, SLIP, STICK
+from pbem.solve.problem.step import OPEN, SLIP, STICK
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 
 MODEL = make_model()

@@ -18,7 +18,7 @@ from pbem.results.output import check_output_path
 from pbem.results.reader import open_results
 from pbem.results.tips import collect_tip_rules
 from pbem.results.writer import ResultWriter
-from pbem.solve.step import OPEN
+from pbem.solve.problem.step import OPEN
 from tests.unit.results_sample import SOURCE, make_mesh, make_model, make_steps
 
 MODEL = make_model()

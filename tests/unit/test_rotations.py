@@ -13,8 +13,8 @@ import pbem
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.problem import Problem
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system.assembly import assemble_problem
 
 # A disc that fits tightly into a plate that is pulled: it touches along two arcs, on which it can slide round.
 DISC = """

@@ -15,12 +15,13 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve import dense_system, groups
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.groups import Group
-from pbem.solve.krylov import KrylovTangent
-from pbem.solve.problem import Problem
-from pbem.solve.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner.subdomains import Group
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system import dense as dense_system
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
 from tests.identities.solving import assemble_tangent, linearise_pairs
 from tests.unit.far_sample import TEXTS, read_sample, shrink_leaves
 

@@ -7,7 +7,7 @@ import numpy as np
 from pbem.contact.laws import SLIP
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
-from pbem.solve.search import CAUTIONS, FUTILE, Search
+from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, Search
 from tests.unit.test_laws import make_modes
 
 COUNT = 100
@@ -92,7 +92,7 @@ def test_the_full_tangent_comes_back_once_no_mode_changes_under_a_frozen_bound()
 
 def test_all_levels_of_caution_are_tried_in_turn() -> None:
     search = Search(4)
-    assert [search.descend() for _ in CAUTIONS] == [True] * (len(CAUTIONS) - 1) + [False]
+    assert [search.descend() for _ in GLOBALISATIONS] == [True] * (len(GLOBALISATIONS) - 1) + [False]
 
 
 def test_a_state_that_comes_back_is_noticed_at_each_level() -> None:

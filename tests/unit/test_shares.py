@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from pbem.solve.shares import share_equally
+from pbem.solve.petsc.shares import share_equally
 from tests.parallel.launch import launch_snippet
 
 # Vectors and columns change from odd shares to ScaLAPACK's and back; every entry belongs to one rank.
 CHANGE = """
 import numpy as np
 from pbem.parallel import world
-from pbem.solve.shares import BLOCK, change_shares, find_own_blocks, share_equally
+from pbem.solve.petsc.shares import BLOCK, change_shares, find_own_blocks, share_equally
 
 count = 3 * world.size + 1
 odd = np.array([1 + 2 * (rank % 2) for rank in range(world.size)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pbem.contact import subset as subset_module
 from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, resists_slip
-from pbem.contact.modes import Proposal, linearise, propose_modes
+from pbem.contact.modes import Proposal, linearise, update_active_set
 from pbem.contact.subset import Settled, settle_subset
 from tests.unit.test_laws import make_laws, remember
 
@@ -41,7 +41,7 @@ def pose(friction: Real, cohesion: Real, pressure: float = 0.0, tensile: float =
 
 def judge_by(subset: Subset) -> object:
     def judge(modes: ModeState, state: PairState) -> Proposal:
-        return propose_modes(subset.laws, modes, state, subset.memory, subset.pressure)
+        return update_active_set(subset.laws, modes, state, subset.memory, subset.pressure)
 
     return judge
 

@@ -12,17 +12,18 @@ from pbem.case.build import parse_model
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.local_laws import solve_laws
-from pbem.contact.modes import linearise, propose_modes
+from pbem.contact.modes import linearise, update_active_set
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve import groups, sweeps
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.krylov import KrylovTangent
-from pbem.solve.march import march
-from pbem.solve.problem import Problem
-from pbem.solve.search import SWEPT, Search
-from pbem.solve.step import SilentReporter, Step
-from pbem.solve.sweeps import Sweeps
+from pbem.solve.nonlinear.search import SWEPT, Search
+from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.problem.tangent import sweeps
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
+from pbem.solve.tangent.sweeps import Sweeps
 from tests.identities.solving import linearise_pairs
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_nearby import draw_modes, write_comb
@@ -112,7 +113,7 @@ def solve_and_sweep(problem: Problem, modes: ModeState) -> tuple[ModeState, Real
     solved = tangent.solve(constraints, load, law)
     settled = tangent.sweep(
         constraints, modes, start_memory(problem.laws), load, law, solved,
-        lambda laws, m, s, memory, pressure: propose_modes(laws, m, s, memory, pressure, floor=1e-3),
+        lambda laws, m, s, memory, pressure: update_active_set(laws, m, s, memory, pressure, floor=1e-3),
     )
     states = tangent.expected
     assert states is not None

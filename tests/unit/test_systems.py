@@ -17,11 +17,11 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.beside import put_beside
-from pbem.solve.choice import SYSTEMS, choose_system
-from pbem.solve.problem import Problem, System
-from pbem.solve.tangent import AnyTangent
+from pbem.solve.estimate.beside import put_beside
+from pbem.solve.problem.problem import Problem, System
+from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.system.choice import SYSTEMS, choose_system
 
 Real = NDArray[np.float64]
 

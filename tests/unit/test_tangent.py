@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pbem
-from pbem.solve.linear import LinearSolver
+from pbem.solve.petsc.linear import LinearSolver
 from tests.cli.cli_sample import BLOCKS
 
 

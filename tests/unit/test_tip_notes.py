@@ -10,7 +10,7 @@ import pytest
 import pbem
 from pbem.results.describe import describe_results
 from pbem.results.tip_notes import compare_release
-from pbem.solve.step import SilentReporter
+from pbem.solve.problem.step import SilentReporter
 
 CASE = """
 materials.rock = {{ young = {young}, poisson = 0.2 }}

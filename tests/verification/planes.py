@@ -25,9 +25,9 @@ from pbem.model.model import (
     Stage,
 )
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 
 ROCK = Material("rock", 1e3, 0.2)
 FREE = Law("coulomb")

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 
 Real = NDArray[np.float64]
 

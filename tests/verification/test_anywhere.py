@@ -20,7 +20,7 @@ from pbem.mesh.mesh import list_faces
 from pbem.model.model import Model
 from pbem.model.origin import move_back
 from pbem.results.reader import Results
-from pbem.solve.linearity import measure_linearity
+from pbem.solve.steps.linearity import measure_linearity
 from scripts import study_stacks
 from scripts.study_places import MOVES, study
 

@@ -14,12 +14,12 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.results.reader import Results
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.balance import measure_balance
-from pbem.solve.imbalance import describe_imbalance
-from pbem.solve.march import march
-from pbem.solve.problem import Problem
-from pbem.solve.step import OPEN, SilentReporter
+from pbem.solve.nonlinear.balance import measure_balance
+from pbem.solve.nonlinear.imbalance import describe_imbalance
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import OPEN, SilentReporter
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 
 
 def write_bar(length: float, inside: str, unit: float = 1.0) -> str:

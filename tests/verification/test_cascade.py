@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pbem
-from pbem.solve import cascade, newton
+from pbem.solve.nonlinear import cascade, newton
 
 # A plate that a bonded fault cuts in two, sheared until the bond unzips; a gap in the bond's strength where it begins.
 PLATE = """

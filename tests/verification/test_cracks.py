@@ -17,10 +17,10 @@ from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.material import Material
 from pbem.model.model import Model
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.problem import Problem
-from pbem.solve.step import SilentReporter, Step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 from tests.identities.bodies import ROCK, Body
 from tests.identities.solving import linearise_pairs, march_to_end
 

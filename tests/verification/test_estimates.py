@@ -20,8 +20,8 @@ from pbem.model.model import Model
 from pbem.results import accuracy as limits
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve import second
-from pbem.solve.step import Step
+from pbem.solve.estimate import second
+from pbem.solve.problem.step import Step
 from tests.cli.cli_sample import BLOCKS
 from tests.verification.proofs import PROOFS, proof
 from tests.verification.proofs.proof import Solved

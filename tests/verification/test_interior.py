@@ -27,11 +27,11 @@ from pbem.model.model import Analysis, Condition, Model, Region, SolverOptions, 
 from pbem.parallel import world
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.backgrounds import evaluate_backgrounds
-from pbem.solve.fields import InteriorField
-from pbem.solve.march import march
-from pbem.solve.step import ContactState, Interior, SilentReporter, Step
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import ContactState, Interior, SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.system.interior import InteriorField
 from tests.parallel.launch import launch_snippet
 from tests.verification.planes import ROCK, make_circle, make_plane, make_straight, solve
 from tests.verification.proofs.proof import solve_case
@@ -49,7 +49,7 @@ def find_interior(model: Model) -> tuple[Mesh, Step, Interior]:
 
 
 def find_hoop_stress(model: Model, mesh: Mesh, step: Step) -> Real:
-    initial = [balanced for balanced, _ in evaluate_backgrounds(model, step.stage, step.factor)]
+    initial = [balanced for balanced, _ in evaluate_particular_solutions(model, step.stage, step.factor)]
     return evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
 
 
@@ -316,10 +316,10 @@ import numpy as np
 from dataclasses import replace
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.fields import InteriorField
-from pbem.solve.march import march
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.step import SilentReporter
+from pbem.solve.system.interior import InteriorField
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.problem.step import SilentReporter
 from tests.verification.planes import make_circle, make_plane
 
 model = make_plane((1.0, 0.2, 0.1), hole=make_circle(1.0, 16), points=[0.2 * k + 0.7j for k in range(10)])

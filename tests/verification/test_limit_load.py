@@ -9,9 +9,9 @@ from pbem.contact.laws import start_memory
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve import march
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.limit_load import can_balance, find_balanced_fraction
+from pbem.solve.steps import march
+from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
+from pbem.solve.system.assembly import assemble_problem
 from tests.verification.proofs.proof import write_case
 from tests.verification.test_settling import BLOCKS, Listener, run
 

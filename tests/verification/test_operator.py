@@ -14,7 +14,7 @@ from tests.verification.test_proofs import VERIFY
 SHRUNK = """
 import runpy, sys
 from pbem.bem import hierarchical
-from pbem.solve import groups
+from pbem.solve.preconditioner import subdomains as groups
 hierarchical.LEAF_ELEMENTS = hierarchical.SMALL_REGION = 4
 groups.ONE_GROUP, groups.GROUP_ELEMENTS = 0, 24
 sys.argv = sys.argv[1:]

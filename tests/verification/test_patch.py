@@ -18,9 +18,9 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.material import Material
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.step import OPEN, SLIP, STICK, SilentReporter, Step
+from pbem.solve.problem.step import OPEN, SLIP, STICK, SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 from tests.identities.bodies import Body
 from tests.identities.solving import march_to_end
 

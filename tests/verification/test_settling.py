@@ -14,9 +14,9 @@ from pbem.case.build import parse_model
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.march import march
-from pbem.solve.step import OPEN, SLIP, STICK, ContactState, SilentReporter, Step
+from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState, SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
 from tests.verification.proofs.crack_fields import scatter_cracks
 from tests.verification.proofs.proof import line, write_case
 

@@ -12,8 +12,9 @@ import numpy as np
 from pbem.case.build import parse_model
 from pbem.contact import laws
 from pbem.errors import ConvergenceError
-from pbem.solve import search, tangent
-from pbem.solve.step import OPEN, SLIP, STICK, ContactState
+from pbem.solve.nonlinear import search
+from pbem.solve.problem.problem import tangent
+from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState
 from tests.verification.proofs.proof import (
     Outcome,
     Proof,
@@ -126,14 +127,14 @@ def solve_stiffly(text: str, factor: float, most_pivoted: int) -> Solved | str:
 
     most_pivoted: pairs; with 0 the search makes plain Newton steps only.
     """
-    usual = laws.SOFTNESS, tangent.MOST_SETTLED, search.CAUTIONS
-    laws.SOFTNESS, tangent.MOST_SETTLED, search.CAUTIONS = factor * usual[0], most_pivoted, usual[2][:1]
+    usual = laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS
+    laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS = factor * usual[0], most_pivoted, usual[2][:1]
     try:
         return solve_model(parse_model(text)[1])
     except ConvergenceError as error:
         return error.reason
     finally:
-        laws.SOFTNESS, tangent.MOST_SETTLED, search.CAUTIONS = usual
+        laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS = usual
 
 
 def stiff_trials(factor: float) -> Outcome:

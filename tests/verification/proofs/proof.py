@@ -18,11 +18,11 @@ from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.tips import collect_tip_rules
-from pbem.solve.assembly import assemble_problem
-from pbem.solve.backgrounds import evaluate_backgrounds
-from pbem.solve.fields import InteriorField
-from pbem.solve.march import march
-from pbem.solve.step import Interior, SilentReporter, Step
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import Interior, SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.system.interior import InteriorField
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -94,7 +94,7 @@ class Solved:
     def hoop_stress(self, step: int = -1) -> Real:
         """At the nodes of all faces."""
         one = self.steps[step]
-        initial = [each for each, _ in evaluate_backgrounds(self.model, one.stage, one.factor)]
+        initial = [each for each, _ in evaluate_particular_solutions(self.model, one.stage, one.factor)]
         return evaluate_hoop_stress(self.mesh, initial, one.displacement, one.traction)
 
     def energies(self) -> list[Energy]:

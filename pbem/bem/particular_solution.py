@@ -1,0 +1,61 @@
+"""Fields that satisfy equilibrium by themselves: uniform stress and gravity. They enter the equations as known parts.
+
+The field of a region under them is total = background + elastic, and only the elastic part obeys the integral
+equations without source. In a finite region the background is the in-situ stress (without displacement) and gravity.
+In an infinite region the remote stress, with the displacement of its strain, is what the equations tend to far away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.arrays import Complex, Real
+from pbem.model.material import Material
+
+Stress = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ParticularSolution:
+    """remote, initial: uniform stresses sxx, syy, sxy, with and without the displacement of their strain.
+
+    force: body force per volume, complex. center: where the displacement of both vanishes, and the stress of the force.
+    One near the region keeps rounding as small as the region. Any will do for the force, as fields of uniform pressure
+    obey the integral equations too. To the remote strain it is the place that does not move.
+    """
+
+    material: Material
+    remote: Stress = (0.0, 0.0, 0.0)
+    initial: Stress = (0.0, 0.0, 0.0)
+    force: complex = 0.0
+    center: complex = 0.0
+
+    @property
+    def is_zero(self) -> bool:
+        return not (any(self.remote) or any(self.initial) or self.force)
+
+    def displacement(self, point: Complex) -> Complex:
+        """Displacement (complex) at points: of the remote strain about the center, and of gravity (theory, 5, 6).
+
+        Gravity's stress is isotropic, -(b . (x - center)), so that its displacement is an analytic function of x.
+        """
+        kappa, shear_modulus = self.material.kappa, self.material.shear_modulus
+        sxx, syy, sxy = self.remote
+        mean, deviator = 0.5 * (sxx + syy), 0.5 * (syy - sxx) + 1j * sxy
+        lever = point - self.center
+        linear = 0.5 * (kappa - 1) * mean * lever - np.conj(deviator * lever)
+        weight = -0.25 * (kappa - 1) * np.conj(self.force) * lever**2
+        return (linear + weight) / (2 * shear_modulus)
+
+    def stress(self, point: Complex) -> Real:
+        """sxx, syy, sxy (n, 3) at points (theory, 6)."""
+        uniform = np.add(self.remote, self.initial)
+        isotropic = -(np.conj(self.force) * (point - self.center)).real
+        return uniform + isotropic[:, None] * np.array([1.0, 1.0, 0.0])
+
+    def traction(self, point: Complex, normal: Complex) -> Complex:
+        """Traction (complex) on unit normals at points."""
+        sxx, syy, sxy = self.stress(point).T
+        return sxx * normal.real + sxy * normal.imag + 1j * (sxy * normal.real + syy * normal.imag)

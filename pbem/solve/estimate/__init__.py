@@ -1,0 +1,1 @@
+"""The second solution on a coarser mesh, from which errors are estimated."""

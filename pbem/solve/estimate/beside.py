@@ -1,0 +1,73 @@
+"""A coarser model and mesh beside those of a run, on which a second solution measures the discretisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pbem.arrays import Bool, Integer, Real
+from pbem.bem.operator_choice import choose_operator
+from pbem.mesh.carry import Carry, carry_nodes
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import coarsen_model
+
+# The second solution starts from the modes of the first, so that it settles soon or never.
+MOST_ITERATIONS = 8
+
+NOTHING_COARSER = "elements cannot be merged in pairs, and the order cannot be lowered"
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A coarser model and mesh beside those of a run, and how values of the run are read there.
+
+    kind: how it was made, see `pbem.model.refinement`. carry: to the coarse mesh's nodes. seen (c,): of each of its
+    pairs, whether all fine pairs that it is compared with are there. pair_of_node (n,): the fine pair whose slot node
+    a fine node is, or -1. nearest (c,): the nearest fine pair, or -1.
+    """
+
+    kind: Literal["merged", "order"]
+    model: Model
+    mesh: Mesh
+    fine: Mesh
+    carry: Carry
+    seen: Bool
+    pair_of_node: Integer
+    nearest: Integer
+
+    def carry_pairs(self, values: Real, jumps: bool) -> Real:
+        """Values (m,) of the fine pairs at the coarse pairs (c,); zero where there is no pair.
+
+        jumps: on crack-tip elements with the shape of the square root.
+        """
+        at_nodes = np.zeros(self.fine.nodes)
+        at_nodes[self.fine.pairs.slot] = values
+        matrix = self.carry.rooted if jumps else self.carry.plain
+        return np.asarray((matrix @ at_nodes)[self.mesh.pairs.slot])
+
+
+def put_beside(model: Model, mesh: Mesh) -> Beside | None:
+    """A coarser model beside a given one; None if there is none (NOTHING_COARSER)."""
+    coarse = coarsen_model(model)
+    if coarse is None:
+        return None
+    eased = choose_operator(model, mesh).ease(coarse.model.solver)
+    eased = replace(eased, newton_max_iterations=min(eased.newton_max_iterations, MOST_ITERATIONS))
+    second = replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=())
+    return relate_meshes(coarse.kind, model, mesh, second, generate_mesh(second))
+
+
+def relate_meshes(
+    kind: Literal["merged", "order"], model: Model, mesh: Mesh, second: Model, second_mesh: Mesh
+) -> Beside:
+    """What reads values of a run on the mesh of another model, each of whose elements is made of whole ones."""
+    carry = carry_nodes(model, mesh, second, second_mesh)
+    pair_of_node = np.full(mesh.nodes, -1)
+    pair_of_node[mesh.pairs.slot] = np.arange(mesh.pairs.count)
+    slot = second_mesh.pairs.slot
+    lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slot]
+    return Beside(kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, pair_of_node[carry.nearest[slot]])

@@ -1,0 +1,125 @@
+"""A second solution on a coarser mesh, step by step beside the first: what differs measures the discretisation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.declaration import BROKEN, list_variables
+from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, start_memory
+from pbem.contact.loads import Load
+from pbem.contact.modes import linearise
+from pbem.errors import ConvergenceError
+from pbem.parallel import StopSignals, do_on_first
+from pbem.solve.estimate.beside import Beside
+from pbem.solve.launch.watch import Watch
+from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import ContactState, SilentReporter, Step
+from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.steps.recovery import describe_step
+from pbem.solve.system.assembly import assemble_problem
+
+
+class SecondSolution:
+    """Marches on the coarser mesh behind a run; all ranks together, with the same numbers on all."""
+
+    def __init__(self, beside: Beside, comm: MPI.Intracomm, start: Step | None = None) -> None:
+        """Begins at rest, or with the memory of a step of the run, carried over.
+
+        Raises ConvergenceError where the operator cannot be assembled well enough.
+        """
+        self.beside = beside
+        self.problem: Problem = assemble_problem(beside.model, beside.mesh, comm)
+        self.tangent: AnyTangent = self.problem.make_tangent()
+        self.memory: Memory = start_memory(self.problem.laws)
+        self._watch = Watch(comm, SilentReporter(), StopSignals())
+        self._watch.look_after(self.problem.laws)
+        if start is not None:
+            self._take_over(start.contact)
+
+    def follow(self, step: Step) -> Step:
+        """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
+
+        Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
+        custom law fails with what it is asked here; there is no further step then.
+        """
+        load = self.problem.evaluate_load(step.stage, step.factor)
+        try:
+            solution = self._solve(step, load)
+        except ConvergenceError:
+            self._watch.check()  # a law that failed has answered with no strength
+            self._take_over(step.contact)
+            raise
+        self.memory = commit(self.problem.laws, solution.memory, solution.modes, solution.pairs)
+        self._watch.check()
+        return describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
+
+    def _solve(self, step: Step, load: Load) -> Solution:
+        begun = replace(self.memory, modes=self._guess_modes(step.contact), duration=step.duration)
+        try:
+            return solve_step(self.problem, self.tangent, begun, load, self._watch)
+        except ConvergenceError:
+            self._watch.check()
+            return self._solve_held(step, load)
+
+    def _solve_held(self, step: Step, load: Load) -> Solution:
+        """The solution with the statuses of the run's pairs, which need not be those that this mesh wants.
+
+        In narrow wedges, or with cohesion that is lost as faces part, a coarser mesh may have none.
+        """
+        problem, beside, contact = self.problem, self.beside, step.contact
+        memory = replace(self.memory, duration=step.duration).lose(self._carry_internal(contact)[BROKEN.name])
+        hold = Hold(problem)
+        modes = do_on_first(problem.comm, ConvergenceError, lambda: follow_leaders(
+            problem.laws, hold.apply(self._guess_modes(contact), problem.laws.gap, np.zeros(problem.laws.count))))
+        law = linearise(
+            problem.laws, modes, beside.carry_pairs(contact.traction_n, jumps=False),
+            beside.carry_pairs(contact.slip, jumps=True), memory, load.pressure, problem.traction_scale, "slip",
+        )
+        constraints = hold.release(problem.constrain(law, load), modes)
+        solved = self.tangent.solve(constraints, load, law)
+        if not solved.checked:
+            solved = self.tangent.check(solved, constraints, load, law)
+        pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, ())
+
+    def _carry_internal(self, contact: ContactState) -> dict[str, NDArray[Any]]:
+        """The internal variables of the run's pairs, carried over as they are declared to be."""
+        laws, nearest = self.problem.laws, self.beside.nearest
+        internal = dict(start_memory(laws).internal)
+        for variable in list_variables(group.law for group in laws.strengths):
+            values = contact.internal[variable.name]
+            if variable.carry == "as the jump":
+                internal[variable.name] = np.maximum(self.beside.carry_pairs(values, jumps=True), 0.0)
+            else:
+                internal[variable.name] = np.where(nearest >= 0, values[nearest], internal[variable.name])
+        internal[BROKEN.name] = laws.brittle & (nearest >= 0) & internal[BROKEN.name]
+        return internal
+
+    def _guess_modes(self, contact: ContactState) -> ModeState:
+        nearest, own = self.beside.nearest, self.memory.modes
+        known = (nearest >= 0) & ~self.problem.laws.bonded & ~self.problem.laws.parted
+        mode = np.where(known, contact.mode[nearest], own.mode).astype(np.int8)
+        sign = np.where(contact.traction_s[nearest] < 0, -1.0, 1.0)
+        return ModeState(mode, np.where(known & (mode == SLIP), sign, own.sign))
+
+    def _take_over(self, contact: ContactState) -> None:
+        """The memory of the run's pairs, carried over."""
+        beside, laws = self.beside, self.problem.laws
+        slip = beside.carry_pairs(contact.slip, jumps=True)
+        tangential = beside.carry_pairs(contact.traction_s, jumps=False)
+        self.memory = Memory(
+            self._guess_modes(contact), slip - laws.compliance_s * tangential, self._carry_internal(contact),
+            beside.carry_pairs(contact.traction_n, jumps=False),
+        )
+
+    def destroy(self) -> None:
+        """Free the storage; after an exception of one rank it is not called."""
+        self.tangent.destroy()

@@ -1,0 +1,1 @@
+"""Newton's method for the contact statuses of one load step."""

@@ -1,0 +1,250 @@
+"""Balance of the forces on every region: what the collocated equations fulfil only as well as the mesh is fine.
+
+The elastic part of a region's tractions - all but those of the fields that stand for weight and in-situ stress - has no
+resultant and no moment. What is left over is a measure of the error; and it is what anchors carry where bodies would
+move freely.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.contact.anchor import group_motions
+from pbem.contact.loads import Load
+from pbem.contact.support import Support
+from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import Balance
+
+# Tractions below ROUNDING of modulus times strain are none; those of a region are no less than FAINT of the largest.
+ROUNDING, FAINT = 1e-9, 1e-6
+# Motions that differ by less than this part of their size are one.
+SAME = 1e-9
+
+
+def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
+    """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted.
+
+    (theory, 72)
+    """
+    mesh, count = problem.mesh, len(problem.mesh.region_names)
+    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    least = _find_least_traction(problem, v, np.abs(whole).max(initial=0.0))
+    faces, of = _collect_faces(problem, whole, known)
+    regions = _add_up(faces, of, count, least)
+    finite = np.array([not region.infinite for region in problem.model.regions])
+    carried_weight = _find_carried_weight(problem, known)
+    regions = replace(regions, force=regions.force - np.where(finite, 0.0, carried_weight))
+    # An infinite region may carry a moment, which decays.
+    turned = np.where(finite, _divide(np.abs(regions.moment), regions.moments), 0.0)
+    relative = np.maximum(_divide(np.abs(regions.force), regions.forces), turned)
+    carried = np.zeros(count)
+    if support.acting.shape[1]:
+        left, sums = (regions.force, regions.moment), (regions.forces, regions.moments)
+        for motions in group_motions(support.motions):
+            own, part = _measure_carried(problem, motions, regions.middle, left, sums)
+            carried[own] = np.maximum(carried[own], part)
+    most = np.full(count, regions.forces.max())
+    parts, part_relative = _measure_parts(problem, whole, known, least)
+    total, total_relative = _measure_whole(problem, faces, of, least, carried_weight)
+    return Balance(
+        resultant=regions.resultant, relative=relative, carried=carried, weight=_divide(regions.forces, most),
+        part_resultant=parts.resultant, part_relative=part_relative,
+        part_weight=_divide(parts.forces, np.full(len(parts.forces), regions.forces.max())),
+        whole=total.resultant[0], whole_relative=total_relative,
+    )
+
+
+@dataclass(frozen=True)
+class _Faces:
+    """Faces at nodes (n,): places, weights, tractions, and of these the part in balance with weight and in-situ stress.
+
+    node: their numbers. bounding: those of boundaries, as opposed to cracks, of which both faces are listed.
+    """
+
+    node: Integer
+    position: Complex
+    weight: Real
+    traction: Complex
+    known: Complex
+    bounding: Bool
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Of each body: force and moment left over, about its middle; the sums of their parts without signs."""
+
+    middle: Complex
+    force: Complex
+    moment: Real
+    forces: Real
+    moments: Real
+
+    @property
+    def resultant(self) -> Real:
+        return np.stack([self.force.real, self.force.imag, self.moment], axis=1)
+
+
+def _collect_faces(problem: Problem, whole: Complex, known: Complex) -> tuple[_Faces, Integer]:
+    """All faces, and the regions that they bound (n,), in rising order; tractions are given at the nodes."""
+    mesh = problem.mesh
+    node = np.concatenate([np.arange(mesh.nodes), np.flatnonzero(mesh.node_crack)])
+    sign = np.where(np.arange(len(node)) < mesh.nodes, 1.0, -1.0)
+    order = np.argsort(mesh.node_region[node], kind="stable")
+    node, sign = node[order], sign[order]
+    faces = _Faces(
+        node, mesh.position[node], mesh.weight[node], sign * whole[node], sign * known[node], ~mesh.node_crack[node]
+    )
+    return faces, mesh.node_region[node]
+
+
+def _find_carried_weight(problem: Problem, known: Complex) -> complex:
+    """The weight of finite bodies that an infinite region carries, as nothing else holds them along it; 0 if none.
+
+    As the loads of the model balance without weight (or it would have been refused), that is the region's resultant.
+    known (nodes,): tractions in balance with weight; those of in-situ stress do no work on rigid motions.
+    """
+    mesh = problem.mesh
+    if not known.any() or not problem.plane_translations:
+        return 0j
+    (plane,) = (region.name for region in problem.model.regions if region.infinite)
+    directions, powers = [], []
+    for motion in problem.plane_translations:
+        direction, power = motion.velocities[plane][0], 0.0
+        for number, name in enumerate(mesh.region_names):
+            if name in motion.velocities and name != plane:
+                own = np.flatnonzero((mesh.node_region == number) & ~mesh.node_crack)
+                shift, spin = motion.velocities[name]
+                velocity = shift + 1j * spin * mesh.position[own]
+                power -= float(mesh.weight[own] @ (np.conj(known[own]) * velocity).real)
+        directions.append([direction.real, direction.imag])
+        powers.append(power)
+    # Along a direction in which something holds the region, nothing is known of its force.
+    force = np.linalg.lstsq(np.array(directions), np.array(powers), rcond=SAME)[0]
+    return complex(*force)
+
+
+def _add_up(
+    faces: _Faces, of: Integer, count: int, least: float, middle: complex | None = None
+) -> _Sums:
+    """The sums over the faces of bodies; of (n,): number of the body of each face, in rising order.
+
+    middle: about which moments are taken; None for that of each body's boundary.
+    """
+
+    def add(values: Real) -> Real:
+        return np.bincount(of, faces.weight * values, count).astype(float)
+
+    def add_vectors(values: Complex) -> Complex:
+        return add(values.real) + 1j * add(values.imag)
+
+    if middle is None:
+        outline = faces.bounding.astype(float)
+        length = add(outline)
+        # About a node of the body first, as coordinates can be large.
+        start = np.append(faces.position, 0j)[np.searchsorted(of, np.arange(count))]
+        # Of a plane with nothing but cracks in it there is no boundary.
+        middles = start + add_vectors(outline * (faces.position - start[of])) / np.where(length > 0, length, 1.0)
+    else:
+        middles = np.full(count, middle)
+    lever = faces.position - middles[of]
+    whole, known = faces.traction, faces.known
+    elastic = whole - known
+    # Loads of which none is left over on a body are no less a measure of its errors: fluid on both faces of a crack,
+    # in-situ stress.
+    return _Sums(
+        middle=middles, force=add_vectors(elastic), moment=add((np.conj(lever) * elastic).imag),
+        forces=np.maximum(add(np.abs(whole)), least * add(np.ones(len(of)))) + add(np.abs(known)),
+        moments=np.maximum(add(np.abs(whole * lever)), least * add(np.abs(lever))) + add(np.abs(known * lever)),
+    )
+
+
+def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: float) -> tuple[_Sums, Real]:
+    """The sums of the parts that cracks cut off, with the tractions of the cracks' faces, and what is left over."""
+    mesh, parts, chosen = problem.mesh, problem.parts, problem.cut_parts
+    crack = np.flatnonzero(mesh.node_crack)
+    nodes = np.concatenate([np.arange(mesh.nodes), crack]) if len(chosen) else crack[:0]
+    sign = np.where(np.arange(len(nodes)) < mesh.nodes, 1.0, -1.0)
+    number = np.full(len(parts.region), -1)
+    number[chosen] = np.arange(len(chosen))
+    element = mesh.node_element[nodes]
+    of = number[np.where(sign > 0, parts.first[element], parts.second[element])]
+    order = np.argsort(of, kind="stable")
+    order = order[of[order] >= 0]
+    nodes, sign, of = nodes[order], sign[order], of[order]
+    sums = _add_up(
+        _Faces(
+            nodes, mesh.position[nodes], mesh.weight[nodes], sign * whole[nodes], sign * known[nodes],
+            np.ones(len(nodes), dtype=bool),
+        ),
+        of, len(chosen), least,
+    )
+    finite = np.array([not problem.model.regions[parts.region[part]].infinite for part in chosen], dtype=bool)
+    turned = np.where(finite, _divide(np.abs(sums.moment), sums.moments), 0.0)
+    return sums, np.maximum(_divide(np.abs(sums.force), sums.forces), turned)
+
+
+def _measure_whole(
+    problem: Problem, faces: _Faces, of: Integer, least: float, carried_weight: complex
+) -> tuple[_Sums, float]:
+    """The sums over outer curves, and the weight: what acts on all bodies together from outside.
+
+    What interfaces and contacts carry from one to the other cancels in it, as it should; but errors are as large as
+    what acts on the bodies, so that they are measured by the one on which most does, about the same middle.
+    """
+    outer = np.zeros(problem.mesh.nodes, dtype=bool)
+    outer[problem.outer.node] = True
+    acting = outer[faces.node]
+    seen = replace(
+        faces, traction=np.where(acting, faces.traction, 0.0),
+        weight=np.where(acting | (faces.bounding & (faces.known != 0)), faces.weight, 0.0),
+    )
+    sums = _add_up(seen, np.zeros(len(of), dtype=np.int64), 1, least)
+    bodies = _add_up(faces, of, len(problem.mesh.region_names), least, middle=complex(sums.middle[0]))
+    sums = replace(
+        sums, force=sums.force - carried_weight, forces=bodies.forces.max(keepdims=True),
+        moments=bodies.moments.max(keepdims=True),
+    )
+    infinite = any(region.infinite for region in problem.model.regions)
+    parts = [_divide(np.abs(sums.force), sums.forces), _divide(np.abs(sums.moment), sums.moments)]
+    return sums, float(parts[0][0] if infinite else max(part[0] for part in parts))
+
+
+def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
+    """Tractions that are smaller are taken to be as large as this."""
+    rounding = max(ROUNDING, problem.system.tolerance)
+    moved = float(np.abs(v[: 2 * problem.mesh.nodes]).max(initial=0.0))
+    return max(FAINT * largest, rounding * problem.traction_scale * moved)
+
+
+def _measure_carried(
+    problem: Problem, motions: list[RigidBodyMode], middle: Complex, left: tuple[Complex, Real],
+    whole: tuple[Real, Real],
+) -> tuple[list[int], float]:
+    """The regions of motions that have some in common, and the part of what is left over that works on the motions.
+
+    Whatever motions span the same space, the part is the same; of one body it is that of its own forces.
+    """
+    numbers = {name: number for number, name in enumerate(problem.mesh.region_names)}
+    own = sorted({numbers[name] for motion in motions for name in motion.velocities})
+    # A lever makes moments forces, and turns velocities.
+    lever = _divide(whole[1][own], whole[0][own])
+    moves = np.zeros((len(own), 3, len(motions)))
+    for column, motion in enumerate(motions):
+        for name, (shift, spin) in motion.velocities.items():
+            at = own.index(numbers[name])
+            velocity = shift + 1j * spin * middle[own[at]]
+            moves[at, :, column] = velocity.real, velocity.imag, spin * lever[at]
+    directions, sizes, _ = np.linalg.svd(moves.reshape(3 * len(own), -1), full_matrices=False)
+    directions = directions[:, sizes > SAME * sizes.max(initial=0.0)]
+    moment = _divide(left[1][own], lever)
+    power = np.stack([left[0][own].real, left[0][own].imag, moment], axis=1).ravel() @ directions
+    scale = whole[0][own] @ np.linalg.norm(directions.reshape(len(own), 3, -1), axis=1)
+    return own, float(np.linalg.norm(_divide(power, scale)))
+
+
+def _divide(part: Real, whole: Real) -> Real:
+    return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0)

@@ -1,0 +1,188 @@
+"""Bodies that the present contact would leave free: pairs that hold them in the meantime, or the refusal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pbem.arrays import Integer, Real
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.cut_parts import describe_cut_motions
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, stick_creeping
+from pbem.contact.loads import Load
+from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
+from pbem.errors import ConvergenceError
+from pbem.parallel import broadcast
+from pbem.solve.nonlinear.balance import measure_balance
+from pbem.solve.nonlinear.imbalance import DRIVEN
+from pbem.solve.problem.problem import Problem
+
+# A body that slips on all its contacts is held by single pairs at most so often in one step.
+MOST_HELD = 12
+# Gaps that differ by more than this part are not those of a symmetric contact.
+UNEQUAL = 1e-3
+# The same modes come back so often before pairs that hold a body are given up.
+MOST_REPEATED = 3
+SHARES = (0.0, 0.3, 1.0)
+
+
+class Hold:
+    """Modes that hold all bodies, through the iterations of one step.
+
+    A body whose pairs are all open has no equilibrium until it touches something: its nearest pairs are closed. One
+    whose closed pairs all slip can still be in balance, by friction that acts in both senses: then there is a place
+    between where slip changes its sense, and a pair there that sticks holds the body and carries what is left of the
+    balance. If that is more than its bound, the place is further on against the sense of what it carries.
+
+    Free motions that were so at the start have anchors, which do where the loads balance. Where they do not, as single
+    pairs push the body, it moves until its contacts hold it: from then on (driven) no free motion is left to anchors.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.pairs: Integer = np.zeros(0, dtype=np.int64)
+        self.count = 0
+        self.driven = False
+        self.repeated = 0
+        # Only violations of this share of the largest change modes, once those that hold a body came back: many changes
+        # at a time free a body whose contact only wants to move on around it.
+        self.share = 0.0
+
+    def release(self, constraints: ConstraintMap, modes: ModeState) -> ConstraintMap:
+        """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
+        if not self.problem.anchors:
+            return constraints
+        released = broadcast(self.problem.comm, self.problem.find_support(modes).released)
+        return replace(constraints, released=released)
+
+    def is_driven(self, modes: ModeState, v: Real, load: Load) -> bool:
+        """Whether anchors carry what the loads do not balance: for v (4 nodes,), by the first rank.
+
+        Once so, `apply` holds the bodies by pairs, and what they cannot hold is refused.
+        """
+        if self.driven or not self.problem.anchors:
+            return False
+        support = self.problem.find_support(modes)
+        carried = measure_balance(self.problem, v, load, support).carried.max(initial=0.0) > DRIVEN
+        self.driven = broadcast(self.problem.comm, bool(carried))
+        return self.driven
+
+    def apply(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None = None) -> ModeState:
+        """The modes, with pairs closed or sticking where a body would be free to move.
+
+        opening, slip (m,): as they are, the slip of this step alone; before: the modes that led to them.
+        Raises ConvergenceError ("free motion") if the pairs that hold a body do not stay closed.
+        """
+        held = self._choose(modes, opening, slip, before)
+        # Pairs that hold a body only by pulling open again each time: there is no state in which they hold it.
+        same = before is not None and held is not modes and held.fingerprint() == before.fingerprint()
+        self.repeated = self.repeated + 1 if same else 0
+        if same:
+            self.share = SHARES[min(self.repeated, len(SHARES) - 1)]
+        if self.repeated == MOST_REPEATED:
+            self.refuse_free_motion(modes)
+        return held
+
+    def _choose(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        if not self.find_free(modes):
+            return modes
+        mesh, laws = self.problem.mesh, self.problem.laws
+        # No more than hold it: a third pair beside the two on which a round body lies would pull at it.
+        for least in range(2, CLOSED_AT_LEAST + 1):
+            closed = close_nearest_pairs(mesh, laws, modes, opening, least)
+            if not self.find_free(closed):
+                return closed
+        if before is None or self.count >= MOST_HELD:
+            return closed
+        # Pairs that stuck until now and are overloaded say in which sense the body goes on to move.
+        overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
+        overloaded = np.intersect1d(overloaded, self.pairs)
+        for passed_over in (overloaded, overloaded[:0]):
+            held, pairs = stick_calmest_pairs(
+                mesh, laws, closed, slip, passed_over, lambda trial: not self.find_free(trial)
+            )
+            if len(pairs):
+                break
+        self.count += 1
+        self.pairs = np.union1d(self.pairs, pairs)
+        return held
+
+    def describe(self, modes: ModeState) -> tuple[str, ...]:
+        """What the user should know of pairs that hold a body in the end."""
+        held = self.pairs[modes.mode[self.pairs] == STICK]
+        if not len(held):
+            return ()
+        released = ModeState(modes.mode.copy(), modes.sign)
+        released.mode[held] = SLIP
+        free = self.find_free(released)
+        if not free:
+            return ()
+        mesh = self.problem.mesh
+        names = ", ".join(sorted({repr(mesh.interface_names[k]) for k in mesh.pairs.interface[held]}))
+        return (
+            f"All of {names} slips and friction is in balance; a {free} is held by {len(held)} sticking "
+            f"{'pair' if len(held) == 1 else 'pairs'} where the slip changes its sense, and known only to the distance "
+            "of its neighbours.",
+        )
+
+    def find_free(self, modes: ModeState) -> str | None:
+        """The motions that neither pairs nor anchors hold, in words; None if there are none."""
+        support = self.problem.find_support(modes)
+        return (support.text or None) if self.driven else support.unheld
+
+    def _find_cut_motion(self, modes: ModeState) -> str | None:
+        """The motions of parts that cracks cut off, for which there are no anchors."""
+        problem = self.problem
+        if not problem.parts.cut.any():
+            return None
+        modes = stick_creeping(problem.laws, modes)
+        return describe_cut_motions(problem.model, problem.mesh, problem.outer, problem.parts, modes)
+
+    def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:
+        """The error that names what can move freely in the present contact; None if nothing can."""
+        free, advice = self.find_free(modes), "hold it by a condition, or use shorter elements where it touches"
+        if not free:
+            free, advice = self._find_cut_motion(modes), "hold it by a condition"
+        if not free:
+            return None
+        detail = f"nothing in the present contact prevents a {free}; {advice}"
+        return ConvergenceError("free motion", detail)
+
+    def describe_collapse(self, modes: ModeState) -> str:
+        """The motions that friction alone prevents in some modes, as the end of a sentence; "" if it prevents none."""
+        gives_way = (modes.mode == STICK) & ~self.problem.laws.bonded
+        free = self.find_free(ModeState(np.where(gives_way, SLIP, modes.mode).astype(np.int8), modes.sign))
+        return f"; nothing but friction prevents a {free}" if free else ""
+
+    def refuse_free_motion(self, modes: ModeState) -> None:
+        """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
+        error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
+        if error:
+            raise error
+
+    def _describe_unresolved(self, modes: ModeState) -> ConvergenceError | None:
+        """The error of a body that two neighbouring pairs alone hold against a rotation, where it is one of the mesh.
+
+        Round faces touch at a place between the pairs, which a contact shorter than an element does not show: pairs
+        that were unequally far apart would turn the body until both touch.
+        """
+        mesh, mode = self.problem.mesh, modes.mode.copy()
+        pairs, gap = mesh.pairs, self.problem.laws.gap
+        closed = np.flatnonzero((mode != OPEN) & ~pairs.crack)
+        count = np.bincount(pairs.interface[closed], minlength=len(mesh.interface_names))
+        for number in np.flatnonzero(count == 2):
+            along = np.flatnonzero(pairs.interface == number)
+            along = along[np.argsort(pairs.arc_length[along], kind="stable")]
+            at = np.flatnonzero(mode[along] != OPEN)
+            first, second = along[at]
+            if at[1] == at[0] + 1 and abs(gap[first] - gap[second]) > UNEQUAL * max(gap[first], gap[second]):
+                mode[second] = OPEN
+        free = self.find_free(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else None
+        if not free:
+            return None
+        detail = (
+            f"nothing in the present contact but two neighbouring pairs, which were not equally far apart, prevents a "
+            f"{free}; hold it by a condition, or use shorter elements where it touches"
+        )
+        return ConvergenceError("free motion", detail)

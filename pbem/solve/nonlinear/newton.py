@@ -1,0 +1,305 @@
+"""Newton's method for one load step: modes from trial values and their tangent operator, until no mode changes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.arrays import Bool, Real
+from pbem.contact.complementarity import take_subset
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
+from pbem.contact.loads import Load
+from pbem.contact.modes import (
+    Linearisation,
+    Proposal,
+    begin_slip,
+    choose_slip,
+    find_failures,
+    limit_changes,
+    linearise,
+    measure_law_error,
+    update_active_set,
+)
+from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
+from pbem.errors import ConvergenceError
+from pbem.parallel import broadcast
+from pbem.solve.nonlinear.cascade import run_cascade
+from pbem.solve.nonlinear.fixed_point import FixedPoint
+from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.search import Globalisation, Search
+from pbem.solve.nonlinear.unsettled import describe_unsettled
+from pbem.solve.preconditioner.subdomains import is_one_group
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.response import find_response
+from pbem.solve.problem.step import Iteration, Reporter
+from pbem.solve.problem.tangent import AnyTangent, Solved
+from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A converged state: unknowns (2 nodes,), v (4 nodes,), pairs, modes and the iterations that led to it.
+
+    memory: that of the last step, with the brittle bonds that failed in this one.
+    """
+
+    unknowns: Real
+    v: Real
+    pairs: PairState
+    modes: ModeState
+    memory: Memory
+    residual: float
+    iterations: tuple[Iteration, ...]
+
+
+# Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
+STRAIN_FLOOR = 0.1
+
+# After so many iterations, and so many more, it is asked whether anything could balance the loads.
+PATIENCE = 8
+
+
+def solve_step(
+    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None, hurried: bool = False,
+) -> Solution:
+    """Converge one load step from the memory of the last.
+
+    Each iteration solves K(mode) x = -B m(mode) and asks which modes the result wants; the laws are affine in each
+    mode (but for friction that depends on slip), so that a step in which no mode changes takes one iteration. How the
+    modes are searched for is said in pbem.solve.nonlinear.search. Brittle bonds fail, those with the largest overload
+    first, only when the modes of all other pairs have settled. Where groups of a crack network that settle by
+    themselves lead to modes that do not, the search begins anew without that. All decisions are taken by the first
+    rank.
+    Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
+    "singular tangent", "linear solver"; and what `refuse` answers, asked now and then with the memory as it is by then:
+    "limit load" in a march, where nothing can balance the loads with the bonds that are left.
+    """
+    iterations: list[Iteration] = []
+    if tangent.settling.nearby and not is_one_group(problem.mesh) and find_linear(problem.laws).all():
+        search = _make_search(problem, tangent, True)
+        try:
+            return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+        except ConvergenceError:
+            if not search.swept:
+                raise
+    search = _make_search(problem, tangent, False)
+    search.wary = False
+    try:
+        return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+    except ConvergenceError as error:
+        if not search.varying or error.reason not in ("iteration limit", "mode cycle"):
+            raise
+    search = _make_search(problem, tangent, False)  # wary of friction that changes with slip
+    return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+
+
+def _make_search(problem: Problem, tangent: AnyTangent, sweeps: bool) -> Search:
+    settling = tangent.settling
+    # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
+    # is followed by Newton's steps with the bound of the last iteration.
+    linear = find_linear(problem.laws)
+    return Search(
+        settling.most_pairs, problem.mesh.pairs.interface if settling.with_neighbours else None,
+        problem.laws.follows | ~linear, varying=not bool(linear.all()), sweeps=sweeps,
+    )
+
+
+def _search_modes(
+    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, search: Search, iterations: list[Iteration],
+) -> Solution:
+    """See solve_step; by one search, whose iterations join those before."""
+    laws = problem.laws
+    hold = Hold(problem)
+    comm = problem.comm
+    modes = problem.decide(lambda: follow_leaders(
+        laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
+    normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
+    fixed_point, kept = FixedPoint(), (modes, normal_traction, slip)
+    while True:
+        begin = time.perf_counter()
+        law = linearise(
+            laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale, search.caution.frozen
+        )
+        constraints = hold.release(problem.constrain(law, load), modes)
+        try:
+            solved = tangent.solve(constraints, load, law)
+            outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
+            if outcome.settled and not solved.checked:
+                solved = tangent.check(solved, constraints, load, law)
+                outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
+        except ConvergenceError:
+            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            raise
+        pairs, proposal = outcome.pairs, outcome.proposal
+        fails, cascade = outcome.settled and bool(outcome.failing.any()), None
+        if fails:
+            floor = _find_floor(problem, solved)
+            cascade = run_cascade(
+                problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
+                min(search.most_pivoted, MOST_PIVOTED),
+            )
+            memory = memory.lose(cascade.broken)
+            proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
+            search.restart()
+        iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
+        reporter.iterate(iterations[-1])
+        driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
+        if driven:
+            search.restart()
+        elif outcome.settled and not fails:
+            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            for note in hold.describe(modes) if comm.rank == 0 else ():
+                reporter.note(note)
+            return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
+        refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
+        if refused:
+            moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
+            raise ConvergenceError(refused.reason, refused.detail + moves)
+        frozen, left = search.caution.frozen, search.leaves(outcome.law_error)
+        search.note(proposal, outcome.law_error)
+        if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
+            raise _end(hold, "iteration limit", proposal, search)
+        if left:
+            modes, normal_traction, slip = kept
+            continue
+        chosen = cascade.modes if cascade else None
+        # The first rank alone knows which pairs hold a body.
+        share = broadcast(comm, max(search.caution.share, hold.share))
+        # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
+        if not cascade and not (share > search.caution.share):
+            chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
+        if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
+            raise _end(hold, "mode cycle", proposal, search)
+        if chosen is None:
+            chosen = limit_changes(modes, proposal, share)
+            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
+                raise _end(hold, "mode cycle", proposal, search)
+        slipped, former = plastic_slip(laws, pairs) - memory.slip, modes
+        modes = problem.decide(
+            lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
+                laws, hold.apply(new, at.g_n, slipped, now)),
+        )
+        normal_traction, found = pairs.p_n, plastic_slip(laws, pairs)
+        if search.wary and frozen == "slip" and not proposal.changed.any():
+            found = fixed_point.choose(modes.fingerprint(), slip, found, modes.mode == SLIP)
+        slip = choose_slip(laws, modes, memory, slip, found, former)
+        if search.just_returned:
+            kept = (modes, normal_traction, slip)
+
+
+def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
+    """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
+    return hold.problem.decide(lambda: (
+        hold.describe_free_motion(proposal.modes)
+        or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))
+
+
+def _pivot(
+    hold: Hold, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
+    law: Linearisation, solved: Solved, search: Search,
+) -> ModeState | None:
+    """The modes that all groups of a crack network settle on by themselves, or else with those of the search's group
+    solved by pivoting; None if it has none or they have no solution.
+
+    Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
+    """
+    problem = hold.problem
+    judge = _make_judge(problem, solved, search.caution)
+    if search.may_sweep():
+        swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
+        if swept.fingerprint() != modes.fingerprint():
+            search.swept = True
+            return swept
+    group = search.choose_group()
+    if not len(group):
+        return None
+    response = find_response(problem, tangent, constraints, load, law, solved, group)
+    subset = take_subset(problem.laws, memory, load.pressure, modes, group)
+
+    # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
+    alone = search.excluded
+    start = ModeState(
+        np.where(alone, search.proposal.modes.mode, modes.mode).astype(np.int8),
+        np.where(alone, search.proposal.modes.sign, modes.sign),
+    )
+
+    def complete(own: ModeState) -> ModeState:
+        mode, sign = start.mode.copy(), start.sign.copy()
+        mode[group], sign[group] = own.mode, own.sign
+        return follow_leaders(problem.laws, ModeState(mode, sign))
+
+    def settle() -> Settled:
+        if tangent.settling.nearby and len(group) > MOST_ASKED:
+            return settle_parts(subset, response, search.proposal.modes, group, judge)
+        return settle_subset(
+            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
+            lambda own: not hold.find_free(complete(own)),
+        )
+
+    found: Settled = problem.decide(settle)
+    ends = search.conclude(found)
+    if found.modes is None and search.widen(ends):
+        return _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
+    # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
+    if ends and not broadcast(problem.comm, len(hold.pairs)):
+        raise _end(hold, "no admissible modes", search.proposal, search)
+    if found.modes is None:
+        return None
+    settled = complete(found.modes)
+    if tangent.settling.nearby and settled.fingerprint() == modes.fingerprint():
+        return None  # what is near says otherwise than the whole model did
+    return settled
+
+
+def _make_judge(problem: Problem, solved: Solved, caution: Globalisation) -> Callable[..., Proposal]:
+    """The choice of modes, with what it takes for rounding."""
+    floor = _find_floor(problem, solved)
+    return lambda laws, modes, state, memory, pressure: update_active_set(
+        laws, modes, state, memory, pressure, caution.softening, floor
+    )
+
+
+def _find_floor(problem: Problem, solved: Solved) -> float:
+    return STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a solution says of the modes that led to it; settled: none changes, and the laws of slipping pairs hold."""
+
+    pairs: PairState
+    proposal: Proposal
+    settled: bool
+    failing: Bool
+    law_error: float
+
+
+def _judge(
+    problem: Problem, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved,
+    caution: Globalisation,
+) -> _Outcome:
+    laws = problem.laws
+
+    def judge() -> _Outcome:
+        pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        floor = _find_floor(problem, solved)
+        proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
+        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
+        failing = find_failures(laws, pairs, memory, load.pressure, floor)
+        settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
+        return _Outcome(pairs, proposal, settled, failing, law_error)
+
+    return problem.decide(judge)
+
+
+def _record(number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:
+    stick, slip, is_open = (int((modes.mode == kind).sum()) for kind in (STICK, SLIP, OPEN))
+    seconds = time.perf_counter() - begin
+    changed = int(proposal.changed.sum())
+    return Iteration(number, solved.residual, changed, stick, slip, is_open, seconds, solved.linear_iterations)

@@ -1,0 +1,254 @@
+"""The search for the pairs' modes: semi-smooth Newton steps, and pivoting for the few pairs that go on changing.
+
+A Newton step gives every pair the mode that its trial values ask for. Far from the solution this settles most pairs at
+a time, and on sound models it ends in a few iterations. Near to it a few pairs can change each other for ever, as the
+step looks at each pair as if the others stood still. The search sees that when the number of changing pairs no longer
+falls, not only when a state comes back, and then solves the contact of the pairs that changed lately exactly, with all
+others kept in their modes (pbem.contact.subset): a non-linear Gauss-Seidel method of two blocks, whose second block is
+the Newton step of all. Pairs that change next join those that are solved for, so that a group that holds all that
+disturb each other is found in a few rounds. Of crack networks, where thousands of pairs change, every group of
+neighbouring elements settles by itself before each Newton step (pbem.solve.tangent.sweeps), as long as that helps.
+
+What is left for models whose law is not linear in a mode (friction that weakens with slip) or whose group is too large:
+the friction bound is kept in each iteration at what it was after the last (a fixed point of Tresca's law; J. Haslinger
+et al., Numerical methods for unilateral problems in solid mechanics, 1996). Once no mode changes under it the full
+tangent comes back at once, as the fixed point itself closes in slowly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.arrays import Bool, Integer
+from pbem.contact.modes import Frozen, Proposal
+from pbem.contact.subset import Settled
+
+
+@dataclass(frozen=True)
+class Globalisation:
+    """How modes are changed: trial stiffness times `softening`; only violations of `share` of the largest.
+
+    frozen: what of the friction bound is taken as it is at the last iterate.
+    """
+
+    softening: float
+    share: float
+    frozen: Frozen = "nothing"
+
+
+# Modes that come back in spite of pivoting move one level down; the last changes one pair at a time.
+GLOBALISATIONS = (
+    Globalisation(1.0, 0.0),
+    Globalisation(0.1, 0.0, "slip"),
+    Globalisation(0.1, 0.0, "strength"),
+    Globalisation(0.01, 0.3, "strength"),
+    Globalisation(0.01, 1.0, "strength"),
+)
+
+# Errors of the laws, as parts of the bound, up to which the full tangent comes back where friction changes with slip:
+# from further off its steps leave the states through which faces that run away come to rest.
+NEAR = 0.02
+# After an iteration with the full tangent that leads further off than that, only from nearer by this factor.
+NEARER = 0.1
+# Changes that fall to no less than this part of the fewest before are a sign of pairs that disturb each other.
+SLOW = 0.5
+# Iterations in which the number of changes should have fallen.
+LONG = 10
+# Iterations that are plain Newton steps whatever they change.
+PLAIN = 3
+# Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
+COSTLY = 60
+# Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
+FUTILE = 6
+# Where a group fails, all pairs of models with so few are pivoted at once; of those with so many at the end of all.
+FEW_IN_ALL, MOST_IN_ALL = 60, 120
+# So often in a search: where it first fails and before it ends.
+MOST_WIDENED = 2
+# The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
+SWEPT = 4
+# Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
+STALLED = 4
+
+
+class Search:
+    """Watches the changes of modes and says what comes next; the same on all ranks, from the same proposals.
+
+    most_pivoted: the largest group of pairs that is solved by pivoting. interface (m,): of each pair, in order along
+    it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
+    has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
+    is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
+    groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps).
+    """
+
+    def __init__(
+        self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
+        varying: bool = False, sweeps: bool = False,
+    ) -> None:
+        self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
+        self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
+        self.sweeps, self.swept = sweeps, False
+        self.wary = True  # whether changes that stall, and a full tangent that leads away, are met with caution
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin anew, as after the failure of a bond."""
+        self.counts: list[int] = []
+        self.changed: list[Integer] = []
+        self.group: Integer = np.zeros(0, dtype=np.int64)
+        self.failed_group: Integer = self.group
+        self.failed: Settled | None = None
+        self.futile = self.solved = 0
+        self.pause = self.paused = 0
+        self.widened, self.widening, self.narrow = 0, False, self.group
+        self.level = 0
+        self.sweeping = self.sweeps
+        self.returned = self.just_returned = False
+        self.near, self.error, self.entered = NEAR, np.inf, 0
+        self.seen: set[bytes] = set()
+
+    @property
+    def caution(self) -> Globalisation:
+        return GLOBALISATIONS[self.level]
+
+    def note(self, proposal: Proposal, law_error: float = 0.0) -> None:
+        """Take note of what the last solution asks for, and of how far the laws of slipping pairs are from holding."""
+        self.proposal = proposal
+        self.changed.append(np.flatnonzero(proposal.changed & ~self.excluded))
+        self.counts.append(int(proposal.changed.sum()))
+        self.just_returned = False
+        near = law_error <= self.near or not self.varying
+        if not self.counts[-1] and self.level and near and not self.returned:
+            self.level, self.returned, self.just_returned, self.error = 0, True, True, law_error
+        elif self._is_stalled():
+            self._enter(self.level + 1)
+
+    def leaves(self, law_error: float) -> bool:
+        """Whether the first iteration with the full tangent again has led away from a state that was nearly settled.
+
+        Then the frozen bound comes back, from that state, until it is nearer.
+        """
+        error, self.error = self.error, np.inf
+        if not (self.varying and self.wary) or not law_error > max(error, NEAR):
+            return False
+        self.near, self.returned = NEARER * min(self.near, error), False
+        self._enter(1)
+        return True
+
+    def _is_stalled(self) -> bool:
+        """Whether hardly fewer pairs change than before at this level, most of which pivoting is not made for."""
+        if not (self.varying and self.wary) or self.level == len(GLOBALISATIONS) - 1:
+            return False
+        if 2 * len(self.changed[-1]) > self.counts[-1]:
+            return False
+        before, lately = np.split(self.counts[self.entered :], [-STALLED])
+        return bool(len(before) and lately.min() > SLOW * before.min())
+
+    def _enter(self, level: int) -> None:
+        self.level, self.entered = level, len(self.counts)
+        self.seen.clear()
+
+    def is_stuck(self) -> bool:
+        """Whether in the last LONG iterations no fewer pairs changed than at best in as many or more before."""
+        before, lately = self.counts[:-LONG], self.counts[-LONG:]
+        return len(before) >= LONG and min(lately) >= max(1, min(before))
+
+    def may_sweep(self) -> bool:
+        """Whether groups may settle by themselves next: as long as that lets fewer and fewer pairs change."""
+        before, lately = self.counts[:-SWEPT], self.counts[-SWEPT:]
+        if before and min(lately) >= min(before):
+            self.sweeping = False
+        return self.sweeping and not self.level
+
+    def choose_group(self) -> Integer:
+        """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
+        nothing = np.zeros(0, dtype=np.int64)
+        if self.widening:
+            self.group = self._list_all()
+            return self.group
+        if len(self.counts) <= PLAIN or not self.counts[-1]:
+            return nothing
+        if self.paused < self.pause:
+            self.paused += 1
+            return nothing
+        if not len(self.group) and self.counts[-1] <= SLOW * min(self.counts[:-1]):
+            return nothing
+        lately = np.unique(np.concatenate(self.changed[-2:]))
+        whole = np.union1d(self.group, lately)
+        for group in (np.union1d(whole, self._find_neighbours(self.changed[-1])), whole, lately, self.changed[-1]):
+            if len(group) <= self.most_pivoted:
+                self.group = group
+                return group
+        return nothing
+
+    def _find_neighbours(self, pairs: Integer) -> Integer:
+        """The pairs next to some, the more the oftener groups were solved in turn: contact ends somewhere there."""
+        if self.interface is None or not self.solved:
+            return pairs
+        reach = min(4**self.solved, len(self.interface))
+        near = pairs[:, None] + np.arange(-reach, reach + 1)
+        inside = np.clip(near, 0, len(self.interface) - 1)
+        near = inside[(near == inside) & (self.interface[inside] == self.interface[pairs][:, None])]
+        return np.unique(near[~np.broadcast_to(self.excluded, self.interface.shape)[near]])
+
+    def conclude(self, found: Settled) -> bool:
+        """Take note of what pivoting found for the group; True if there seems to be nothing to be found.
+
+        That is certain where all choices were tried for the same pairs twice, with what all others make of it between;
+        of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
+        """
+        if found.modes is not None:
+            self.widening = False
+            self.futile = self.pause = 0
+            self.solved += 1
+            return False
+        self.solved = self.paused = 0
+        self.pause = 2 * self.pause + 1 if len(self.group) > COSTLY else 0
+        again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
+        self.failed_group, self.failed = self.group, found
+        self.futile += found.tried > 1
+        return (again and found.exhaustive) or self.futile >= FUTILE
+
+    def widen(self, ends: bool) -> bool:
+        """After a group for which nothing was found: whether all pairs are to be pivoted at once, with the same states.
+
+        Pairs that keep their modes only because they did not change can stand in the way of the others. ends: whether
+        the search ends otherwise.
+        """
+        if self.widening:
+            self.widening, self.group = False, self.narrow
+            return False
+        most = MOST_IN_ALL if ends else FEW_IN_ALL
+        if self.widened == MOST_WIDENED - (not ends) or not len(self.group) < len(self._list_all()) <= most:
+            return False
+        self.widened, self.widening, self.narrow = self.widened + 1, True, self.group
+        return True
+
+    def _list_all(self) -> Integer:
+        """All pairs that may be in a group; none where many cost much."""
+        count = 0 if self.interface is None else len(self.interface)
+        return np.flatnonzero(~np.broadcast_to(self.excluded, (count,)) if count else np.zeros(0, dtype=bool))
+
+    def returns(self, fingerprint: bytes) -> bool:
+        """Note a state of modes; whether it was there before at this level of caution."""
+        back = fingerprint in self.seen
+        self.seen.add(fingerprint)
+        return back
+
+    def descend(self) -> bool:
+        """Move to more caution; False at the end of all.
+
+        At first groups no longer settle by themselves. Where modes still come back what they found was the wrong way
+        (swept): another search begins anew, without.
+        """
+        if self.sweeping:
+            self.sweeping = False
+            self.seen.clear()
+            return True
+        if self.swept:
+            return False
+        if self.level == len(GLOBALISATIONS) - 1:
+            return False
+        self._enter(self.level + 1)
+        return True

@@ -1,0 +1,63 @@
+"""Why the modes of a load step did not settle, in words with the pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.arrays import Integer
+from pbem.contact.modes import Proposal
+from pbem.contact.subset import Settled
+from pbem.errors import ConvergenceError
+from pbem.geometry.junction import format_point
+from pbem.solve.problem.problem import Problem
+
+# So many pairs, or interfaces, are named.
+MOST_NAMED = 5
+
+
+def describe_unsettled(
+    problem: Problem, reason: str, proposal: Proposal, group: Integer, failed: Settled | None
+) -> ConvergenceError:
+    """The error of a search that ends, with its reason or a truer one.
+
+    group (s,): the pairs for which pivoting found no modes last, with what it found; none if it did not fail.
+    """
+    if not proposal.changed.any():
+        return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
+    if failed is not None and failed.wrong.any():
+        return ConvergenceError(
+            "unsound mesh",
+            f"single pairs part when they are pressed, or move against a shear: {_name(problem, group[failed.wrong])}; "
+            "with the others in their present modes contact there has none or several solutions; where elements are "
+            "longer than the distance to the next face, use shorter ones",
+        )
+    if reason == "no admissible modes" and failed is not None:
+        loses = bool((problem.laws.tensile_strength[group] > 0).any())
+        certainty = "fulfils" if failed.exhaustive else "was found that fulfils"
+        lost = "tensile strength and cohesion are" if loses else "cohesion is"
+        return ConvergenceError(
+            reason,
+            f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these "
+            f"{len(group)}: {_name(problem, group)}; {lost} lost at once where faces part, and back "
+            "where they meet: cohesion_lost = true makes that loss last",
+        )
+    names = problem.mesh.interface_names
+    numbers, counts = np.unique(problem.mesh.pairs.interface[proposal.changed], return_counts=True)
+    first = zip(numbers[:MOST_NAMED], counts[:MOST_NAMED], strict=True)
+    where = ", ".join(f"{count} on {names[number]}" for number, count in first)
+    worst = np.array([int(np.argmax(proposal.violation))])
+    return ConvergenceError(
+        reason, f"pairs that still change mode: {where}; the worst {_name(problem, worst)}; try shorter elements there"
+    )
+
+
+def _name(problem: Problem, pairs: Integer) -> str:
+    """Interface and place of the first few pairs."""
+    mesh = problem.mesh
+    places = [
+        f"on {mesh.interface_names[mesh.pairs.interface[pair]]} at "
+        f"{format_point(mesh.pairs.position[pair] + problem.model.origin)}"
+        for pair in pairs[:MOST_NAMED]
+    ]
+    more = len(pairs) - len(places)
+    return ", ".join(places) + (f" and {more} more" if more else "")

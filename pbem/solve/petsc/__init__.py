@@ -1,0 +1,1 @@
+"""PETSc's solvers and options, and how rows are shared by the ranks."""

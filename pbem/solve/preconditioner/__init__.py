@@ -1,0 +1,1 @@
+"""Subdomains that overlap, and the preconditioner made of their inverses."""

@@ -1,0 +1,326 @@
+"""A preconditioner of overlapping groups: each group's part of the solution of its equations and its neighbours'.
+
+For every group the tangent operator of the group and of those around it is formed exactly and factored; of the local
+solution only the group's own part is used (restricted additive Schwarz: X.-C. Cai, M. Sarkis, SIAM J. Sci. Comput. 21,
+1999). Only the rows of the local inverse that give this part are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.linalg import lapack
+
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.bem.rigid import RigidMotions
+from pbem.bem.rows import Sources, evaluate_rows
+from pbem.contact.anchor import Anchor
+from pbem.contact.constraints import ConstraintMap
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes, number_components, split_components
+from pbem.model.material import Material
+from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
+from pbem.solve.preconditioner.subdomains import Group
+
+# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
+MOST_LEFT = 900
+
+
+@dataclass
+class LocalInverse:
+    """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
+
+    inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
+    eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
+    formed: whether it has been tried.
+    """
+
+    group: Group
+    own: Integer
+    around: Integer
+    inside: Integer
+    seen: Integer
+    solved: Integer
+    matrix: Real | None = None
+    formed: bool = False
+
+
+class SchwarzPreconditioner:
+    """The local inverses of this rank's groups, formed anew where the constraint map has changed."""
+
+    def __init__(
+        self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
+        groups: Sequence[Group], nodes: Integer, rigid: Sequence[RigidMotions] = (),
+    ) -> None:
+        self._mesh, self._anchors = mesh, tuple(anchors)
+        self._rigid = [motions for motions in rigid if motions.interpolated]
+        self._sources = collect_sources(mesh, materials)
+        self._scale = scale_equations(mesh, materials, length)
+        self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
+        self.free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
+        self._nodes = nodes
+        # The mesh makes these anew at every call, for all nodes.
+        self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
+        self._node_crack = mesh.node_crack
+        self._formed: sparse.csr_matrix | None = None
+        self._less: Elimination | None = None
+        self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
+        self.singular = 0  # groups without an inverse, of those formed last
+        self.inverses = [self._place(group) for group in groups]
+
+    def regroup(self, groups: Sequence[Group]) -> None:
+        """Take other surroundings of the same groups; `update` then forms all inverses."""
+        self._formed = None
+        self.inverses = [self._place(group) for group in groups]
+
+    def _place(self, group: Group) -> LocalInverse:
+        at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
+        around = list_nodes(self._mesh, group.around)
+        inside = number_components(np.searchsorted(around, list_nodes(self._mesh, group.elements)))
+        return LocalInverse(group, number_components(at), number_components(around), inside, inside, inside)
+
+    def update(self, constraints: ConstraintMap) -> int:
+        """Form the inverses of the groups that see a change of the constraint map; returns their number."""
+        matrix = constraints.matrix
+        changed = _find_changes(self._formed, matrix)
+        self._formed = matrix
+        changed |= self._find_anchored(constraints)
+        by_column = matrix.tocsc()
+        free = (self.free @ matrix).tocsr()
+        less = self._less = eliminate_tractions(matrix, free, self._node_crack)
+        count, self.singular = 0, 0
+        for inverse in self.inverses:
+            if not inverse.formed or changed[inverse.around].any():
+                self._invert(inverse, by_column, free, less)
+                count += 1
+        return count
+
+    def apply(self, residual: Real, result: Real) -> None:
+        """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,) (theory, 63)."""
+        less, nodes = self._less, self._nodes
+        assert less is not None
+        turned = less.apply(residual)
+        eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], turned.reshape(-1, 2)[nodes]).ravel()
+        for inverse in self.inverses:
+            if inverse.matrix is not None:
+                result[inverse.own] = eliminated[inverse.own]
+                result[inverse.own[inverse.solved]] += inverse.matrix @ turned[inverse.seen]
+            else:
+                # A group that nothing holds without the rest of the model: its residual serves as it is.
+                result[inverse.own] = residual[inverse.around[inverse.inside]]
+
+    def correct(self, residual: Real) -> tuple[Real, Real]:
+        """What the eliminated unknowns are off by (own unknowns,), from this rank's part of K x - b, and what is left.
+
+        No other equation contains them, so that their own are fulfilled without a product.
+        """
+        less, nodes = self._less, self._nodes
+        assert less is not None
+        turned = (less.turn[nodes] @ residual.reshape(-1, 2, 1))[..., 0]
+        off = (less.inverse[nodes] @ turned[..., None])[..., 0]
+        return off.ravel(), np.where(less.first[nodes], 0.0, turned).ravel()
+
+    def _invert(
+        self, inverse: LocalInverse, constraints: sparse.csc_matrix, free: sparse.csr_matrix, less: Elimination
+    ) -> None:
+        """Form the rows of a group's inverse; what is eliminated is not in the factors, but follows from the rest."""
+        elements, around, inside = self._narrow(inverse, less)
+        local, first = less.local.ravel()[around], less.first.ravel()[around]
+        inverse.seen, inverse.matrix, inverse.formed = around[~first], None, True
+        if local.all():
+            inverse.matrix, inverse.solved = np.zeros((0, 0)), np.zeros(0, dtype=np.int64)
+            return
+        # In large groups the eliminated follow their own residual alone: what the others do to them GMRES sees in its
+        # next iteration, and no other equation contains them.
+        own = np.zeros(len(around), dtype=bool)
+        own[inside] = not len(inverse.group.nearest)
+        rows = np.flatnonzero(~first | own)
+        left = np.flatnonzero(~local)
+        whole = self._form(elements, around, rows, left, constraints, free, less)
+        rest = ~first[rows]
+        factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(whole[rest]), overwrite_a=True)
+        # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
+        at = np.flatnonzero(~rest)
+        effect = np.zeros((len(inside), len(left)))
+        effect[np.searchsorted(inside, rows[at])] = whole[at]
+        back = less.inverse[around[inside[::2]] // 2]
+        wanted = -(back @ effect.reshape(len(back), 2, -1)).reshape(effect.shape)
+        kept = np.flatnonzero(~local[inside])
+        wanted[kept, np.searchsorted(left, inside[kept])] = 1.0
+        inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
+        if not zero_pivot:
+            matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
+            inverse.matrix = np.ascontiguousarray(matrix) if np.isfinite(matrix).all() else None
+        self.singular += inverse.matrix is None
+
+    def respond(
+        self, constraints: sparse.csr_matrix, offsets: sparse.csr_matrix, elements: Integer, unknowns: Integer
+    ) -> Real:
+        """What columns of B times offsets (4 n, 2 n) do to the unknowns of the same numbers, (k, k), all else free.
+
+        Of the model the elements alone are there, the nodes of the unknowns among them; constraints: those of `update`.
+        """
+        less = self._less
+        assert less is not None
+        around = number_components(list_nodes(self._mesh, elements))
+        at = np.searchsorted(around, unknowns)
+        local, first = less.local.ravel()[around], less.first.ravel()[around]
+        wanted = np.zeros(len(around), dtype=bool)
+        wanted[at] = True
+        rows, left = np.flatnonzero(~first | wanted), np.flatnonzero(~local)
+        whole, forces = (
+            self._form(elements, around, rows, columns, matrix.tocsc(), (self.free @ matrix).tocsr(), less)
+            for columns, matrix in ((left, constraints), (at, offsets))
+        )
+        rest = ~first[rows]
+        result = np.zeros((len(around), len(at)))
+        result[left] = -np.linalg.solve(whole[rest], forces[rest])
+        turned = np.zeros_like(result)
+        turned[rows[~rest]] = (-forces - whole @ result[left])[~rest]
+        back = less.inverse[around[::2] // 2]
+        result += (back @ turned.reshape(len(back), 2, -1)).reshape(result.shape)
+        return np.asarray(result[at])
+
+    def form_block(self, constraints: sparse.csr_matrix, elements: Integer, nodes: Integer) -> Real:
+        """Rows of the tangent operator of a constraint map and its columns, of some nodes of elements: (2 k, 2 k)."""
+        around = list_nodes(self._mesh, elements)
+        at = number_components(np.searchsorted(around, nodes))
+        free = (self.free @ constraints).tocsr()
+        return self._form(elements, number_components(around), at, at, constraints.tocsc(), free, None)
+
+    def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
+        """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""
+        group = inverse.group
+        if not len(group.nearest):
+            return group.around, inverse.around, inverse.inside
+        own, width = group.elements, 2 * (self._mesh.order + 1)
+        left = (~less.local).reshape(-1, width).sum(axis=1)
+        sums = left[own].sum() + np.cumsum(left[group.nearest])
+        elements = np.union1d(own, group.nearest[sums <= MOST_LEFT])
+        around = list_nodes(self._mesh, elements)
+        inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
+        return elements, number_components(around), inside
+
+    def _form(
+        self, elements: Integer, around: Integer, rows: Integer, left: Integer, constraints: sparse.csc_matrix,
+        free: sparse.csr_matrix, less: Elimination | None,
+    ) -> Real:
+        """Turned rows of the tangent operator, and its columns that are left, of the nodes of elements, dense.
+
+        rows, left: places in around (k,), the unknowns of elements, rising.
+        """
+        mesh, columns = self._mesh, around[left]
+        nodes = np.unique(around[rows] // 2)
+        formed = np.zeros((2 * len(nodes), len(left)))
+        row, column, value = _take_entries(free, number_components(nodes))
+        place, known = _find_places(columns, column)
+        formed[row[known], place[known]] = value[known]
+        column, row, value = _take_entries(constraints, columns)
+        # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
+        sources = np.unique(self._node_element[row // 2 % mesh.nodes])
+        for region in np.unique(mesh.region[elements]):
+            own = np.flatnonzero(self._node_region[nodes] == region)
+            seen = sources[mesh.region[sources] == region]
+            if not len(own) or not len(seen):
+                continue
+            values, places = self._evaluate(int(region), seen, nodes[own])
+            place, known = _find_places(places, row)
+            entries = (value[known], (place[known], column[known]))
+            chosen = sparse.csr_matrix(entries, shape=(len(places), len(left)))
+            formed[number_components(own)] += (chosen.T @ values.T).T
+        turned = formed if less is None else less.turn[nodes] @ formed.reshape(len(nodes), 2, -1)
+        return np.asarray(turned.reshape(2 * len(nodes), -1)[np.searchsorted(number_components(nodes), around[rows])])
+
+    def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
+        """Rows of B of nodes, less the free terms, on the entries of v of elements of the same region."""
+        mesh = self._mesh
+        sources: Sources = self._sources[region].select(elements - self._first_element[region])
+        bounded = bool((sources.family == 0).any())
+        place, there = _find_places(elements, self._node_element[nodes])
+        on = np.where(there, place, -1)
+        seen = list_nodes(mesh, elements)
+        columns = number_components(seen)
+        if bounded:
+            columns = np.concatenate([columns, 2 * mesh.nodes + columns])
+        values = np.empty((2 * len(nodes), len(columns)))
+        for traction in (False, True):
+            at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
+            if len(at):
+                own = nodes[at]
+                normal = mesh.normal[own] if traction else None
+                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
+                values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
+        values *= -np.repeat(self._scale[nodes], 2)[:, None]
+        for motions in self._rigid:
+            place, there = _find_places(columns, motions.columns)
+            if motions.region == region and there.all():
+                rotation = np.zeros(4 * mesh.nodes)
+                rotation[motions.columns] = motions.basis[-1]
+                left = (self.free[number_components(nodes)] @ rotation) + values @ rotation[columns]
+                values[:, place] -= np.outer(left, motions.basis[-1])
+        # After the rotations, which the anchors hold.
+        own_anchors = [number for number, anchor in enumerate(self._anchors) if anchor.region == region]
+        for one in own_anchors:
+            for other in own_anchors:
+                if self._acting[one, other]:
+                    self._anchor(values, nodes, seen, one, other)
+        return values, columns
+
+    def _find_anchored(self, constraints: ConstraintMap) -> Bool:
+        """Unknowns of the regions on which other anchors act than before."""
+        released = constraints.released
+        acting = np.eye(len(self._anchors))
+        if released is not None:
+            acting -= released @ released.T
+        moved = np.flatnonzero(np.abs(acting - self._acting).max(axis=1, initial=0.0) > 0)
+        self._acting = acting
+        regions = [self._anchors[number].region for number in moved]
+        return np.repeat(np.isin(self._node_region, regions), 2)
+
+    def _anchor(self, values: Real, nodes: Integer, seen: Integer, one: int, other: int) -> None:
+        """Add the pattern of one anchor in the equations of nodes, by the functional of another of the same region."""
+        at, pattern = _look_up(self._anchors[one].nodes, self._anchors[one].pattern, nodes)
+        on, functional = _look_up(self._anchors[other].nodes, self._anchors[other].functional, seen)
+        where = np.ix_(number_components(at), number_components(on))
+        values[where] += self._acting[one, other] * np.outer(split_components(pattern), split_components(functional))
+
+
+def _look_up(
+    known: Integer, value: Complex, nodes: Integer
+) -> tuple[Integer, Complex]:
+    """Places in nodes (k,) of those that are known (sorted), and their values."""
+    place, there = _find_places(known, nodes)
+    at = np.flatnonzero(there)
+    return at, value[place[at]]
+
+
+def _take_entries(matrix: sparse.csr_matrix | sparse.csc_matrix, chosen: Integer) -> tuple[Integer, Integer, Real]:
+    """Entries of chosen rows of a matrix by rows, or columns of one by columns: place in chosen, other index, value.
+
+    Slices of scipy's take time in proportion to the whole matrix.
+    """
+    first = matrix.indptr[chosen].astype(np.int64)
+    count = matrix.indptr[chosen + 1] - first
+    at = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
+    return np.repeat(np.arange(len(chosen)), count), matrix.indices[at].astype(np.int64), matrix.data[at]
+
+
+def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
+    """Where numbers are in a sorted list, and whether they are."""
+    place = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
+    return place, known[place] == numbers
+
+
+def _find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
+    """Columns (unknowns,) in which two constraint maps differ."""
+    changed = np.zeros(matrix.shape[1], dtype=bool)
+    if before is None:
+        changed[:] = True
+    else:
+        difference = (matrix - before).tocoo()
+        changed[difference.col[difference.data != 0]] = True
+    return changed

@@ -1,0 +1,1 @@
+"""Load steps: stages, cut-backs, and what is said of each step."""

@@ -1,0 +1,88 @@
+"""Why a march ends: the errors of steps that fail, with the loads that forces in the contacts could balance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.contact.laws import Memory
+from pbem.errors import ConvergenceError
+from pbem.solve.problem.problem import Problem
+from pbem.solve.steps.ceiling import Ceiling
+from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
+
+# The end of what is said of a limit load.
+BEYOND = "prescribe a displacement in place of the load to go beyond"
+
+
+def refuse_load(problem: Problem, memory: Memory, stage: int, target: float, now: Memory) -> ConvergenceError | None:
+    """The error of a step whose loads nothing balances with the bonds that are left now; None if something may.
+
+    As the first rank finds it.
+    """
+    possible = problem.decide(lambda: can_balance(problem, now, stage, target))
+    if possible is not False:
+        return None
+    if np.array_equal(memory.broken, now.broken):
+        return ConvergenceError("limit load", "no forces that the contacts can carry balance the loads")
+    return ConvergenceError(
+        "limit load", "bonds fail one after the other until no forces that the contacts can carry balance the loads"
+    )
+
+
+def find_balanced(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float:
+    """The largest fraction up to the target that forces in the contacts could balance, as the first rank finds it."""
+    found = problem.decide(lambda: find_balanced_fraction(problem, memory, stage, reached, target))
+    return target if found is None else found
+
+
+def end_at_limit(
+    problem: Problem, stage: int, reached: float, ceiling: Ceiling, error: ConvergenceError
+) -> ConvergenceError:
+    """The error at the largest load that the contacts bear; error: of the try at ceiling.tried."""
+    name = problem.model.stages[stage].name
+    known = error.reason in ("free motion", "limit load")
+    why = f"at {ceiling.tried:.6g} {error.detail if known else 'no modes of the contacts were found that settle'}"
+    if ceiling.balanced < np.inf:
+        some = f"{why}; up to {ceiling.balanced:.6g} some could"
+        why = some if error.reason == "limit load" else f"{_describe_bound(ceiling.balanced)}; {why}"
+    return ConvergenceError(
+        "limit load", f"limit load reached at fraction {reached:.6g} of stage {name!r}: {why}; {BEYOND}"
+    )
+
+
+def _describe_bound(balanced: float) -> str:
+    return f"no forces that the contacts can carry balance the loads beyond {balanced:.6g}"
+
+
+def end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceError) -> ConvergenceError:
+    """The error of a first step whose problem is the same at every fraction."""
+    name = problem.model.stages[stage].name
+    return ConvergenceError(
+        error.reason,
+        f"stage {name!r} stopped at the fraction 0; the load grows in proportion from rest, and what fails at "
+        f"{target:.6g} fails at every fraction: {error.detail}",
+    )
+
+
+def end_march(
+    problem: Problem, memory: Memory, stage: int, reached: float, target: float, error: ConvergenceError
+) -> ConvergenceError:
+    """The error of a step that is as small as allowed.
+
+    A contact that held up to here and becomes a mechanism under more load has come to the largest load that it bears.
+    """
+    name = problem.model.stages[stage].name
+    if error.reason == "free motion" and (stage > 0 or reached > 0):
+        return ConvergenceError(
+            "limit load",
+            f"limit load reached at fraction {reached:.6g} of stage {name!r}, no equilibrium at {target:.6g}: there "
+            f"{error.detail}; {BEYOND}",
+        )
+    # Of the whole stage: whether a try went beyond the bound depends on the steps.
+    balanced = find_balanced(problem, memory, stage, reached, 1.0)
+    bound = f"; {_describe_bound(balanced)}" if balanced < 1.0 else ""
+    return ConvergenceError(
+        error.reason,
+        f"stage {name!r} stopped at the fraction {reached:.6g}; the step to {target:.6g} failed and is the "
+        f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}{bound}",
+    )

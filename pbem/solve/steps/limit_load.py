@@ -1,0 +1,178 @@
+"""The largest part of a load step that forces in the contacts could balance, whatever the bodies' elasticity.
+
+Static admissibility (the lower bound of limit analysis, here as a necessary condition): tractions of the pairs within
+their laws, and of what is held, have to balance the loads on every finite body. Beyond the fraction at which none do
+no smaller step finds an equilibrium. A linear programme in the tractions of the nodes and the fraction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from pbem.arrays import Integer, Real
+from pbem.contact.constraints import build_constraints
+from pbem.contact.laws import Memory, PairLaws
+from pbem.contact.loads import Load
+from pbem.contact.modes import P_N, P_S, Linearisation, tensile_limit
+from pbem.solve.problem.problem import Problem
+
+# What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.
+BALANCED = 1e-3
+# A share that is less than the whole by no more than this is the whole.
+ROUNDING = 1e-6
+# How a linear programme can end.
+SOLVED, INFEASIBLE = 0, 2
+# Models with more pairs are not asked.
+MOST_PAIRS = 20_000
+
+
+def find_balanced_fraction(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float | None:
+    """The largest fraction of a stage in [reached, target] whose loads some tractions balance; None if unknown.
+
+    reached itself where hardly more than its loads are balanced, target where all are. Of the pairs those between
+    bodies count, without what they have lost for good, but as if none of them had slipped; what the faces of a crack
+    carry acts within one body and balances by itself. Unknown for laws that do not say how much they bear, models
+    without finite bodies, and where the programme finds no balance at `reached` itself.
+    """
+    solved = _solve(problem, memory, stage, reached, target)
+    share = solved.share if solved else None
+    if share is None or share > 1 - ROUNDING:
+        return None if share is None else target
+    return reached + share * (target - reached)
+
+
+def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -> bool | None:
+    """Whether some tractions balance the loads at a fraction of a stage; None if unknown, as above."""
+    solved = _solve(problem, memory, stage, fraction, fraction)
+    return None if solved is None or not solved.certain else solved.share is not None
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """The largest share of a change of loads that is balanced, None if no share is; certain: whether that is so."""
+
+    share: float | None
+    certain: bool
+
+
+def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> _Solved | None:
+    """For the change from one fraction of a stage to another one; None where the programme cannot be posed."""
+    mesh, laws = problem.mesh, problem.laws
+    finite = np.array([not region.infinite for region in problem.model.regions])
+    if laws.count > MOST_PAIRS or not finite.any() or not (~mesh.pairs.crack).any():
+        return None
+    if any(group.law.find_strongest(group.parameters) is None for group in laws.strengths):
+        return None
+    loads = [problem.evaluate_load(stage, factor) for factor in (reached, target)]
+    matrix, before, after = _sum_up(problem, loads, np.flatnonzero(finite))
+    size = max(np.abs(before).max(), np.abs(after).max())
+    if not size > 0:
+        return _Solved(1.0, True)
+    return _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size)
+
+
+def _sum_up(
+    problem: Problem, loads: list[Load], regions: Integer
+) -> tuple[sparse.csr_matrix, Real, Real]:
+    """Force and moment over length of every region (3 k,): what unknown tractions add (3 k, 2 nodes), and loads."""
+    mesh, count = problem.mesh, problem.laws.count
+    tangent = np.zeros((count, 4, 2))
+    tangent[:, P_N, 0] = tangent[:, P_S, 1] = 1.0
+    law = Linearisation(tangent, np.zeros((count, 4)), np.arange(count))
+    maps = [build_constraints(mesh, problem.outer, np.zeros(count), law, load, 1.0) for load in loads]
+    weight = np.where(mesh.node_crack, 0.0, mesh.weight)
+    rows, columns, values = [], [], []
+    for row, region in enumerate(regions):
+        own = np.flatnonzero(mesh.node_region == region)
+        lever = mesh.position[own] - mesh.position[own].mean()
+        lever = lever / np.abs(lever).max()
+        for part, along in enumerate((np.ones_like(lever), np.full_like(lever, 1j), 1j * lever)):
+            for component, value in enumerate((along.real, along.imag)):
+                rows.append(np.full(len(own), 3 * row + part))
+                columns.append(2 * own + component)
+                values.append(weight[own] * value)
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    resultant = sparse.csr_matrix(entries, shape=(3 * len(regions), 2 * mesh.nodes))
+    given = [
+        resultant @ (each.offset - load.known)[2 * mesh.nodes :] for each, load in zip(maps, loads, strict=True)
+    ]
+    return resultant @ maps[0].matrix[2 * mesh.nodes :], given[0], given[1]
+
+
+def _maximise(
+    problem: Problem, memory: Memory, loads: list[Load], matrix: sparse.csr_matrix, constant: Real, change: Real,
+    size: float,
+) -> _Solved:
+    """The largest share of the change that is balanced (theory, 57).
+
+    Unknowns: tractions times the model's length over `size`, in the order of the map's unknowns, and the share.
+    """
+    mesh, laws = problem.mesh, problem.laws
+    scale = size / problem.model.size
+    columns = 2 * mesh.nodes
+    at_n, at_s = 2 * mesh.pairs.slot, 2 * mesh.pairs.slot + 1
+    pressure, rise = loads[0].pressure / scale, (loads[1].pressure - loads[0].pressure) / scale
+    friction, cohesion = _find_strongest(laws, memory)
+    limit = tensile_limit(laws, memory)
+    low, high = np.full(columns + 1, -np.inf), np.full(columns + 1, np.inf)
+    low[-1], high[-1] = 0.0, 1.0
+    balance = sparse.hstack([matrix * (1 / problem.model.size), change[:, None]]).tocsr()
+    used = np.zeros(columns + 1, dtype=bool)
+    used[np.unique(balance.indices)] = used[-1] = True
+    # What the faces of a crack carry balances by itself, within the one body: their laws would bound nothing but the
+    # share, by their pressure.
+    bearing = used[at_n] | used[at_s]
+    used[at_n[bearing]] = used[at_s[bearing]] = True
+    # Without pressure parted faces carry nothing; with it, what it gives.
+    own = bearing & ~(laws.bonded | laws.follows | laws.parted)
+    parted = np.flatnonzero(bearing & laws.parted)
+    count, last = len(own), np.full(len(own), columns)
+    pair = np.arange(count)
+
+    def build(blocks: list[tuple[Real, Integer]]) -> sparse.csr_matrix:
+        parts = [sparse.csr_matrix((value, (pair, column)), shape=(count, columns + 1)) for value, column in blocks]
+        return sum(parts[1:], parts[0])
+
+    inside = np.where(laws.fluid_inside, friction, 0.0)
+    one = np.ones(count)
+    bounds = [
+        (build([(one, at_n), (rise, last)]), limit / scale - pressure),
+        (build([(one, at_s), (friction, at_n), (inside * rise, last)]), cohesion / scale - inside * pressure),
+        (build([(-one, at_s), (friction, at_n), (inside * rise, last)]), cohesion / scale - inside * pressure),
+    ]
+    above = sparse.vstack([rows[own] for rows, _ in bounds])
+    most = np.concatenate([values[own] for _, values in bounds])
+    low[at_s[parted]] = high[at_s[parted]] = 0.0
+    fixed = build([(one, at_n), (rise, last)])[parted]
+    # What is left may grow with the loads.
+    spare = BALANCED * np.abs(constant).max()
+    left = BALANCED * sparse.csr_matrix(([np.abs(change).max()] * len(change), (np.arange(len(change)), [columns] *
+                                        len(change))), shape=balance.shape)
+    cost = np.zeros(columns + 1)
+    cost[-1] = -1.0
+    from scipy.optimize import linprog  # here, as few runs need it and it is a tenth of what a start imports
+
+    found = linprog(
+        cost[used],
+        A_ub=sparse.vstack([above, balance - left, -balance - left]).tocsr()[:, used],
+        b_ub=np.concatenate([most, spare - constant, spare + constant]),
+        A_eq=fixed[:, used] if len(parted) else None,
+        b_eq=-pressure[parted] if len(parted) else None,
+        bounds=np.stack([low, high], axis=1)[used], method="highs",
+    )  # fmt: skip
+    if found.status != SOLVED:
+        return _Solved(None, found.status == INFEASIBLE)
+    return _Solved(float(np.clip(found.x[-1], 0.0, 1.0)), True)
+
+
+def _find_strongest(laws: PairLaws, memory: Memory) -> tuple[Real, Real]:
+    """Friction and cohesion of all pairs, the largest that their laws know of; cohesion that is lost is none."""
+    friction, cohesion = np.zeros(laws.count), np.zeros(laws.count)
+    for group in laws.strengths:
+        strongest = group.law.find_strongest(group.parameters)
+        assert strongest is not None
+        friction[group.pairs], cohesion[group.pairs] = strongest
+    return friction, np.where(memory.broken, 0.0, cohesion)

@@ -1,0 +1,126 @@
+"""The march through the load history: steps, halved where they fail, each committed once when it has converged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from pbem.contact.laws import Memory, ModeState, commit, start_memory
+from pbem.errors import ConvergenceError
+from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import ContactState, Reporter, Step
+from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.steps.ceiling import SAFE, Ceiling
+from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, refuse_load
+from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
+from pbem.solve.steps.recovery import describe_step
+from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing
+
+# After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
+TRIED_FROM_REST = 2
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where a march begins: after a number of steps, at a fraction of a stage, with the memory of the pairs."""
+
+    number: int
+    stage: int
+    factor: float
+    memory: Memory
+
+
+def start_from_rest(problem: Problem) -> Start:
+    """The unloaded state: closed pairs stick."""
+    return Start(0, 0, 0.0, start_memory(problem.laws))
+
+
+def start_from(problem: Problem, number: int, stage: int, factor: float, contact: ContactState) -> Start:
+    """The state of a stored step."""
+    modes = ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
+    elastic = problem.laws.compliance_s * contact.traction_s
+    memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n)
+    return Start(number, stage, factor, memory)
+
+
+def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
+    """Yield the converged steps of all stages in turn.
+
+    A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction;
+    the factors of a stage's own steps are always met. Raises ConvergenceError with the reason of the last failure, or
+    "limit load" or "not in balance", after the steps before it were yielded.
+    """
+    begin = start or start_from_rest(problem)
+    tangent = problem.make_tangent()
+    number, memory, noted, told, depth = begin.number, begin.memory, 0.0, 0.0, 0.0
+    try:
+        for stage in range(begin.stage, len(problem.model.stages)):
+            steps = problem.model.stages[stage].steps
+            reached = begin.factor if stage == begin.stage else 0.0
+            ceiling = Ceiling()
+            while reached < 1.0:
+                planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
+                solution, reached, ceiling = _advance(
+                    problem, tangent, memory, stage, reached, planned, ceiling, reporter
+                )
+                memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
+                number += 1
+                step = describe_step(problem, solution, memory, number, stage, reached)
+                noted = note_imbalance(problem, step, noted, reporter)
+                told = note_nonlinearity(problem, step, told, reporter)
+                depth = note_passing(problem, step, depth, reporter)
+                reporter.accept(step)
+                yield step
+    except (ConvergenceError, GeneratorExit):
+        # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
+        tangent.destroy()
+        raise
+    tangent.destroy()
+
+
+def _advance(
+    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float, ceiling: Ceiling,
+    reporter: Reporter,
+) -> tuple[Solution, float, Ceiling]:
+    """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
+
+    Raises ConvergenceError: of the last try, or "limit load".
+    """
+    least = problem.model.solver.min_step
+    if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
+        raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
+    target, proportional = ceiling.choose(reached, planned, least), is_proportional(problem, memory, stage, reached)
+    tries, alike = 0, is_proportional_at_last(problem, memory, stage, reached)
+    while True:
+        reporter.start_step(stage, reached, target)
+        # From rest nothing is gained by an early end.
+        refuse = _never if proportional else partial(refuse_load, problem, memory, stage, target)
+        try:
+            load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
+            begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
+            solution = solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
+            return solution, target, ceiling.pass_by(target)
+        except ConvergenceError as error:
+            balanced = find_balanced(problem, memory, stage, reached, target)
+            if proportional:
+                if balanced < target and error.reason != "free motion":
+                    ceiling = ceiling.lower(target, balanced, error)
+                    raise end_at_limit(problem, stage, reached, ceiling, error) from error
+                raise end_at_rest(problem, stage, target, error) from error
+            ceiling = ceiling.lower(target, balanced, error)
+            if ceiling.is_reached(reached, target, least):
+                raise end_at_limit(problem, stage, reached, ceiling, error) from error
+            half = SAFE * (balanced - reached) if balanced < target else 0.5 * (target - reached)
+            if half < least:
+                raise end_march(problem, memory, stage, reached, target, error) from error
+            reporter.reject(error.reason, error.detail)
+            tries += 1
+            target = reached + (least if alike and tries == TRIED_FROM_REST else half)
+
+
+def _never(_: Memory) -> ConvergenceError | None:
+    return None

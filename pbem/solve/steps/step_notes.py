@@ -1,0 +1,53 @@
+"""What a user should know of a converged step: forces that do not balance, what is beyond linear theory, overlap."""
+
+from __future__ import annotations
+
+from pbem.errors import ConvergenceError
+from pbem.parallel import do_on_first
+from pbem.solve.nonlinear.imbalance import describe_imbalance
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import Reporter, Step
+from pbem.solve.steps.linearity import describe_nonlinearity, measure_excess
+from pbem.solve.steps.passing import describe_passing, find_passing
+
+
+def note_imbalance(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
+    """Note what is left over if it is twice as much as was noted before; returns what has been noted now.
+
+    Raises ConvergenceError ("not in balance") where it makes the result wrong; a smaller step would not mend it.
+    """
+    assert step.balance is not None
+    balance, name = step.balance, problem.model.stages[step.stage].name
+    try:
+        text = do_on_first(problem.comm, ConvergenceError, lambda: describe_imbalance(problem, balance))
+    except ConvergenceError as error:
+        detail = f"the step to the fraction {step.factor:.6g} of stage {name!r} is wrong: {error.detail}"
+        raise ConvergenceError(error.reason, detail) from error
+    amount = max(float(balance.relative.max(initial=0.0)), float(balance.part_relative.max(initial=0.0)))
+    if text is None or amount <= 2 * noted:
+        return noted
+    reporter.note(f"Step {step.number}: {text}.")
+    return amount
+
+
+def note_nonlinearity(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
+    """Note what is beyond linear theory if it is twice as much as was noted before; returns what has been noted now."""
+    assert step.linearity is not None
+    amount = measure_excess(step.linearity)
+    mesh = problem.mesh
+    if amount > 2 * noted:
+        notes = describe_nonlinearity(mesh.region_names, mesh.interface_names, step.linearity)
+        for text in notes:
+            reporter.note(f"Step {step.number}: {text}.")
+        return amount if notes else noted
+    return noted
+
+
+def note_passing(problem: Problem, step: Step, noted: float, reporter: Reporter) -> float:
+    """Note bodies that have moved into each other, if twice as deep as was noted before; returns what is noted now."""
+    moved = step.displacement[: problem.mesh.nodes]
+    found = do_on_first(problem.comm, ConvergenceError, lambda: find_passing(problem.model, problem.mesh, moved))
+    if found is None or found.depth <= 2 * noted:
+        return noted
+    reporter.note(f"Step {step.number}: {describe_passing(found)}.")
+    return found.depth

@@ -1,0 +1,1 @@
+"""The integral equations as stored: dense, or by the fast multipole method."""

@@ -1,0 +1,44 @@
+"""From the discretised model to the problem on the ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from pbem.bem.operator import scale_equations
+from pbem.contact.anchor import anchor_motions
+from pbem.contact.laws import collect_laws
+from pbem.contact.loads import collect_outer_nodes
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.rigid_body_modes import find_rigid_body_modes
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system.choice import choose_system
+
+
+def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
+    """Choose the system of a model, and assemble this rank's rows of it.
+
+    Raises ConvergenceError ("linear solver") where the system cannot be as exact as is asked for.
+    """
+    outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
+    anchored = find_rigid_body_modes(model)
+    anchors = anchor_motions(mesh, anchored)
+    return Problem(
+        comm=comm,
+        model=model,
+        mesh=mesh,
+        outer=outer,
+        laws=laws,
+        system=choose_system(model, mesh).assemble(comm, model, mesh, outer, laws, anchors),
+        traction_scale=_scale_tractions(model),
+        equation_scale=scale_equations(mesh, [region.material for region in model.regions], model.size),
+        anchors=anchors,
+        anchored=anchored,
+    )
+
+
+def _scale_tractions(model: Model) -> float:
+    """Modulus/length: the geometric mean of the regions' shear moduli over the model's size."""
+    logarithms = [np.log(region.material.shear_modulus) for region in model.regions]
+    return float(np.exp(np.mean(logarithms))) / model.size

@@ -1,0 +1,18 @@
+"""Which system of equations a model is computed with: the one place where that is decided."""
+
+from __future__ import annotations
+
+from pbem.bem.operator_choice import choose_operator
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.solve.system.dense import DenseSystem
+from pbem.solve.system.hierarchical import HierarchicalSystem
+
+SYSTEMS: dict[str, type[DenseSystem] | type[HierarchicalSystem]] = {
+    "dense": DenseSystem, "hierarchical": HierarchicalSystem,
+}
+
+
+def choose_system(model: Model, mesh: Mesh) -> type[DenseSystem] | type[HierarchicalSystem]:
+    """As the model asks, else by its largest region; the class assembles the system and knows what it can do."""
+    return SYSTEMS[choose_operator(model, mesh).name]

@@ -1,0 +1,163 @@
+"""The integral equations by the fast multipole method: near elements stored, far ones by their expansions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.hierarchical import (
+    HierarchicalOperator,
+    anchor_rows,
+    assemble_hierarchical,
+    choose_terms,
+    prepare_sources,
+    sort_elements,
+)
+from pbem.bem.location import Location
+from pbem.bem.pointwise import PointRows, TreeRows, place_points
+from pbem.contact.anchor import Anchor
+from pbem.contact.laws import PairLaws
+from pbem.contact.loads import OuterNodes, find_needed_columns
+from pbem.errors import ConvergenceError
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes, split_components
+from pbem.model.model import Model
+from pbem.parallel import add_up
+from pbem.solve.petsc.shares import cut_equally
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner.subdomains import Group, divide_model, share_groups, surround_groups
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.system.accuracy import measure_product_error
+from pbem.solve.tangent.krylov import KrylovTangent
+
+# Beyond this rounding in the expansions outweighs what further terms bring.
+MOST_TERMS = 60
+
+
+@dataclass(frozen=True)
+class HierarchicalSystem:
+    """See pbem.solve.problem.problem.System.
+
+    crack_points: of the mean displacement at this rank's share of the crack nodes; None without cracks. groups: this
+    rank's groups of elements; widen_groups makes them with so many times as many elements around them.
+    """
+
+    operator: HierarchicalOperator
+    crack_points: PointRows | None
+    groups: tuple[Group, ...]
+    widen_groups: Callable[[int], tuple[Group, ...]]
+    tolerance: float
+    notes: tuple[str, ...]
+
+    @staticmethod
+    def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
+        """What to say when a model cannot be shared by so many ranks; None, as ranks can be without a group."""
+        return None
+
+    @staticmethod
+    def assemble(
+        comm: MPI.Intracomm, model: Model, mesh: Mesh, outer: OuterNodes, laws: PairLaws, anchors: tuple[Anchor, ...]
+    ) -> HierarchicalSystem:
+        """This rank's rows; shares are whole groups of neighbouring elements.
+
+        Raises ConvergenceError ("linear solver") where products cannot be as exact as is asked for.
+        """
+        needed = find_needed_columns(model, mesh, outer)
+        groups = divide_model(mesh)
+        first, last = share_groups(mesh, groups, comm.rank, comm.size)
+        elements = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups[first:last]]))
+        operator, error = _reach_tolerance(comm, model, mesh, needed, list_nodes(mesh, elements))
+        for anchor in anchors:
+            operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
+        own_cracks = cut_equally(np.flatnonzero(mesh.node_crack), comm)
+        return HierarchicalSystem(
+            operator=operator,
+            crack_points=place_nodes_on_cracks(operator, own_cracks) if mesh.crack.any() else None,
+            groups=surround_groups(mesh, groups, first, last),
+            widen_groups=lambda widening: surround_groups(mesh, groups, first, last, widening),
+            tolerance=model.solver.tolerance,
+            notes=(_describe_operator(operator, len(groups), model.solver.tolerance, error),),
+        )
+
+    @property
+    def nodes(self) -> Integer:
+        """See System."""
+        return self.operator.nodes
+
+    @property
+    def stored(self) -> int:
+        """See System."""
+        return sum(leaf.near.nbytes + leaf.far.nbytes for leaf in self.operator.leaves)
+
+    def apply(self, v: Real) -> Real:
+        """See System."""
+        return self.operator.apply(v)
+
+    def recover(self, v: Real) -> Real:
+        """See System (theory, 13)."""
+        return np.zeros(0) if self.crack_points is None else split_components(self.crack_points.displacement(v))
+
+    def make_tangent(self, problem: Problem) -> AnyTangent:
+        """GMRES, preconditioned by the groups."""
+        preconditioner = SchwarzPreconditioner(
+            problem.mesh, [region.material for region in problem.model.regions], problem.model.size, problem.anchors,
+            self.groups, self.nodes, self.operator.rigid,
+        )
+        return KrylovTangent(problem, preconditioner, self.groups, self.widen_groups)
+
+    def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> TreeRows:
+        """See System; by the operator's trees."""
+        return TreeRows(self.operator, points, location)
+
+
+def place_nodes_on_cracks(operator: HierarchicalOperator, nodes: Integer) -> PointRows:
+    """Rows of the displacement at nodes (k,) on cracks: there the mean of both faces."""
+    mesh = operator.parts.mesh
+    return place_points(
+        operator.parts, operator.sources, mesh.position[nodes], mesh.node_region[nodes], mesh.node_element[nodes],
+        mesh.node_local[nodes],
+    )  # fmt: skip
+
+
+def _reach_tolerance(
+    comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: Bool, nodes: Integer
+) -> tuple[HierarchicalOperator, float]:
+    """The operator of the given nodes with enough terms for the tolerance, and its measured relative error.
+
+    Raises ConvergenceError if no number of terms is enough: "linear solver".
+    """
+    tolerance = model.solver.tolerance
+    materials = [region.material for region in model.regions]
+    finite = model.finite_regions
+    # Rigid motions are taken off from all displacements, also from those that are zero.
+    needed = needed.copy()
+    needed[: 2 * mesh.nodes] |= np.repeat(np.isin(mesh.node_region, finite), 2)
+    terms = choose_terms(tolerance)
+    while True:
+        parts = sort_elements(mesh, materials, terms)
+        own = cut_equally(parts.forest.leaves, comm)
+        sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
+        operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite)
+        error = measure_product_error(comm, operator, model.size)
+        if error <= tolerance:
+            return operator, error
+        if terms >= MOST_TERMS or not np.isfinite(error):
+            raise ConvergenceError(
+                "linear solver",
+                f"products of the hierarchical operator have a relative error of {error:.1e} (asked: solver.tolerance "
+                f'= {tolerance:g}); ask for less, or for operator = "dense"',
+            )
+        terms = min(MOST_TERMS, max(terms + 2, choose_terms(tolerance**2 / error)))
+
+
+def _describe_operator(operator: HierarchicalOperator, groups: int, tolerance: float, error: float) -> str:
+    forest = operator.parts.forest
+    return (
+        f"hierarchical operator: {len(forest.leaves)} clusters of elements, {operator.parts.terms} terms, {groups} "
+        f"groups in the preconditioner; relative error of its products {error:.1e} (asked: {tolerance:.0e})"
+    )

@@ -1,0 +1,93 @@
+"""The whole field at the interior points of a model, their evaluation shared by the ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+
+from pbem.arrays import Complex
+from pbem.bem.hoop import evaluate_hoop_stress
+from pbem.bem.interior import Values, evaluate_limits
+from pbem.bem.location import Location, locate_points
+from pbem.mesh.interpolation import split_faces
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.parallel import gather_parts
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.problem import InteriorRows, System
+from pbem.solve.problem.step import Interior, Step
+from pbem.solve.system.dense import place_directly
+
+PlaceInterior = Callable[[Model, Mesh, Complex, Location], InteriorRows]
+
+
+class InteriorField:
+    """The model's interior points, each rank with its share of them.
+
+    location: of all points, on every rank.
+    """
+
+    def __init__(self, model: Model, mesh: Mesh, comm: MPI.Intracomm) -> None:
+        points = np.array(model.interior_points, dtype=complex)
+        shares = np.linspace(0, len(points), comm.size + 1).astype(int)
+        own = points[shares[comm.rank] : shares[comm.rank + 1]]
+        self._model, self._mesh, self._comm = model, mesh, comm
+        self._points = own
+        self._location = locate_points(mesh, [region.infinite for region in model.regions], own)
+        self._place: PlaceInterior = place_directly
+        parts = [self._location.region, self._location.element, self._location.s]
+        region, element, s = (gather_parts(comm, np.asarray(part, dtype=float)) for part in parts)
+        self.location = Location(region.astype(np.int64), element.astype(np.int64), s)
+
+    def prepare(self, system: System) -> None:
+        """Evaluate in the way of a system of equations; else by every element of a point's region."""
+        self._place = system.place_interior
+
+    @cached_property
+    def _rows(self) -> InteriorRows:
+        return self._place(self._model, self._mesh, self._points, self._location)
+
+    def evaluate(self, step: Step) -> Interior:
+        """Displacement and stress at all points after a step, on every rank; all ranks call this together.
+
+        Inside, the sum of the region's backgrounds and of what the representation makes of the boundary values less the
+        balanced background. The far field is not taken from them: it goes on through the holes, so that from outside
+        the representation makes nothing of its part. On the boundary, the limits of the nodes' values.
+        """
+        mesh, backgrounds = self._mesh, evaluate_particular_solutions(self._model, step.stage, step.factor)
+        first, opposite = split_faces(mesh, step.displacement)
+        displacement = np.where(mesh.node_crack, first - opposite, first)
+        traction = step.traction[: mesh.nodes].copy()
+        moved, stress = np.zeros_like(self._points), np.zeros((len(self._points), 3))
+        # There can be thousands of regions: each finds its nodes and its points without looking at all of them.
+        ends = np.searchsorted(mesh.region, np.arange(len(backgrounds) + 1)) * (mesh.order + 1)
+        crack = mesh.node_crack
+        points = np.flatnonzero(self._location.element < 0)
+        points = points[np.argsort(self._location.region[points], kind="stable")]
+        last = np.searchsorted(self._location.region[points], np.arange(len(backgrounds) + 1))
+        for region, (balanced, far) in enumerate(backgrounds):
+            if not balanced.is_zero:
+                nodes = ends[region] + np.flatnonzero(~crack[ends[region] : ends[region + 1]])
+                displacement[nodes] -= balanced.displacement(mesh.position[nodes])
+                traction[nodes] -= balanced.traction(mesh.position[nodes], mesh.normal[nodes])
+            inside = points[last[region] : last[region + 1]]
+            for background in (balanced, far):
+                if len(inside) and not background.is_zero:
+                    moved[inside] += background.displacement(self._points[inside])
+                    stress[inside] += background.stress(self._points[inside])
+        elastic = self._rows.evaluate(displacement, traction)
+        hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
+        limit = evaluate_limits(
+            mesh, self._points, self._location, step.displacement, step.traction, hoop_stress
+        )
+        return self._gather(Values(moved + elastic.displacement + limit.displacement,
+                                   stress + elastic.stress + limit.stress))
+
+    def _gather(self, part: Values) -> Interior:
+        flat = np.column_stack([part.displacement.real, part.displacement.imag, part.stress])
+        whole = gather_parts(self._comm, flat.ravel()).reshape(-1, 5)
+        whole[self.location.region < 0] = np.nan  # both parts of a complex number, which sums may lose
+        return Interior(whole[:, :2].copy().view(np.complex128)[:, 0], whole[:, 2:])

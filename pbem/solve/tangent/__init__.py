@@ -1,0 +1,1 @@
+"""Tangent operators: factored, condensed onto the contact pairs, and by products for GMRES."""

@@ -1,0 +1,305 @@
+"""The linear systems of the hierarchical operator: GMRES on K x = B (M x), preconditioned by overlapping groups."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pbem.arrays import Integer, Real
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.laws import Memory, ModeState
+from pbem.contact.loads import Load
+from pbem.contact.modes import Linearisation, carry_over
+from pbem.errors import ConvergenceError
+from pbem.mesh.numbering import number_components
+from pbem.parallel import add_up, gather_parts
+from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence, petsc_options
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner.subdomains import Group
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.response import select_states
+from pbem.solve.problem.tangent import MOST_SETTLED, AnyTangent, Judge, Settling, Solved, size_residual
+from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
+from pbem.solve.tangent.sweeps import Sweeps
+
+# Most iterations of GMRES for one linear system, without restart.
+MOST_ITERATIONS = 300
+# GMRES is started at most so often for one linear system.
+MOST_ATTEMPTS = 4
+# After a system of more iterations than this the groups of the preconditioner take in more around them: each time
+# WIDENING times as much, up to MOST_WIDENING times.
+SLOW = 60
+WIDENING, MOST_WIDENING = 4, 16
+# GMRES goes on to this part of the tolerance of Newton's method.
+SAFETY = 0.1
+# The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
+# sets that are far from each other are settled one by one.
+MOST_SETTLED_BY_GMRES = 12
+# Responses of single pairs are found to this part of their forces.
+RESPONSE = 3e-2
+
+
+class KrylovTangent(AnyTangent):
+    """The tangent operator K = B M as a PETSc shell; its preconditioner follows the modes."""
+
+    def __init__(
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Group],
+        widen: Callable[[int], Sequence[Group]],
+    ) -> None:
+        """groups: of the preconditioner; widen: makes them with so many times as many elements around them."""
+        self.problem = problem
+        self.preconditioner = preconditioner
+        self._groups, self._widen_groups = groups, widen
+        self.constraints: ConstraintMap | None = None
+        self.solution: Real | None = None
+        self.law: Linearisation | None = None
+        # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
+        self.expected: Real | None = None
+        self.iterations: list[int] = []
+        nearby = answers_nearby(problem)
+        self._settling = Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
+        self.widening = 1
+        rows = 2 * len(problem.system.nodes)
+        sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
+        self._sweeps: Sweeps | None = None
+        self._order = _find_order(problem)
+        self._matrix = PETSc.Mat().createPython(sizes, _Product(self), comm=problem.comm)
+        self._matrix.setUp()
+        self._right, self._left = self._matrix.createVecs()
+        solver = PETSc.KSP().create(problem.comm)
+        solver.setOptionsPrefix(PREFIX)
+        solver.setOperators(self._matrix)
+        solver.setType("gmres")
+        solver.setGMRESRestart(MOST_ITERATIONS)
+        solver.setPCSide(PETSc.PC.Side.RIGHT)
+        solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
+        solver.setInitialGuessNonzero(True)
+        inner = solver.getPC()
+        inner.setType("python")
+        inner.setPythonContext(_Preconditioning(self))
+        with petsc_options(_choose_options()):
+            solver.setFromOptions()
+        if inner.getType() not in ("python", "none"):
+            kind = inner.getType()
+            solver.destroy()
+            raise ConvergenceError(
+                "linear solver",
+                f"PETSc's preconditioner {kind!r} needs a stored matrix, which the hierarchical operator has not; "
+                'leave pc_type out, or ask for operator = "dense"',
+            )
+        self._solver = solver
+        self._tolerance = float(solver.getTolerances()[0])  # the user's ksp_rtol, if one is given
+
+    @property
+    def settling(self) -> Settling:
+        """See AnyTangent."""
+        return self._settling
+
+    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
+        """Solve B (M x + m) = 0 for a constraint map.
+
+        Raises ConvergenceError: "linear solver".
+        """
+        self.preconditioner.update(constraints)
+        self.constraints = constraints
+        begin = self._carry_over(law)
+        self.law = law
+        forced = self.problem.apply(constraints.offset, load, constraints.released)
+        if self.problem.measure(forced) == 0.0:
+            unknowns = np.zeros(self.problem.unknowns)
+            return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
+        return self._complete(constraints, load, forced, self._guess(-forced, begin))
+
+    def _complete(self, constraints: ConstraintMap, load: Load, forced: Real, begin: Real) -> Solved:
+        """The solution to the tolerance, from this rank's part of an approximate one on."""
+        problem, tolerance = self.problem, self.problem.model.solver.newton_tolerance
+        scale = problem.measure(forced)
+        self._left.setArray(begin)
+        self._right.setArray(-forced)
+        self._solver.setTolerances(rtol=self._tolerance)
+        residual, count = np.inf, 0
+        for _ in range(MOST_ATTEMPTS):
+            before = residual
+            self._run_gmres()
+            self.iterations.append(int(self._solver.getIterationNumber()))
+            count += self.iterations[-1]
+            own = np.array(self._left.getArray())
+            v = constraints.evaluate(self.gather(own))
+            # The tractions of crack pairs are those of the jumps to rounding: pairs are judged by them.
+            off, left = self.preconditioner.correct(problem.apply(v, load, constraints.released))
+            unknowns = self.gather(own - off)
+            v = constraints.evaluate(unknowns)
+            size = size_residual(scale, unknowns)
+            residual = problem.measure(left) / size
+            if residual <= tolerance:  # what is said of the solution is measured on it
+                residual = problem.measure(problem.apply(v, load, constraints.released)) / size
+            self._left.setArray(own - off)
+            solved = residual <= tolerance
+            widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
+            if solved:
+                self.solution = unknowns
+                return Solved(unknowns, v, residual, linear_iterations=count)
+            # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
+            if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or not residual < 0.1 * before):
+                break
+            if widened:
+                self.preconditioner.update(constraints)
+                self._solver.getPC().setUp()
+        singular = int(add_up(problem.comm, np.array([float(self.preconditioner.singular)]))[0])
+        loose = f"; {singular} groups of elements are held by nothing near to them" if singular else ""
+        raise ConvergenceError(
+            "linear solver",
+            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"
+            + (f"; the option ksp_rtol = {self._tolerance:g} lets it end there"
+               if self._tolerance > SAFETY * tolerance else '; try operator = "dense"'),
+        )
+
+    def _run_gmres(self) -> None:
+        """Improve the left vector for the right one; whether it is good enough is measured by the callers."""
+        with pass_over_divergence():
+            self._solver.solve(self._right, self._left)
+
+    def _widen(self) -> bool:
+        """Let the groups of the preconditioner take in more around them; whether there was more to take."""
+        wider = self.widening * WIDENING
+        if wider > MOST_WIDENING:
+            return False
+        groups = self._widen_groups(wider)
+        before = sum(len(inverse.around) for inverse in self.preconditioner.inverses)
+        more = 2 * (self.problem.mesh.order + 1) * sum(len(group.around) for group in groups) > before
+        if not add_up(self.problem.comm, np.array([float(more)]))[0]:
+            return False
+        self.widening = wider
+        self.preconditioner.regroup(groups)
+        return True
+
+    def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+        """See AnyTangent; every solution is checked."""
+        return solved
+
+    def respond(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
+    ) -> Real:
+        """See AnyTangent; to RESPONSE of the forces only, as the modes that follow are judged by a full solution.
+
+        Of cracks that meet, where the pairs are many, with the elements near to them alone.
+        """
+        self.constraints = constraints
+        if self.settling.nearby and len(pairs) > MOST_ASKED:
+            return respond_nearby(self.problem, self.preconditioner, constraints, load, law, pairs, directions)
+        states, unknowns = select_states(self.problem, load, law, pairs, directions)
+        result = np.empty((len(unknowns), len(unknowns)))
+        usual = self._solver.getTolerances()
+        self._solver.setTolerances(rtol=RESPONSE)
+        for k in range(states.shape[1]):
+            self._right.setArray(-self._apply(np.asarray(states[:, k])))
+            self._left.set(0.0)
+            self._run_gmres()
+            result[:, k] = self.gather(np.array(self._left.getArray()))[unknowns]
+        self._solver.setTolerances(rtol=usual[0])
+        return result
+
+    def sweep(
+        self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
+        solved: Solved, judge: Judge,
+    ) -> ModeState:
+        """See AnyTangent; the next solution begins from the states that go with the modes."""
+        if self._sweeps is None:
+            self._sweeps = Sweeps(self.problem, self.preconditioner, self._groups, load)
+        settled, self.expected = self._sweeps.settle(constraints, modes, memory, load, law, solved, judge)
+        return settled
+
+    def _carry_over(self, law: Linearisation | None) -> Real | None:
+        """The last solution, or the states expected of the pairs, in the present unknowns; None if there is none."""
+        if self.solution is None or law is None or self.law is None:
+            return self.solution
+        slot = self.problem.mesh.pairs.slot
+        carried = self.solution.reshape(-1, 2).copy()
+        state = np.einsum("mij,mj->mi", self.law.tangent, carried[slot]) + self.law.offset
+        if self.expected is not None:
+            state = np.where(self.problem.laws.follows[:, None], state, self.expected)
+            self.expected = None
+        carried[slot] = carry_over(state, law, self.problem.traction_scale)
+        return carried.ravel()
+
+    def _guess(self, right: Real, begin: Real | None) -> Real:
+        """This rank's part of that multiple of an approximate solution whose product is nearest to the right-hand side.
+
+        Other loads or modes can make it much worse than none.
+        """
+        problem, rows = self.problem, self.problem.system.nodes
+        if begin is None:
+            return np.zeros(2 * len(rows))
+        product = self.multiply(begin)
+        sums = add_up(problem.comm, np.array([product @ right, product @ product]))
+        factor = sums[0] / sums[1] if sums[1] > 0 else 0.0
+        return np.ascontiguousarray(factor * begin.reshape(-1, 2)[rows].ravel())
+
+    def gather(self, part: Real) -> Real:
+        """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""
+        whole = np.empty(self.problem.unknowns)
+        whole[self._order] = gather_parts(self.problem.comm, part)
+        return whole
+
+    def multiply(self, unknowns: Real) -> Real:
+        """This rank's rows of B M x."""
+        assert self.constraints is not None
+        return self._apply(self.constraints.matrix @ unknowns)
+
+    def _apply(self, v: Real) -> Real:
+        """This rank's rows of B v, without the anchors that do not act."""
+        assert self.constraints is not None
+        return self.problem.system.apply(v) - self.problem.find_released(v, self.constraints.released)
+
+    def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
+        """See AnyTangent; without the anchors that the constraint map releases."""
+        self.constraints = constraints
+        self._solver.setTolerances(rtol=self._tolerance)
+        self._left.set(0.0)
+        self._right.setArray(forces)
+        self._run_gmres()
+        return self.gather(np.array(self._left.getArray()))
+
+    def destroy(self) -> None:
+        for item in (self._solver, self._matrix, self._right, self._left):
+            item.destroy()
+
+
+def _choose_options() -> dict[str, str]:
+    """Options of PETSc's that have no function of their own, unless the user says otherwise.
+
+    GMRES orthogonalises its vectors twice: with traction equations on graded meshes rows differ so much in size that
+    once is not enough, and it stagnates.
+    """
+    name = "ksp_gmres_cgs_refinement_type"
+    return {} if PETSc.Options().hasName(PREFIX + name) else {name: "refine_always"}
+
+
+class _Product:
+    """What PETSc asks of a matrix that is not stored."""
+
+    def __init__(self, tangent: KrylovTangent) -> None:
+        self._tangent = tangent
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray(readonly=True)))))
+
+
+class _Preconditioning:
+    """What PETSc asks of a preconditioner of ours."""
+
+    def __init__(self, tangent: KrylovTangent) -> None:
+        self._tangent = tangent
+
+    def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        result = np.zeros(x.getLocalSize())
+        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray(readonly=True))), result)
+        y.setArray(result)
+
+
+def _find_order(problem: Problem) -> Integer:
+    """Unknowns of all ranks, one rank after the other."""
+    own = problem.system.nodes.astype(float)
+    nodes = gather_parts(problem.comm, own).astype(np.int64)
+    return number_components(nodes)

@@ -1,0 +1,208 @@
+"""A reference operator K0 = B M0 of one constraint map: formed by rows, factorised, and solved with.
+
+Unknowns of crack pairs can be eliminated first. In stick such a pair's unknowns are its tractions, which appear in the
+pair's own two equations only, by the free term (nothing of them is stored in the operator, as those of both faces
+cancel): with f for all other unknowns and equations, and c for these,
+
+    K0 = [ A_ff   0 ]       x_f = A_ff^-1 r_f,    x_c = D^-1 (r_c - A_cf x_f),     D of 2 x 2 blocks,
+         [ A_cf   D ]
+
+so that the factors are those of the body without its cracks, whatever becomes of their modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from pbem.arrays import Integer, Real
+from pbem.bem.operator import Block, RowOperator
+from pbem.parallel import gather_parts
+from pbem.solve.petsc.linear import LinearSolver, choose_method
+from pbem.solve.problem.problem import Problem
+
+# Columns that are formed at a time: little beside the matrix, much beside the cost of a call.
+COLUMNS_AT_ONCE = 512
+
+
+def form_columns(
+    operator: RowOperator, block: Block, constraints: sparse.csr_matrix, columns: Integer, wanted: Integer
+) -> Real:
+    """Some of a block's rows of B M, dense (wanted, columns), in some columns of the constraint map M.
+
+    wanted: positions in block.rows, rising. Most columns of M have one or two entries: the products are those of single
+    columns of B, taking one entry of every column of M at a time.
+    """
+    chosen = constraints[:, columns].tocsc()
+    stored = chosen[block.columns].tocsc()
+    counts = np.diff(stored.indptr)
+    rows = take_rows(block.matrix, wanted)
+    values = np.empty((len(wanted), len(columns)))
+    if not counts.all():
+        values.fill(0.0)
+    for depth in range(int(counts.max(initial=0))):
+        of = np.flatnonzero(counts > depth)
+        at = stored.indptr[of] + depth
+        if depth == 0 and len(of) == len(columns):
+            # The indices are right: numpy need not keep a copy in case they are not.
+            np.take(rows, stored.indices[at], axis=1, out=values, mode="clip")
+            values *= stored.data[at]
+        else:
+            values[:, of] += np.take(rows, stored.indices[at], axis=1) * stored.data[at]
+    free = (operator.free[block.rows[wanted]] @ chosen).tocoo()
+    values[free.row, free.col] += free.data
+    return values
+
+
+def apply_narrow(operator: RowOperator, v: Real) -> Real:
+    """This rank's rows of B v, as operator.apply, for a v (4 nodes,) of few entries that lie near to each other."""
+    result: Real = operator.free @ v
+    for block in operator.blocks:
+        at = np.flatnonzero(v[block.columns])
+        if len(at):
+            span = slice(int(at[0]), int(at[-1]) + 1)
+            result[block.rows] += block.matrix[:, span] @ v[block.columns[span]]
+    return result
+
+
+def take_rows(matrix: Real, rows: Integer) -> Real:
+    """Some rows, rising; without a copy if they are neighbours."""
+    if len(rows) and rows[-1] - rows[0] + 1 == len(rows):
+        return matrix[rows[0] : rows[-1] + 1]
+    return matrix[rows]
+
+
+@dataclass(frozen=True)
+class TangentRows:
+    """This rank's rows of B, and for every block the unknowns (rising) on which it depends in any modes."""
+
+    operator: RowOperator
+    block_unknowns: tuple[Integer, ...]
+
+
+class Reference:
+    """Holds the factors of a K0, and the constraint map with which products are taken (`present`).
+
+    rows: of B, and the unknowns on which they can depend. eliminated (k,): crack pairs whose unknowns are eliminated;
+    every M0 holds them in stick without joints.
+    """
+
+    def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer) -> None:
+        self.problem, self.operator, self.block_unknowns = problem, rows.operator, rows.block_unknowns
+        method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
+        nodes = problem.mesh.pairs.slot[eliminated]
+        kept = np.ones(problem.unknowns, dtype=bool)
+        kept.reshape(-1, 2)[nodes] = False
+        self.kept, self.number = kept, np.cumsum(kept) - 1
+        first, last = 2 * self.operator.first_node, 2 * self.operator.last_node
+        self.own = slice(first, last)
+        self.kept_rows = np.flatnonzero(kept[self.own])
+        self.crack_rows = np.flatnonzero(~kept[self.own])
+        self.solver = LinearSolver(problem.comm, method, len(self.kept_rows), int(kept.sum()), self._multiply)
+        self.present: sparse.csr_matrix | None = None
+        self.free_blocks = np.zeros((0, 2, 2))
+
+    @property
+    def rows(self) -> int:
+        """Of this rank, those of eliminated unknowns included."""
+        return self.own.stop - self.own.start
+
+    def form(self, constraints: sparse.csr_matrix) -> None:
+        """Form and factorise K0 for a constraint map M0.
+
+        Raises ConvergenceError ("singular tangent", "linear solver").
+        """
+        self.present = constraints
+        kept = self.kept
+        chosen = [columns[kept[columns]] for columns in self.block_unknowns]
+        wanted = [np.flatnonzero(kept[self.own][block.rows]) for block in self.operator.blocks]
+        if self.solver.method == "lu":
+            self._fill_dense(constraints, wanted)
+        else:
+            self._fill_sparse(constraints, chosen, wanted)
+        self.free_blocks = self._invert_free_blocks(constraints)
+        self.solver.factorise()
+
+    def _fill_dense(self, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
+        """Columns of all rows at a time, as they may have to change ranks."""
+        operator, numbers = self.operator, np.flatnonzero(self.kept)
+        local = np.cumsum(self.kept[self.own]) - 1
+        self.solver.begin_filling()
+        for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
+            columns = numbers[begin : begin + COLUMNS_AT_ONCE]
+            values = np.zeros((len(self.kept_rows), len(columns)))
+            for block, rows in zip(operator.blocks, wanted, strict=True):
+                if len(rows):
+                    part = form_columns(operator, block, constraints, columns, rows)
+                    if len(rows) == len(values):
+                        values = part
+                    else:
+                        values[local[block.rows[rows]]] = part
+            self.solver.fill_columns(begin, values)
+
+    def _fill_sparse(self, constraints: sparse.csr_matrix, chosen: list[Integer], wanted: list[Integer]) -> None:
+        """Dense blocks of the regions."""
+        operator = self.operator
+        inside, outside = np.zeros((2, self.rows), dtype=np.int64)
+        for block, columns in zip(operator.blocks, chosen, strict=True):
+            own = (columns >= self.own.start) & (columns < self.own.stop)
+            inside[block.rows], outside[block.rows] = own.sum(), (~own).sum()
+        self.solver.begin_filling((inside[self.kept_rows], outside[self.kept_rows]))
+        local = np.cumsum(self.kept[self.own]) - 1
+        for block, every, rows in zip(operator.blocks, chosen, wanted, strict=True):
+            for begin in range(0, len(every), COLUMNS_AT_ONCE):
+                columns = every[begin : begin + COLUMNS_AT_ONCE]
+                values = form_columns(operator, block, constraints, columns, rows)
+                self.solver.fill(local[block.rows[rows]], self.number[columns], values)
+
+    def _invert_free_blocks(self, constraints: sparse.csr_matrix) -> Real:
+        """D^-1 (this rank's eliminated pairs, 2, 2)."""
+        terms = (self.operator.free[self.crack_rows] @ constraints[:, self.crack_rows + self.own.start]).tocoo()
+        assert np.array_equal(terms.row // 2, terms.col // 2)
+        blocks = np.zeros((len(self.crack_rows) // 2, 2, 2))
+        blocks[terms.row // 2, terms.row % 2, terms.col % 2] = terms.data
+        return np.linalg.inv(blocks)
+
+    def _multiply(self, part: Real) -> Real:
+        """This rank's part of K x without the eliminated unknowns and equations."""
+        assert self.present is not None
+        unknowns = np.zeros(self.problem.unknowns)
+        unknowns[self.kept] = gather_parts(self.problem.comm, part)
+        result: Real = self.operator.apply(self.present @ unknowns)[self.kept_rows]
+        return result
+
+    def solve(self, rhs: Real, most: int | None = None) -> Real:
+        """This rank's part (rows,) of the solution for its part of the right-hand side, by GMRES with `present`.
+
+        most: iterations. Raises ConvergenceError ("linear solver").
+        """
+        return self._complete(rhs[:, None], self.solver.solve(rhs[self.kept_rows], most)[:, None])[:, 0]
+
+    def solve_columns(self, rhs: Real) -> Real:
+        """This rank's rows (rows, k) of the solutions for many right-hand sides, by the factors alone."""
+        return self._complete(rhs, self.solver.solve_columns(rhs[self.kept_rows]))
+
+    def _complete(self, rhs: Real, kept: Real) -> Real:
+        """Add the eliminated unknowns (rows, k) to the solution for the others (theory, 60)."""
+        if self.kept.all():
+            return kept
+        assert self.present is not None
+        problem = self.problem
+        whole = np.zeros((problem.unknowns, rhs.shape[1]))
+        whole[self.kept] = gather_parts(problem.comm, kept.ravel()).reshape(-1, rhs.shape[1])
+        left = rhs[self.crack_rows]
+        for block in self.operator.blocks:
+            at = np.flatnonzero(~self.kept[self.own][block.rows])
+            if len(at):
+                product = take_rows(block.matrix, at) @ (self.present[block.columns] @ whole)
+                left[np.searchsorted(self.crack_rows, block.rows[at])] -= product
+        result = np.empty((self.rows, rhs.shape[1]))
+        result[self.kept_rows] = kept
+        result[self.crack_rows] = np.matmul(self.free_blocks, left.reshape(-1, 2, rhs.shape[1])).reshape(left.shape)
+        return result
+
+    def destroy(self) -> None:
+        """Free PETSc's storage."""
+        self.solver.destroy()

@@ -1,0 +1,202 @@
+"""Modes of crack networks that agree in every group of neighbouring elements, before the next solution of the whole.
+
+The ends of contact move along a crack, and around the corners of its branches, by few elements in a step of Newton's
+method of the whole model, although nothing far away takes part in that. Here every group settles its own contact, with
+some of its surroundings and with the jumps beyond as they are; of what it finds its own pairs' part is kept. Then one
+product tells all groups the tractions that follow from what the others have found, and they settle again: a non-linear
+Schwarz method (X.-C. Cai, D. E. Keyes, SIAM J. Sci. Comput. 24, 2002). The modes that it ends with are judged by a
+solution of the whole model, which begins from the states that go with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.contact.complementarity import Subset, take_subset
+from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
+from pbem.contact.loads import Load
+from pbem.contact.local_laws import solve_laws
+from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes
+from pbem.parallel import add_up
+from pbem.solve.preconditioner.elimination import take_blocks
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.preconditioner.subdomains import Group, find_nearest
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import Judge, Solved
+
+# The groups of a network are divided into parts of so many elements at most, which settle with the elements nearest to
+# them, so many times as many: what they take grows with the square of these numbers.
+PART_ELEMENTS = 48
+AROUND = 1.0
+# All groups settle so often in turn between two solutions of the whole, each by so many of Newton's steps at most.
+MOST_SWEEPS = 3
+MOST_STEPS = 8
+
+
+# A group whose tractions the others have moved off its laws by less than this part of the largest is left as it is.
+SMALL = 1e-3
+
+
+class Sweeps:
+    """The groups of this rank, and the tractions of all pairs from their jumps.
+
+    All groups take a step of Newton's method at a time. Their pairs (k,), one group after the other, are in `pairs`,
+    most of them in more than one group; owned (k,): those that belong to the group and not to what is around it.
+    Group j has those from first[j] to first[j + 1], and their stiffness (see pbem.contact.local_laws).
+    """
+
+    def __init__(
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Iterable[Group], load: Load
+    ) -> None:
+        self._problem, mesh = problem, problem.mesh
+        self._jumps = _free(problem, ~problem.laws.follows)
+        constraints = problem.constrain(self._jumps, load)
+        closed = problem.constrain(_free(problem, np.zeros(problem.laws.count, dtype=bool)), load)
+        # The tractions of a crack's pair are in its own node's equations alone.
+        own_equations = take_blocks((preconditioner.free @ closed.matrix).tocsr(), mesh.nodes)[mesh.pairs.slot]
+        self._softness = np.linalg.inv(own_equations)
+        self._held = np.flatnonzero(np.isin(mesh.pairs.slot, problem.system.nodes))
+        pair_of_node = np.full(mesh.nodes, -1)
+        pair_of_node[mesh.pairs.slot] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
+        pairs, owned = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=bool)]
+        self._stiffness = []
+        for own, around in _divide(mesh, groups):
+            near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (around, own))
+            if not len(inside):
+                continue
+            formed = preconditioner.form_block(constraints.matrix, around, mesh.pairs.slot[near])
+            formed = self._softness[near] @ formed.reshape(len(near), 2, -1)
+            self._stiffness.append(-formed.reshape(2 * len(near), -1).astype(np.float32))
+            pairs.append(near)
+            owned.append(np.isin(near, inside))
+        self._pairs, self._owned = np.concatenate(pairs), np.concatenate(owned)
+        self._first = np.cumsum([len(each) for each in pairs])
+
+    def settle(
+        self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
+        solved: Solved, judge: Judge,
+    ) -> tuple[ModeState, Real]:
+        """Modes (m,) that follow from a solution in some modes, and the states (m, 4) that go with them.
+
+        All ranks together, the same on all. law, solved: linearised at the modes, and the solution for that.
+        """
+        problem, laws, pairs = self._problem, self._problem.laws, self._pairs
+        subset = take_subset(laws, memory, load.pressure, modes, pairs)
+        state = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
+        values[:, :2] /= problem.traction_scale
+        for sweep in range(MOST_SWEEPS):
+            if sweep:
+                values[:, :2] = self.find_tractions(constraints, load, solved, values[:, 2:])
+            start = replace(subset, modes=ModeState(modes.mode[pairs], modes.sign[pairs]))
+            settled, reached = self._settle_groups(start, values[pairs], judge, sweep > 0)
+            found = np.zeros((len(values), 6))
+            found[pairs[self._owned]] = np.column_stack([settled.mode, settled.sign, reached])[self._owned]
+            found = add_up(problem.comm, found)[laws.leader]
+            before, modes = modes, follow_leaders(laws, ModeState(np.rint(found[:, 0]).astype(np.int8), found[:, 1]))
+            values = found[:, 2:]
+            if modes.fingerprint() == before.fingerprint():
+                break
+        return modes, values * np.array([problem.traction_scale, problem.traction_scale, 1.0, 1.0])
+
+    def _settle_groups(self, subset: Subset, values: Real, judge: Judge, moved: bool) -> tuple[ModeState, Real]:
+        """Modes (k,) and values (k, 4) of the groups' pairs from those before, by Newton's steps in every group.
+
+        moved: whether the values are not those of the modes. Groups that do not come to an end keep what they have.
+        """
+        scale, values = self._problem.traction_scale, values.copy()
+        mode, sign = subset.modes.mode.copy(), subset.modes.sign.copy()
+        groups = np.arange(len(self._stiffness))
+        for taken in range(MOST_STEPS + 1):
+            if not len(groups):
+                break
+            at = np.concatenate([np.arange(*self._first[group : group + 2]) for group in groups])
+            first = np.concatenate([[0], np.cumsum(self._first[groups + 1] - self._first[groups])])
+            part = take_subset(subset.laws, subset.memory, subset.pressure, ModeState(mode, sign), at)
+            if taken or moved:
+                values[at] = self._solve_groups(part, groups, first, values[at], 0.0 if taken else SMALL)
+            if taken == MOST_STEPS:
+                break
+            proposal = judge(part.laws, part.modes, _name_state(values[at], scale), part.memory, part.pressure)
+            mode[at], sign[at] = proposal.modes.mode, proposal.modes.sign
+            groups = groups[np.logical_or.reduceat(proposal.changed, first[:-1])]
+        return ModeState(mode, sign), values
+
+    def _solve_groups(self, part: Subset, groups: Integer, first: Integer, values: Real, least: float) -> Real:
+        """The values of the pairs of some groups in their modes; as they were where there are none. least: what counts.
+        """
+        scale, result = self._problem.traction_scale, values.copy()
+        state = _name_state(values, scale)
+        slip = plastic_slip(part.laws, state)
+        law = linearise(part.laws, part.modes, state.p_n, slip, part.memory, part.pressure, scale)
+        for k, group in enumerate(groups):
+            own = slice(first[k], first[k + 1])
+            found = solve_laws(law.tangent[own], law.offset[own], self._stiffness[group], values[own], scale, least)
+            if found is not None:
+                result[own] = found
+        return result
+
+    def find_tractions(self, constraints: ConstraintMap, load: Load, solved: Solved, jumps: Real) -> Real:
+        """Tractions (m, 2) of all pairs, in units of the traction scale, from their jumps (m, 2); all ranks together.
+
+        Outer boundaries are as in the solution.
+        """
+        problem, mesh = self._problem, self._problem.mesh
+        unknowns = solved.unknowns.reshape(-1, 2).copy()
+        unknowns[mesh.pairs.slot] = np.where(problem.laws.follows[:, None], 0.0, jumps)
+        v = problem.constrain(self._jumps, load).evaluate(unknowns.ravel())
+        equations = problem.apply(v, load, constraints.released).reshape(-1, 2)
+        place = np.searchsorted(problem.system.nodes, mesh.pairs.slot[self._held])
+        result = np.zeros((mesh.pairs.count, 2))
+        result[self._held] = -(self._softness[self._held] @ equations[place][..., None])[..., 0]
+        return add_up(problem.comm, result)
+
+
+def _divide(mesh: Mesh, groups: Iterable[Group]) -> Iterator[tuple[Integer, Integer]]:
+    """The elements of parts of the groups, and those with the elements around them, each rising."""
+    middle = 0.5 * (mesh.start + mesh.end)
+    tree = cKDTree(np.column_stack([middle.real, middle.imag]))
+    for group in groups:
+        if not len(group.nearest):
+            yield group.elements, group.around
+            continue
+        for part in _halve(middle, group.elements):
+            yield part, np.union1d(part, find_nearest(mesh, part, tree, int(AROUND * len(part))))
+
+
+def _halve(middle: Complex, elements: Integer) -> Iterator[Integer]:
+    """Elements by place in parts of at most PART_ELEMENTS, each rising."""
+    if len(elements) <= PART_ELEMENTS:
+        yield elements
+        return
+    at = middle[elements]
+    along = at.real if np.ptp(at.real) >= np.ptp(at.imag) else at.imag
+    order = np.argsort(along, kind="stable")
+    for half in (order[: len(order) // 2], order[len(order) // 2 :]):
+        yield from _halve(middle, np.sort(elements[half]))
+
+
+def _find_pairs(mesh: Mesh, pair_of_node: Integer, elements: Integer) -> Integer:
+    """The pairs on elements that have a mode of their own, rising."""
+    pairs = pair_of_node[list_nodes(mesh, elements)]
+    return np.sort(pairs[pairs >= 0])
+
+
+def _free(problem: Problem, jumps: Bool) -> Linearisation:
+    """The law of pairs that are free to have any jumps, without tractions, where jumps (m,); else any tractions."""
+    tangent = np.zeros((problem.laws.count, 4, 2))
+    tangent[jumps, G_N, 0] = tangent[jumps, G_S, 1] = 1.0
+    tangent[~jumps, P_N, 0] = tangent[~jumps, P_S, 1] = problem.traction_scale
+    return Linearisation(tangent, np.zeros((problem.laws.count, 4)), problem.laws.leader)
+
+
+def _name_state(values: Real, scale: float) -> PairState:
+    return PairState(values[:, 0] * scale, values[:, 1] * scale, values[:, 2], values[:, 3])

@@ -17,8 +17,9 @@ if .venv/bin/python -c 'import sys, numpy; sys.exit(numpy.__version__ >= "2")'; 
 else
     echo "mypy: left out. NumPy 2 describes arrays by their number of axes, the code does not; types are checked with NumPy 1."
 fi
-# One thread for each process: those of BLAS would wait for each other on cores that other processes use.
-export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
 workers=$(nproc)
+# One thread for each process: those of BLAS would wait for each other on cores that other processes use. (After nproc,
+# which counts no more than that.)
+export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
 check .venv/bin/python -m pytest -n $((workers < 4 ? workers : 4)) --dist loadfile "$@"
 exit "$failure"

@@ -28,7 +28,7 @@ from bench_field import make_field
 from pbem import driver
 from pbem.model import build
 from pbem.solve.nonlinear import hold
-from pbem.solve.problem.problem import problem
+from pbem.solve.problem import problem
 from pbem.solve.steps import march
 
 MOST = 0.03

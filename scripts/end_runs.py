@@ -42,7 +42,7 @@ from pbem.cli import main
 from pbem.parallel import world
 from pbem.results import journal
 from pbem.solve.system import assembly
-from pbem.solve.problem.problem import problem
+from pbem.solve.problem import problem
 
 phase, end, rank, *arguments = sys.argv[1:]
 rank, calls, processes = int(rank), 0, world.allgather(os.getpid())

@@ -11,7 +11,7 @@ import pytest
 import pbem
 from pbem.results.reader import Results
 from pbem.solve.preconditioner import subdomains as groups
-from pbem.solve.problem.tangent import krylov
+from pbem.solve.tangent import krylov
 from tests.cases.bundled import CASES, Solve
 from tests.cases.conditions import find_faults
 from tests.cases.expectations import check_expectation, parse_expectations

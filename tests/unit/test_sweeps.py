@@ -19,9 +19,9 @@ from pbem.solve.nonlinear.search import SWEPT, Search
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import SilentReporter, Step
-from pbem.solve.problem.tangent import sweeps
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent import sweeps
 from pbem.solve.tangent.krylov import KrylovTangent
 from pbem.solve.tangent.sweeps import Sweeps
 from tests.identities.solving import linearise_pairs

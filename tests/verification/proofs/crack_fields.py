@@ -13,7 +13,7 @@ from pbem.case.build import parse_model
 from pbem.contact import laws
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import search
-from pbem.solve.problem.problem import tangent
+from pbem.solve.problem import tangent
 from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState
 from tests.verification.proofs.proof import (
     Outcome,

@@ -29,7 +29,7 @@ from pbem import driver
 from pbem.model import build
 from pbem.solve.nonlinear import hold
 from pbem.solve.problem import problem
-from pbem.solve.steps import march
+from pbem.solve.steps import recovery, step_notes
 
 MOST = 0.03
 # Of the model, when it is read; and after each step.
@@ -39,10 +39,12 @@ CHECKS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "free motions": (build, ("_check_support",)),
     "parts": (problem, ("find_parts",)),
     "support": (problem.Problem, ("find_support",)),
-    "balance": (march, ("measure_balance", "describe_imbalance")),
+    "balance": (recovery, ("measure_balance",)),
+    "balance, told": (step_notes, ("describe_imbalance",)),
     "balance, anchors": (hold, ("measure_balance",)),
-    "linearity": (march, ("measure_linearity", "measure_excess", "describe_nonlinearity")),
-    "passing": (march, ("find_passing",)),
+    "linearity": (recovery, ("measure_linearity",)),
+    "linearity, told": (step_notes, ("measure_excess", "describe_nonlinearity")),
+    "passing": (step_notes, ("find_passing",)),
 }  # fmt: skip
 ESTIMATE: dict[str, tuple[Any, tuple[str, ...]]] = {
     "second solution": (driver, ("make_estimator",)),

@@ -41,7 +41,7 @@ import errno, os, resource, signal, sys, time
 from pbem.cli import main
 from pbem.parallel import world
 from pbem.results import journal
-from pbem.solve.system import assembly
+from pbem.solve.system import dense
 from pbem.solve.problem import problem
 
 phase, end, rank, *arguments = sys.argv[1:]
@@ -86,7 +86,7 @@ def watched(action, due):
 
 whole_write = os.pwrite
 if phase == "assembling":
-    assembly.assemble_rows = watched(assembly.assemble_rows, 1)
+    dense.assemble_rows = watched(dense.assemble_rows, 1)
 elif phase == "iterating":
     problem.Problem.apply = watched(problem.Problem.apply, 20)
 elif world.rank == 0:

@@ -149,26 +149,26 @@ def test_a_search_is_stuck_where_no_fewer_pairs_change_for_long() -> None:
 
 def test_the_full_tangent_waits_until_friction_that_changes_with_slip_is_near_its_law() -> None:
     for varying, law_error, level in ((True, 0.3, 2), (True, 0.01, 0), (False, 0.3, 0)):
-        search = Search(50, varying=varying)
+        search = Search(50, varying=varying, wary=True)
         assert search.descend() and search.descend()
         search.note(propose([]), law_error)
         assert search.level == level
 
 
 def test_pairs_that_pivoting_is_not_made_for_are_met_with_caution_once_their_number_does_not_fall() -> None:
-    search = Search(50, excluded=np.arange(COUNT) < 60, varying=True)
+    search = Search(50, excluded=np.arange(COUNT) < 60, varying=True, wary=True)
     follow(search, *(list(range(count)) for count in (40, 20, 9, 15, 30, 12)))
     assert search.level == 0
     follow(search, list(range(10)))
     assert search.level == 1
     # Not where those that can be pivoted are as many, nor with laws that are linear in each mode.
-    for other in (Search(50, excluded=np.arange(COUNT) < 4, varying=True), Search(50, excluded=np.arange(COUNT) < 60)):
+    for other in (Search(50, excluded=np.arange(COUNT) < 4, varying=True, wary=True), Search(50, excluded=np.arange(COUNT) < 60)):
         follow(other, *(list(range(count)) for count in (40, 20, 9, 15, 30, 12, 10)))
         assert other.level == 0
 
 
 def test_a_full_tangent_that_leads_away_gives_way_to_the_frozen_bound_until_that_is_nearer() -> None:
-    search = Search(50, varying=True)
+    search = Search(50, varying=True, wary=True)
     search.descend()
     search.note(propose([]), 0.01)
     assert (search.level, search.just_returned) == (0, True)

@@ -61,6 +61,8 @@ STRAIN_FLOOR = 0.1
 
 # After so many iterations, and so many more, it is asked whether anything could balance the loads.
 PATIENCE = 8
+# Ends of a search that another one may not have.
+UNSETTLED = ("iteration limit", "mode cycle")
 
 
 def solve_step(
@@ -80,33 +82,28 @@ def solve_step(
     "limit load" in a march, where nothing can balance the loads with the bonds that are left.
     """
     iterations: list[Iteration] = []
-    if tangent.settling.nearby and not is_one_group(problem.mesh) and find_linear(problem.laws).all():
-        search = _make_search(problem, tangent, True)
+    *first, last = _list_searches(problem, tangent)
+    for search in first:
         try:
             return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
-        except ConvergenceError:
-            if not search.swept:
+        except ConvergenceError as error:
+            if not (search.swept or (search.varying and error.reason in UNSETTLED)):
                 raise
-    search = _make_search(problem, tangent, False)
-    search.wary = False
-    try:
-        return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
-    except ConvergenceError as error:
-        if not search.varying or error.reason not in ("iteration limit", "mode cycle"):
-            raise
-    search = _make_search(problem, tangent, False)  # wary of friction that changes with slip
-    return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+    return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, last, iterations)
 
 
-def _make_search(problem: Problem, tangent: AnyTangent, sweeps: bool) -> Search:
-    settling = tangent.settling
+def _list_searches(problem: Problem, tangent: AnyTangent) -> list[Search]:
+    """The searches of one step, one after the other where the former does not settle."""
+    settling, linear = tangent.settling, find_linear(problem.laws)
+    sweeps = settling.nearby and not is_one_group(problem.mesh) and bool(linear.all())
+    interface = problem.mesh.pairs.interface if settling.with_neighbours else None
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
-    # is followed by Newton's steps with the bound of the last iteration.
-    linear = find_linear(problem.laws)
-    return Search(
-        settling.most_pairs, problem.mesh.pairs.interface if settling.with_neighbours else None,
-        problem.laws.follows | ~linear, varying=not bool(linear.all()), sweeps=sweeps,
-    )
+    # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
+    varying, excluded = not bool(linear.all()), problem.laws.follows | ~linear
+    return [
+        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary)
+        for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
+    ]
 
 
 def _search_modes(

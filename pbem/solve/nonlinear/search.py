@@ -79,17 +79,18 @@ class Search:
     it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
     has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
     is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
-    groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps).
+    groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps). wary: whether changes that
+    stall, and a full tangent that leads away, are met with caution where friction changes with slip.
     """
 
     def __init__(
         self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
-        varying: bool = False, sweeps: bool = False,
+        varying: bool = False, sweeps: bool = False, wary: bool = False,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept = sweeps, False
-        self.wary = True  # whether changes that stall, and a full tangent that leads away, are met with caution
+        self.wary = wary
         self.restart()
 
     def restart(self) -> None:

@@ -6,9 +6,10 @@ import math
 import sys
 from typing import Any, TextIO
 
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.errors import printable
 from pbem.model.model import Model, Stage
-from pbem.solve.problem.step import OPEN, SLIP, STICK, Iteration, Reporter, SilentReporter, Step
+from pbem.solve.problem.step import Iteration, Reporter, SilentReporter, Step
 
 
 class Plan:

@@ -20,6 +20,7 @@ from scipy import sparse
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import number_components
 from pbem.model.material import Material
 
 # Scratch memory of one call of the kernels, in bytes: about that of the caches.
@@ -111,7 +112,7 @@ def assemble_rows(
             traction = bool(mesh.traction_equation[part[0]])
             values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction, scratch)
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
-        rows = (2 * (own - first_node)[:, None] + np.arange(2)).ravel()
+        rows = number_components(own - first_node)
         blocks.append(Block(int(region), rows, columns, matrix))
     return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
 
@@ -131,7 +132,7 @@ def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes:
         scratch = _allocate_scratch(sources[region])
         for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), scratch):
             matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False, scratch)
-        blocks.append(Block(int(region), (2 * at[:, None] + np.arange(2)).ravel(), columns, matrix))
+        blocks.append(Block(int(region), number_components(at), columns, matrix))
     return blocks
 
 
@@ -145,10 +146,10 @@ def add_anchor(
     (theory, 61)
     """
     own = (nodes >= operator.first_node) & (nodes < operator.last_node)
-    columns = (2 * nodes[:, None] + np.arange(2)).ravel()
+    columns = number_components(nodes)
     values = np.stack([functional.real, functional.imag], axis=1).ravel()
     added = np.stack([pattern.real, pattern.imag], axis=1)[own].ravel()
-    rows = (2 * (nodes[own] - operator.first_node)[:, None] + np.arange(2)).ravel()
+    rows = number_components(nodes[own] - operator.first_node)
     for block in operator.blocks:
         if block.region == region:
             at = np.searchsorted(block.columns, columns)
@@ -208,7 +209,7 @@ def _list_chunks(nodes: Integer, traction: Bool, scratch: tuple[Real, Real]) -> 
         at = np.flatnonzero(traction[nodes] == kind)
         for begin in range(0, len(at), most):
             part = at[begin : begin + most]
-            chunks.append((nodes[part], (2 * part[:, None] + np.arange(2)).ravel()))
+            chunks.append((nodes[part], number_components(part)))
     return chunks
 
 

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from pbem.bem.operator_choice import choose_operator
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.description.generation import Group
 from pbem.geometry.curve import Curve
 from pbem.mesh.mesh import Mesh
@@ -16,7 +17,6 @@ from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
 from pbem.results.tip_notes import compare_release, explain_missing_factors
-from pbem.solve.problem.step import OPEN, SLIP, STICK
 
 MOST_ROWS = 40
 MOST_TIPS = 10

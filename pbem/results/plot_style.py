@@ -11,9 +11,9 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.description.generation import Group
 from pbem.results.reader import Results
-from pbem.solve.problem.step import OPEN, SLIP, STICK
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.contact.laws import SLIP
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.solve.estimate.beside import Beside
-from pbem.solve.problem.step import SLIP, ContactState
+from pbem.solve.problem.step import ContactState
 
 # The error of the second solution's tractions over that of the run, less one, on the elements beside an end. Of a root
 # that begins where two elements meet the mean error falls with the length (2 - 1). Within an element it depends on

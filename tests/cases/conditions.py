@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.solve.problem.step import OPEN, SLIP, STICK
+from pbem.contact.laws import OPEN, SLIP, STICK
 
 # Of the largest length or traction of the interface: rounding, times the condition of the equations.
 ROUNDING = 1e-9

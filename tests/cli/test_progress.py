@@ -7,8 +7,9 @@ import io
 import numpy as np
 import pytest
 
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.progress import BarReporter, LogReporter, make_reporter
-from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState, Iteration, Reporter, SilentReporter, Step
+from pbem.solve.problem.step import ContactState, Iteration, Reporter, SilentReporter, Step
 from tests.unit.results_sample import make_model
 
 # Stages "press" of 2 and "shear" of 4 steps.

@@ -10,10 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.rows import Sources, evaluate_rows
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.shapes import place_nodes
 from pbem.model.material import Material
-from pbem.solve.problem.step import OPEN, SLIP, STICK, Step
+from pbem.solve.problem.step import Step
 from tests.identities.bodies import Body
 from tests.identities.solving import march_to_end
 

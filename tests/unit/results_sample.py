@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
@@ -23,7 +24,7 @@ from pbem.model.model import (
     SolverOptions,
     Stage,
 )
-from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState, Iteration, Step
+from pbem.solve.problem.step import ContactState, Iteration, Step
 
 SOURCE = 'title = "Made-up blocks"\n'
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
+from pbem.contact.laws import SLIP
 from pbem.mesh.generate import generate_mesh
 from pbem.results.between import BetweenNodes
-from pbem.solve.problem.step import SLIP, ContactState, Step
+from pbem.solve.problem.step import ContactState, Step
 from tests.cli.cli_sample import BLOCKS
 
 

@@ -10,6 +10,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from pbem.contact.laws import OPEN
 from pbem.mesh.mesh import second_face_nodes
 from pbem.model.model import Condition, Model
 from pbem.results.model_plot import draw_model
@@ -18,7 +19,6 @@ from pbem.results.plot_style import FORCE, MODES, MOTION, label
 from pbem.results.plots import choose_magnification, draw_results, plot_model, plot_results
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.problem.step import OPEN
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 from tests.verification.planes import make_plane, make_straight, solve
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from pbem.bem.operator_choice import estimate_dense_memory
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.model.model import Condition
 from pbem.results.describe import describe_model, describe_results
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.problem.step import OPEN, SLIP, STICK
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 
 MODEL = make_model()

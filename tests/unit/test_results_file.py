@@ -12,13 +12,13 @@ import h5py
 import numpy as np
 import pytest
 
+from pbem.contact.laws import OPEN
 from pbem.errors import ConvergenceError, ResultFileError, StopError
 from pbem.mesh.mesh import list_faces
 from pbem.results.output import check_output_path
 from pbem.results.reader import open_results
 from pbem.results.tips import collect_tip_rules
 from pbem.results.writer import ResultWriter
-from pbem.solve.problem.step import OPEN
 from tests.unit.results_sample import SOURCE, make_mesh, make_model, make_steps
 
 MODEL = make_model()

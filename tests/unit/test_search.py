@@ -162,7 +162,8 @@ def test_pairs_that_pivoting_is_not_made_for_are_met_with_caution_once_their_num
     follow(search, list(range(10)))
     assert search.level == 1
     # Not where those that can be pivoted are as many, nor with laws that are linear in each mode.
-    for other in (Search(50, excluded=np.arange(COUNT) < 4, varying=True, wary=True), Search(50, excluded=np.arange(COUNT) < 60)):
+    few = Search(50, excluded=np.arange(COUNT) < 4, varying=True, wary=True)
+    for other in (few, Search(50, excluded=np.arange(COUNT) < 60)):
         follow(other, *(list(range(count)) for count in (40, 20, 9, 15, 30, 12, 10)))
         assert other.level == 0
 

@@ -9,7 +9,7 @@ import pytest
 
 import pbem
 from pbem.case.build import parse_model
-from pbem.contact.laws import ModeState
+from pbem.contact.laws import OPEN, ModeState
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
@@ -17,7 +17,7 @@ from pbem.results.reader import Results
 from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.imbalance import describe_imbalance
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.step import OPEN, SilentReporter
+from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
+from pbem.contact.laws import SLIP, STICK
 from pbem.model.model import Model
-from pbem.solve.problem.step import SLIP, STICK
 from tests.verification.proofs.proof import Complex, Solved, line, solve_model, write_case
 
 SCHEMES = ["SST", "DBEM", "HST", "THST"]

@@ -13,12 +13,13 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.case.build import parse_model
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.exact import PlaneField, uniform_field
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.material import Material
 from pbem.parallel import world
-from pbem.solve.problem.step import OPEN, SLIP, STICK, SilentReporter, Step
+from pbem.solve.problem.step import SilentReporter, Step
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 from tests.identities.bodies import Body

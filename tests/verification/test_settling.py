@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState, SilentReporter, Step
+from pbem.solve.problem.step import ContactState, SilentReporter, Step
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 from tests.verification.proofs.crack_fields import scatter_cracks

@@ -22,6 +22,7 @@ from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, update_active_set
 from pbem.contact.subset import settle_subset
+from pbem.mesh.numbering import number_components
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
 from pbem.solve.problem.tangent import AnyTangent, Solved
@@ -100,7 +101,7 @@ def _settle(
     """Modes and states of all pairs while the intact ones stick: of those that are lost by Newton's steps among them
     alone, by pivoting where these do not end."""
     lost = np.flatnonzero(subset.memory.broken)
-    columns = (2 * lost[:, None] + np.arange(2)).ravel()
+    columns = number_components(lost)
     part = replace(response, values=response.values[lost], change=response.change[lost][:, :, columns])
     own = take_subset(subset.laws, subset.memory, subset.pressure, subset.modes, lost)
 

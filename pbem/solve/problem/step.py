@@ -13,8 +13,6 @@ from pbem.arrays import Bool, Complex, Real
 from pbem.contact.declaration import BROKEN, SLIP_PATH
 from pbem.model.model import Model
 
-STICK, SLIP, OPEN = 0, 1, 2
-
 
 @dataclass(frozen=True)
 class Iteration:

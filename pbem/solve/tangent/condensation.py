@@ -90,13 +90,13 @@ def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
     """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k, c) for each of c solutions (theory, 59)."""
     count = len(split.a_offset)
     varied = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)) | (split.b_offset != 0).any(axis=1))
-    active = (2 * varied[:, None] + np.arange(2)).ravel()
+    active = number_components(varied)
     rhs = given - (split.a_offset.ravel() + coupling[:, active] @ split.b_offset[varied].ravel())[:, None]
     unknowns, rcond, residual = np.zeros(given.shape), 1.0, 0.0
     rest = np.ones(2 * count, dtype=bool)
     if len(active):
         changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
-        own = (2 * changed[:, None] + np.arange(2)).ravel()
+        own = number_components(changed)
         first, second = coupling[:, own[::2]], coupling[:, own[1::2]]
         effect = np.empty((2 * count, len(own)))
         for j in range(2):

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
+from pbem.mesh.numbering import number_components
 from pbem.parallel import gather_rows
 from pbem.solve.tangent.reference import Reference, apply_narrow, form_columns
 
@@ -71,5 +72,5 @@ def start_columns(reference: Reference, states: sparse.csr_matrix, unknowns: Int
 
 
 def _pair_up(pairs: Integer) -> Integer:
-    result: Integer = (2 * pairs[:, None] + np.arange(2)).ravel()
+    result: Integer = number_components(pairs)
     return result

@@ -8,8 +8,8 @@ from functools import partial
 
 import numpy as np
 
+from pbem.contact.laws import OPEN, STICK
 from pbem.exact import closed_crack
-from pbem.solve.problem.step import OPEN, STICK
 from tests.verification.proofs.cracks import ROCK, TADA
 from tests.verification.proofs.proof import Outcome, Proof, Solved, largest_error, line, solve_case
 

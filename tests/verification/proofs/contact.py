@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.errors import ConvergenceError
-from pbem.solve.problem.step import OPEN, SLIP, STICK
 from tests.verification.proofs.blocks import list_block
 from tests.verification.proofs.proof import Outcome, Proof, Solved, Table, largest_error, line, solve_case
 

@@ -11,10 +11,11 @@ import numpy as np
 
 from pbem.case.build import parse_model
 from pbem.contact import laws
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import search
 from pbem.solve.problem import tangent
-from pbem.solve.problem.step import OPEN, SLIP, STICK, ContactState
+from pbem.solve.problem.step import ContactState
 from tests.verification.proofs.proof import (
     Outcome,
     Proof,

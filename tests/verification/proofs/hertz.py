@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pbem.solve.problem.step import OPEN
+from pbem.contact.laws import OPEN
 from tests.verification.proofs.blocks import list_block, stack_blocks
 from tests.verification.proofs.proof import Outcome, Proof, Solved, largest_error, solve_case
 

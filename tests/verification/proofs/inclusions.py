@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from pbem.contact.laws import OPEN
 from pbem.exact import kirsch_field
 from pbem.model.material import Material
-from pbem.solve.problem.step import OPEN
 from tests.verification.proofs.proof import Complex, Outcome, Proof, Solved, Table, largest_error, line, solve_case
 
 ROCK = Material("rock", 1e3, 0.2)

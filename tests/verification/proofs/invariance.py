@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.mesh.mesh import list_faces
 from pbem.results.reader import open_results
-from pbem.solve.problem.step import OPEN, SLIP, STICK
 from tests.parallel.launch import launch
 from tests.verification.proofs.proof import Complex, Outcome, Proof, Real, Solved, solve_case, write_case
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pbem.solve.problem.step import OPEN, SLIP, STICK
+from pbem.contact.laws import OPEN, SLIP, STICK
 from tests.verification.proofs.proof import Outcome, Proof, Solved, largest_error, solve_text
 
 CASE = Path(__file__).resolve().parents[3] / "cases" / "layers_pull_stiff.toml"

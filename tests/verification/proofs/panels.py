@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pbem.contact.laws import SLIP
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
-from pbem.solve.problem.step import SLIP
 from tests.verification.proofs.proof import Outcome, Proof, Real, Solved, largest_error, solve_text
 
 CASES = Path(__file__).resolve().parents[3] / "cases"

@@ -19,7 +19,7 @@ from functools import partial
 
 import numpy as np
 
-from pbem.solve.problem.step import SLIP, STICK
+from pbem.contact.laws import SLIP, STICK
 from tests.verification.proofs.proof import (
     Complex,
     Integer,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pbem.solve.problem.step import OPEN, SLIP, STICK
+from pbem.contact.laws import OPEN, SLIP, STICK
 from tests.verification.proofs.blocks import stack_blocks
 from tests.verification.proofs.proof import Outcome, Proof, Real, Solved, solve_case
 

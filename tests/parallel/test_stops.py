@@ -147,6 +147,16 @@ def test_too_little_memory_for_the_first_product_is_told(
     assert done.stderr.count("out of memory") == 1 and "Traceback" not in done.stderr, done.stderr
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_factors_without_memory_stop_the_run(ranks: int, folder: Path) -> None:
+    """MUMPS is allowed one megabyte (its ICNTL(23)); no smaller load step needs less."""
+    arguments = ("run", "layers_push", "-o", "layers.h5", "--quiet", "-pbem_mat_mumps_icntl_23=1")
+    done = launch_snippet(ranks, "import sys; from pbem.cli import main; sys.exit(main())", *arguments, cwd=folder)
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("out of memory (MUMPS has no room") == 1 and "Traceback" not in done.stderr, done.stderr
+    assert open_results(folder / "layers.h5").status == "stopped"
+
+
 class LibraryError(RuntimeError):
     """As PETSc's of a library that it calls."""
 

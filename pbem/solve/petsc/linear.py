@@ -123,7 +123,8 @@ class LinearSolver:
     def factorise(self) -> None:
         """Factorise the filled matrix.
 
-        Raises ConvergenceError ("singular tangent" or "linear solver") on all ranks alike; then there are no factors.
+        Raises ConvergenceError ("singular tangent" or "linear solver") or MemoryError on all ranks alike; then there
+        are no factors.
         """
         assert self.matrix is not None
         self.matrix.assemble()
@@ -303,8 +304,10 @@ class _Product:
         result.setArray(self.multiply(np.array(given.getArray(readonly=True))))
 
 
-def _explain_factors(code: int | None) -> ConvergenceError:
-    if code in MORE_ROOM_HELPS or code in NO_MEMORY:
+def _explain_factors(code: int | None) -> ConvergenceError | MemoryError:
+    if code in NO_MEMORY:  # no smaller step needs less
+        return MemoryError(f"MUMPS has no room for the LU factors, INFOG(1) = {code}")
+    if code in MORE_ROOM_HELPS:
         detail = f"MUMPS has no room for the LU factors (INFOG(1) = {code}); try more memory or fewer elements"
         return ConvergenceError("linear solver", detail)
     return ConvergenceError(

@@ -255,8 +255,8 @@ def _plot(options: argparse.Namespace) -> int:
     target = check_picture_path(options.output or beside)
     step = -1 if options.step is None else results.find_step(options.step)
     if options.mesh:
-        from pbem.results.level_plot import read_refined
         from pbem.results.plots import plot_model
+        from pbem.results.refinement_plot import read_refined
 
         model, mesh, levels = read_refined(results)
         plot_model(model, mesh, target, levels)

@@ -26,8 +26,8 @@ from pbem.results.passes import KeptPass, keep_pass, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
-from pbem.solve.estimate.beside import NOTHING_COARSER, put_beside
-from pbem.solve.estimate.second import SecondSolution
+from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
+from pbem.solve.estimate.second_solution import SecondSolution
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.options import check_options

@@ -38,7 +38,7 @@ CHECKS: dict[str, tuple[Any, tuple[str, ...]]] = {
                          "find_coincidences", "check_closing", "check_tip_elements", "check_turning", "check_facing")),
     "free motions": (build, ("_check_support",)),
     "parts": (problem, ("find_parts",)),
-    "support": (problem.Problem, ("find_support",)),
+    "support": (problem.Problem, ("find_free_motions",)),
     "balance": (recovery, ("measure_balance",)),
     "balance, told": (step_notes, ("describe_imbalance",)),
     "balance, anchors": (hold, ("measure_balance",)),

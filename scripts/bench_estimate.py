@@ -42,7 +42,7 @@ from pbem.model.model import Model
 from pbem.model.refinement import bisect_elements, count_elements
 from pbem.results.accuracy import Pass, decide
 from pbem.results.estimates import Comparison, Relative
-from pbem.solve.estimate.beside import relate_meshes
+from pbem.solve.estimate.coarser_mesh import relate_meshes
 from tests.verification.proofs import PROOFS, Proof, proof
 from tests.verification.proofs.proof import Solved
 
@@ -251,7 +251,7 @@ def measure_error(solved: Solved, reference: Solved) -> float:
 def read_jump(solved: Solved, name: str, values: np.ndarray, place: np.ndarray) -> np.ndarray:
     """Values (m,) of the pairs, read at arc lengths on an interface by the shapes of its elements."""
     mesh, pairs = solved.mesh, solved.pairs(name)
-    element = mesh.pairs.slot[pairs] // (mesh.order + 1)
+    element = mesh.pairs.slave[pairs] // (mesh.order + 1)
     chain = element[:: mesh.order + 1]
     along = mesh.pairs.arc_length[pairs].reshape(len(chain), -1)
     # Each place belongs to the element whose nodes are nearest.

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.bem.rows import Sources, evaluate_rows
-from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -84,9 +84,9 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
     from pbem.case import parse_draft, read_case_text
     from pbem.cli import main
     from pbem.contact.anchor import anchor_motions
+    from pbem.contact.free_motions import close_nearest_pairs, find_free_motions, find_ties
     from pbem.contact.laws import collect_laws, start_memory
     from pbem.contact.loads import collect_outer_nodes, evaluate_load, find_needed_columns
-    from pbem.contact.support import close_nearest_pairs, find_support, find_ties
     from pbem.mesh.generate import generate_mesh
     from pbem.model.build import build_model
     from pbem.model.rigid_body_modes import find_rigid_body_modes
@@ -123,7 +123,7 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
         anchors = anchor_motions(mesh, anchored)
         modes = start_memory(laws).modes
         for _ in range(STEPS):
-            find_support(model, mesh, anchors, anchored, find_ties(model, mesh, modes))
+            find_free_motions(model, mesh, anchors, anchored, find_ties(model, mesh, modes))
         close_nearest_pairs(mesh, laws, modes, laws.gap)
     with clock.measure("writer, begin"):
         writer = ResultWriter(target, model, mesh, 1, "")

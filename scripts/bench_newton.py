@@ -31,13 +31,13 @@ from pbem.parallel import gather_parts, world
 from pbem.solve.nonlinear.newton import solve_step
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import SilentReporter
-from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.march import start_from_rest
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.tangent.factored import FactoredTangent
 
 Real = NDArray[np.float64]
-T = TypeVar("T", bound=AnyTangent)
+T = TypeVar("T", bound=TangentOperator)
 
 CASES = ("panel_frictionless_closing", "panel_friction_closing", "two_blocks", "layers_push_stiff")
 JOINT_STIFFNESSES = (0.125, 0.25, 0.5, 1.0, 2.0)
@@ -98,7 +98,7 @@ def solve_classically(problem: Problem, tangent: FactoredTangent, load: Load, fa
     return state, MOST_ITERATIONS
 
 
-def solve_by_tangent(problem: Problem, tangent: AnyTangent, load: Load) -> tuple[PairState, int]:
+def solve_by_tangent(problem: Problem, tangent: TangentOperator, load: Load) -> tuple[PairState, int]:
     """Converge one step from rest with the tangent operator; returns the pairs and the number of iterations."""
     solution = solve_step(problem, tangent, start_from_rest(problem).memory, load, SilentReporter())
     return solution.pairs, len(solution.iterations)

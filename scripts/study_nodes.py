@@ -1,7 +1,8 @@
 """Where to put the collocation nodes of crack elements: errors on a Griffith crack under tension, in an infinite plane.
 
 For several node positions and meshes of equal elements with tip shapes, the relative error of the stress-intensity
-factor and the largest error of the opening, relative to its maximum. pbem.mesh.shapes.CRACK_NODES holds the choice.
+factor and the largest error of the opening, relative to its maximum. pbem.mesh.shape_functions.CRACK_NODES holds the
+choice.
 
 usage: .venv/bin/python scripts/study_nodes.py
 """
@@ -11,14 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.case.build import parse_model
-from pbem.mesh import shapes
+from pbem.mesh import shape_functions
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 
-GAUSS = {order: tuple(shapes.place_nodes(order)) for order in (1, 2, 3)}
+GAUSS = {order: tuple(shape_functions.place_nodes(order)) for order in (1, 2, 3)}
 TRIALS = {
     1: [GAUSS[1], *[(-a, a) for a in (0.62, 0.65, 0.675, 0.7, 0.75)]],
     2: [GAUSS[2], *[(-a, 0.0, a) for a in (0.80, 0.82, 0.84, 0.849, 0.86, 0.88)]],
@@ -37,20 +38,20 @@ analysis = {{ order = {order}, steps = 1 }}
 
 def measure(order: int, nodes: tuple[float, ...], elements: int) -> tuple[float, float]:
     """Relative errors of KI and of the opening with the given nodes (order + 1,) in [-1, 1]."""
-    shapes.CRACK_NODES[order] = nodes
+    shape_functions.CRACK_NODES[order] = nodes
     _, model = parse_model(CASE.format(elements=elements, order=order))
     mesh = generate_mesh(model)
     (step,) = march(assemble_problem(model, mesh, world), SilentReporter())
     modulus = model.regions[0].material.plane_modulus
     exact = 4 / modulus * np.sqrt(1 - mesh.pairs.position.real**2)
-    coefficient = shapes.tip_shapes(nodes)[0][0] @ step.contact.opening[: order + 1]
+    coefficient = shape_functions.tip_shapes(nodes)[0][0] @ step.contact.opening[: order + 1]
     factor = modulus / 8 * np.sqrt(2 * np.pi / abs(mesh.end[0] - mesh.start[0])) * coefficient
     return factor / np.sqrt(np.pi) - 1, float(np.abs(step.contact.opening - exact).max() / exact.max())
 
 
 def main() -> None:
     """Print the table."""
-    chosen = dict(shapes.CRACK_NODES)
+    chosen = dict(shape_functions.CRACK_NODES)
     heads = "".join(f"{f'{count} elements: K, opening':>28s}" for count in ELEMENTS)
     print(f"{'order':5s}  {'nodes (positive ones)':24s}{heads}")
     for order, trials in TRIALS.items():

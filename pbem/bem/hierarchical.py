@@ -17,7 +17,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestors, prepare_shifts
 from pbem.bem.leaf import Medium, form_l2p, form_p2m
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
-from pbem.bem.rigid import RigidMotions, find_rigid_motions, take_off_rigid_motions
+from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions, take_off_rigid_motions
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.bem.tree import Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh

@@ -10,7 +10,7 @@ import numpy as np
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.location import Location
 from pbem.bem.operator import collect_sources
-from pbem.bem.rigid import RigidMotions, take_off_rotations
+from pbem.bem.rigid_motions import RigidMotions, take_off_rotations
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes, split_faces
 from pbem.mesh.mesh import Mesh

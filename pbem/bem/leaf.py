@@ -13,7 +13,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.bem.rows import Sources
-from pbem.mesh.shapes import interpolate_shapes, tip_shapes
+from pbem.mesh.shape_functions import interpolate_shapes, tip_shapes
 
 
 @dataclass(frozen=True)

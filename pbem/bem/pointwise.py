@@ -12,7 +12,7 @@ from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_colu
 from pbem.bem.interior import Values
 from pbem.bem.leaf import Medium, form_l2p
 from pbem.bem.location import Location
-from pbem.bem.rigid import take_off_rigid_motions
+from pbem.bem.rigid_motions import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.tree import Interactions, build_forest, find_interactions
 from pbem.mesh.numbering import list_nodes, split_components

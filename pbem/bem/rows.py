@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem import _kernels
 from pbem.geometry.elements import Elements
-from pbem.mesh.shapes import interpolate_shapes, tip_shapes
+from pbem.mesh.shape_functions import interpolate_shapes, tip_shapes
 
 
 @dataclass(frozen=True)

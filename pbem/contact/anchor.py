@@ -1,7 +1,7 @@
 """Bodies that only the balance of their loads keeps at rest: their mean displacement and rotation are set to zero.
 
 Anchors are for the motions that are free at the start. Where contact comes to hold such a motion its anchor has to be
-taken off, or it would carry a part of the load: see pbem.contact.support and pbem.solve.tangent.release.
+taken off, or it would carry a part of the load: see pbem.contact.free_motions and pbem.solve.tangent.release.
 """
 
 from __future__ import annotations

@@ -93,7 +93,7 @@ def _constrain_outer_nodes(
 
 
 def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation) -> None:
-    """The slot node follows the other side but for the jump; the other side carries the opposite of its traction.
+    """The slave node follows the other side but for the jump; the other side carries the opposite of its traction.
 
     The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge.
     (theory, 47, 65)
@@ -105,23 +105,23 @@ def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, 
     constant_jump = pairs.sense * ((law.offset[led, G_N] - gap[led]) * n + law.offset[led, G_S] * s)
     constant_traction = -pairs.sense * (law.offset[:, P_N] * n + law.offset[:, P_S] * s)
     for k in range(2):
-        unknown = 2 * pairs.slot + k
+        unknown = 2 * pairs.slave + k
         jump = pairs.sense * (law.tangent[led, G_N, k] * n + law.tangent[led, G_S, k] * s)
         traction = -pairs.sense * (law.tangent[:, P_N, k] * n + law.tangent[:, P_S, k] * s)
-        entries.add(DISPLACEMENT, pairs.slot, unknown[led], jump)
-        entries.add(TRACTION, pairs.slot, unknown, traction)
+        entries.add(DISPLACEMENT, pairs.slave, unknown[led], jump)
+        entries.add(TRACTION, pairs.slave, unknown, traction)
         entries.add(TRACTION, links.traction_node, unknown[givers], -links.traction_weight * traction[givers])
         entries.add(DISPLACEMENT, links.carrier, 2 * links.carrier + k, np.full(len(links.carrier), 1j**k))
-        follower = pairs.slot[links.displacement_pair]
+        follower = pairs.slave[links.displacement_pair]
         entries.add(DISPLACEMENT, follower, 2 * links.displacement_node + k, links.displacement_weight * 1j**k)
-    offset[DISPLACEMENT, pairs.slot] += constant_jump
-    offset[TRACTION, pairs.slot] += constant_traction
+    offset[DISPLACEMENT, pairs.slave] += constant_jump
+    offset[TRACTION, pairs.slave] += constant_traction
     np.subtract.at(offset[TRACTION], links.traction_node, links.traction_weight * constant_traction[givers])
 
 
 def read_pair_unknowns(mesh: Mesh, unknowns: Real) -> Real:
     """The two unknowns (m, 2) of every pair's mode, from x (2 nodes,)."""
-    return unknowns.reshape(-1, 2)[mesh.pairs.slot]
+    return unknowns.reshape(-1, 2)[mesh.pairs.slave]
 
 
 def evaluate_pairs(mesh: Mesh, law: Linearisation, unknowns: Real) -> PairState:

@@ -12,8 +12,8 @@ from pbem.contact.loads import OuterNodes
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import Parts
 from pbem.model.model import Model
-from pbem.model.rigid import GROUND, Link, find_moving_bodies
 from pbem.model.rigid_body_modes import describe_motion, find_least_stiffness
+from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
 
 
 def describe_cut_motions(model: Model, mesh: Mesh, outer: OuterNodes, parts: Parts, modes: ModeState) -> str | None:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
 from pbem.description.finding import Finding
-from pbem.description.generation import Expansion, Group, expand
+from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
 from pbem.description.repair import repair
 from pbem.description.schema import (
@@ -68,7 +68,7 @@ class Case:
     output: OutputTable
     given: Mapping[str, Any]
     source: str
-    groups: tuple[Group, ...]
+    groups: tuple[GeneratedGroup, ...]
     origin: Mapping[str, int]
 
     def __init__(self, /, **tables: Any) -> None:

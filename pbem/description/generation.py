@@ -16,7 +16,7 @@ MANY = 1000
 
 
 @dataclass(frozen=True)
-class Group:
+class GeneratedGroup:
     """What one table [[generate]] made: `count` curves name_1, name_2, ... of one kind in a region."""
 
     name: str
@@ -43,7 +43,7 @@ class Expansion:
     regions: Mapping[str, RegionTable]
     interfaces: Mapping[str, LawTable]
     stages: tuple[StageTable, ...]
-    groups: tuple[Group, ...]
+    groups: tuple[GeneratedGroup, ...]
     origin: Mapping[str, int]
 
 
@@ -72,7 +72,7 @@ def expand(case: CaseFile) -> tuple[Expansion | None, list[Finding]]:
         return None, findings
     for name, own in case.interfaces.items():
         laws[name] = combine_laws(laws[name], own) if name in laws else own
-    groups = tuple(Group(table.name, table.kind, table.count, table.region) for table in case.generate)
+    groups = tuple(GeneratedGroup(table.name, table.kind, table.count, table.region) for table in case.generate)
     stages = tuple(_spread_groups(stage, groups) for stage in case.stages)
     return Expansion(curves, regions, laws, stages, groups, origin), []
 
@@ -157,7 +157,7 @@ def _add_to_regions(regions: dict[str, RegionTable], table: GenerateTable, names
         regions[name] = RegionTable.model_construct(material=table.material, boundary=(name,))
 
 
-def _spread_groups(stage: StageTable, groups: tuple[Group, ...]) -> StageTable:
+def _spread_groups(stage: StageTable, groups: tuple[GeneratedGroup, ...]) -> StageTable:
     """What a stage says of the name of a table it says of all that the table made, and that of a single one instead."""
     told = {group.name: group for group in groups if group.name in stage.interfaces}
     if not told:

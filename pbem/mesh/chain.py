@@ -8,7 +8,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.geometry.elements import Elements
-from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 
 
 @dataclass(frozen=True)

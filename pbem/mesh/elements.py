@@ -9,7 +9,7 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.geometry.curve import Curve
 from pbem.geometry.elements import Elements
-from pbem.mesh.shapes import integrate_shapes
+from pbem.mesh.shape_functions import integrate_shapes
 
 
 def divide_curve(curve: Curve) -> Elements:

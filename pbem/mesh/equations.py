@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pbem.geometry.curve import Curve
-from pbem.model.facing import Strip, find_strips
 from pbem.model.model import Model, Region
+from pbem.model.sight import Strip, find_strips
 from pbem.wording import list_names
 
 # Notes on inner loops of one region, beyond which there is one for all.

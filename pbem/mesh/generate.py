@@ -10,10 +10,10 @@ from pbem.arrays import Bool
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
-from pbem.mesh.facing import describe_sparse_meshes
 from pbem.mesh.mesh import Links, Mesh, Pairs
+from pbem.mesh.mortar_pairs import describe_sparse_meshes
 from pbem.mesh.pairing import pair_nodes
-from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 from pbem.model.model import Model
 
 
@@ -66,7 +66,7 @@ def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: 
     """
     faces = {name for contact in model.contacts.values() for name in (contact.first, contact.second)}
     free = np.concatenate([np.full(chain.elements.count, chain.curve in faces) for chain in chains])
-    for nodes in (pairs.slot, links.displacement_node, links.traction_node):
+    for nodes in (pairs.slave, links.displacement_node, links.traction_node):
         free[nodes // (model.analysis.order + 1)] = False
     return free & (model.analysis.scheme != "THST")
 
@@ -90,7 +90,7 @@ def _list_chains(model: Model, equations: Equations) -> list[Chain]:
 
 def _note_contacts(model: Model, pairs: Pairs) -> tuple[str, ...]:
     first = len(model.interfaces)
-    slots = [(name, pairs.slot[pairs.interface == first + number]) for number, name in enumerate(model.contacts)]
+    slots = [(name, pairs.slave[pairs.interface == first + number]) for number, name in enumerate(model.contacts)]
     return describe_sparse_meshes(slots, model.analysis.order)
 
 

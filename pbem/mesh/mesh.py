@@ -18,8 +18,8 @@ class Pairs:
 
     interface (m,): index into Mesh.interface_names; first, second (m,): the two nodes. The pair of a crack has only
     one node, whose unknown displacement is the jump u_r - u_l: there second = first and crack is True. Between curves
-    with different meshes one of both is the slot, and the other the node that has most in common with it.
-    slot (m,): the node that follows the other side and owns the pair's two unknowns; sense (m,): +1 if that is the
+    with different meshes one of both is the slave, and the other the node that has most in common with it.
+    slave (m,): the node that follows the other side and owns the pair's two unknowns; sense (m,): +1 if that is the
     second, -1 if it is the first.
     position, normal (m,): complex; normal is outward of the first side. arc_length (m,): from the curve's first point.
     weight (m,): integration weight (length) of the pair's node. distance (m,): of the second side along the normal,
@@ -29,7 +29,7 @@ class Pairs:
     interface: Integer
     first: Integer
     second: Integer
-    slot: Integer
+    slave: Integer
     crack: Bool
     sense: Real
     position: Complex
@@ -47,9 +47,9 @@ class Pairs:
 class Links:
     """What the two sides of the pairs take from each other, as lists of weights.
 
-    carrier (k,): nodes whose displacement is their own unknown. The displacement of a pair's slot node is the jump plus
-    the sum of displacement_weight times the displacement of displacement_node over displacement_pair (l,);
-    traction_node carries minus the sum of traction_weight times the slot node's traction over traction_pair (r,).
+    carrier (k,): nodes whose displacement is their own unknown. The displacement of a pair's slave node is the jump
+    plus the sum of displacement_weight times the displacement of displacement_node over displacement_pair (l,);
+    traction_node carries minus the sum of traction_weight times the slave node's traction over traction_pair (r,).
     """
 
     carrier: Integer

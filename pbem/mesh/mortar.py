@@ -20,7 +20,7 @@ from pbem.arrays import Integer, Real
 from pbem.geometry.elements import Elements
 from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.projection import find_hidden, project_nodes
-from pbem.mesh.shapes import interpolate_shapes
+from pbem.mesh.shape_functions import interpolate_shapes
 
 # Gauss points on every piece of an element that faces one element of the other side.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from pbem.mesh.chain import Chain
-from pbem.mesh.facing import Columns, pair_contact, place_pairs
 from pbem.mesh.mesh import Links, Pairs
+from pbem.mesh.mortar_pairs import Columns, pair_contact, place_pairs
 from pbem.model.model import Contact, Interface, Model
 
 
@@ -35,7 +35,7 @@ def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:
 
 
 _PAIR_TYPES: Mapping[str, type] = {
-    "interface": np.int64, "first": np.int64, "second": np.int64, "slot": np.int64, "crack": np.bool_,
+    "interface": np.int64, "first": np.int64, "second": np.int64, "slave": np.int64, "crack": np.bool_,
     "sense": np.float64, "position": np.complex128, "normal": np.complex128, "arc_length": np.float64,
     "weight": np.float64, "distance": np.float64,
 }  # fmt: skip
@@ -59,7 +59,7 @@ def _no_links() -> Columns:
 
 def _pair_crack(chain: Chain) -> Columns:
     made = place_pairs(chain)
-    return made | {"second": made["first"], "slot": made["first"], "sense": np.full(len(made["first"]), -1.0)}
+    return made | {"second": made["first"], "slave": made["first"], "sense": np.full(len(made["first"]), -1.0)}
 
 
 def _pair_interface(
@@ -75,4 +75,4 @@ def _pair_interface(
         "displacement_pair": numbers, "displacement_node": first, "displacement_weight": np.ones(len(first)),
         "traction_pair": numbers, "traction_node": first, "traction_weight": np.ones(len(first)),
     }  # fmt: skip
-    return made | {"second": second, "slot": second, "sense": np.ones(len(first))}, links
+    return made | {"second": second, "slave": second, "sense": np.ones(len(first))}, links

@@ -11,7 +11,6 @@ from pbem.errors import CaseError, Fault
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
-from pbem.model.balance import describe_unbalance
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
     check_closing,
@@ -21,7 +20,6 @@ from pbem.model.crack import (
     describe_near_misses,
     find_tips,
 )
-from pbem.model.facing import check_facing, split_opposite_ends
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
@@ -31,9 +29,11 @@ from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
+from pbem.model.resultants import describe_unbalance
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
+from pbem.model.sight import check_facing, split_opposite_ends
 from pbem.wording import list_names
 
 # Faults shown of what one table [[generate]] made.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from pbem.description.generation import Group
+from pbem.description.generation import GeneratedGroup
 from pbem.geometry.curve import Curve, find_middle
 from pbem.geometry.loop import Loop
 from pbem.model.material import Material
@@ -186,7 +186,7 @@ class Model:
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
-    groups: tuple[Group, ...] = ()
+    groups: tuple[GeneratedGroup, ...] = ()
     ties: tuple[Tie, ...] = ()
     law_texts: Mapping[str, str] = field(default_factory=dict)
     origin: complex = 0j

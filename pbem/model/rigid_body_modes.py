@@ -14,7 +14,7 @@ from pbem.geometry.junction import format_point
 from pbem.geometry.loop import Side
 from pbem.geometry.sampling import sample_side
 from pbem.model.model import Contact, Interface, Law, Model, Region
-from pbem.model.rigid import GROUND, Link, find_moving_bodies
+from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
 from pbem.model.touching import measure_opening
 from pbem.wording import list_names
 

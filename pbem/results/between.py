@@ -78,10 +78,10 @@ def _place_samples(mesh: Mesh) -> tuple[Integer, list[Real], list[Real]]:
     """
     pairs, per_element = mesh.pairs, mesh.order + 1
     number = np.full(mesh.nodes, -1)
-    number[pairs.slot] = np.arange(pairs.count)
-    element = pairs.slot // per_element
+    number[pairs.slave] = np.arange(pairs.count)
+    element = pairs.slave // per_element
     mates = number[element[:, None] * per_element + np.arange(per_element)]
-    own = pairs.slot % per_element
+    own = pairs.slave % per_element
     alone = (own == mesh.order) | (mates < 0).any(axis=1)
     local, itself = locate_nodes(mesh)[element], np.eye(per_element)[own]
     rows = np.arange(pairs.count)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.contact.laws import OPEN, Modes, find_joint
-from pbem.mesh.facing import FEWEST
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.mortar_pairs import FEWEST
 from pbem.model.model import Contact, Model
 
 
 def describe_sparse_contacts(model: Model, mesh: Mesh, mode: Modes) -> tuple[str, ...]:
     """A sentence for every contact, and interface with a gap, that is closed on fewer than five elements; mode (m,)."""
     pairs = mesh.pairs
-    element = pairs.slot // (mesh.order + 1)
+    element = pairs.slave // (mesh.order + 1)
     notes = []
     for number, name in enumerate(mesh.interface_names):
         joint = find_joint(model, name)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbem.bem.operator_choice import choose_operator
 from pbem.contact.laws import OPEN, SLIP, STICK
-from pbem.description.generation import Group
+from pbem.description.generation import GeneratedGroup
 from pbem.geometry.curve import Curve
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Law, Model, Region
@@ -137,7 +137,7 @@ def _curve_row(curve: Curve) -> list[str]:
             text + (f" (power {'/'.join(power)})" if power else "")]
 
 
-def _group_row(model: Model, group: Group) -> list[str]:
+def _group_row(model: Model, group: GeneratedGroup) -> list[str]:
     """What a group has in common; sizes: lengths of cracks, diameters of inclusions."""
     members = group.members
     curves = [model.curves[name] for name in members]

@@ -8,7 +8,7 @@ from pbem.arrays import Complex, Real
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.solve.estimate.beside import Beside
+from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import Step
 
 

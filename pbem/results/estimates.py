@@ -15,7 +15,7 @@ from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
 from pbem.results.rates import EndFinder, choose_jump_divisors
 from pbem.results.tips import collect_tip_rules
-from pbem.solve.estimate.beside import Beside
+from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
 
 # The error of the second solution over that of the run, less one, by order: 2^rate - 1 for the rate order + 1, at most
@@ -233,8 +233,8 @@ class Comparison:
         The mean over each coarse element is left out: it comes from elsewhere.
         """
         pairs, result = beside.mesh.pairs, np.zeros(self._mesh.elements)
-        element = beside.carry.nearest[pairs.slot] // (self._mesh.order + 1)
-        own, of = np.unique(pairs.slot // (beside.mesh.order + 1), return_inverse=True)
+        element = beside.carry.nearest[pairs.slave] // (self._mesh.order + 1)
+        own, of = np.unique(pairs.slave // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             for name in JUMPS:
                 errors = self._subtract_jumps(name, mine, other, beside) / (self._jump_divisor * self.scales.jumps)

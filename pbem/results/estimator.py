@@ -13,7 +13,7 @@ from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import BetweenNodes
 from pbem.results.estimates import VIOLATIONS, Comparison, to_rows
-from pbem.solve.estimate.beside import Beside
+from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import Step
 
 # Of sound models (scripts/bench_estimate.py) at most 3 %, where contact ends within an element.
@@ -26,7 +26,7 @@ VIOLATED = {
 
 
 class Follower(Protocol):
-    """What the second solution does: see `pbem.solve.estimate.second.SecondSolution`."""
+    """What the second solution does: see `pbem.solve.estimate.second_solution.SecondSolution`."""
 
     def follow(self, step: Step) -> Step:
         """The same load step on the coarser mesh; raises ConvergenceError, or LawError and then is of no more use."""

@@ -19,9 +19,9 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model
 from pbem.model.origin import move_back
 from pbem.results.describe import describe_condition
-from pbem.results.level_plot import draw_levels
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
+from pbem.results.refinement_plot import draw_levels
 
 MOST_NAMES = 30
 CRACK = "#A51C30"

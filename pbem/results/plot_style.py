@@ -12,7 +12,7 @@ import matplotlib
 from matplotlib.axes import Axes
 
 from pbem.contact.laws import OPEN, SLIP, STICK
-from pbem.description.generation import Group
+from pbem.description.generation import GeneratedGroup
 from pbem.results.reader import Results
 
 
@@ -43,7 +43,7 @@ MODES = {
     SLIP: ModeStyle("slip", "^", "#E69F00", "#B87D00", "#E69F00"),
     OPEN: ModeStyle("open", "s", "white", "#333333", "black"),
 }
-def choose_shades(names: Sequence[str], groups: Sequence[Group]) -> list[str]:
+def choose_shades(names: Sequence[str], groups: Sequence[GeneratedGroup]) -> list[str]:
     """A shade for every region, by its name: the same for those that were generated together."""
     group_of = {member: group.name for group in groups for member in group.members}
     numbers: dict[str, int] = {}

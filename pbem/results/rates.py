@@ -14,7 +14,7 @@ from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import SLIP
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
-from pbem.solve.estimate.beside import Beside
+from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState
 
 # The error of the second solution's tractions over that of the run, less one, on the elements beside an end. Of a root
@@ -47,8 +47,8 @@ class EndFinder:
     def __init__(self, mesh: Mesh, beside: Beside) -> None:
         self._fine, self._coarse = _Chain(mesh), _Chain(beside.mesh)
         per_element = mesh.order + 1
-        slot = beside.mesh.pairs.slot
-        self._fine_element = beside.carry.nearest[slot] // per_element
+        slave = beside.mesh.pairs.slave
+        self._fine_element = beside.carry.nearest[slave] // per_element
         # One coordinate for all pairs: interfaces one after the other.
         longest = max(each.pairs.arc_length.max(initial=0.0) for each in (mesh, beside.mesh)) or 1.0
         self._at, self._nodes = (
@@ -82,16 +82,16 @@ def choose_jump_divisors(beside: Beside, tips: Mapping[str, tuple[bool, bool]], 
     for name, own in list_curve_elements(beside.model, coarse) if beside.kind == "merged" else ():
         at_start, at_end = tips.get(name, (False, False))
         result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
-    return np.asarray(result[coarse.pairs.slot // (coarse.order + 1)])
+    return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
 
 
 class _Chain:
-    """The pairs of all interfaces in order along them; element (m,): of each pair's slot."""
+    """The pairs of all interfaces in order along them; element (m,): of each pair's slave."""
 
     def __init__(self, mesh: Mesh) -> None:
         pairs = mesh.pairs
         self.order: Integer = np.lexsort((pairs.arc_length, pairs.interface))
-        self.element: Integer = pairs.slot // (mesh.order + 1)
+        self.element: Integer = pairs.slave // (mesh.order + 1)
         self._elements = mesh.elements
         same = np.diff(pairs.interface[self.order]) == 0
         self._first, self._second = self.order[:-1][same], self.order[1:][same]

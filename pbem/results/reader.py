@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Integer, Real
-from pbem.description.generation import Group
+from pbem.description.generation import GeneratedGroup
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
@@ -68,7 +68,7 @@ class Results:
     reactions: Mapping[str, Real]
     contact: Mapping[str, Contact]
     pairs: AllPairs
-    groups: tuple[Group, ...]
+    groups: tuple[GeneratedGroup, ...]
     tips: Mapping[str, Tips]
     energy: Energies
     balance: Balances | None
@@ -178,7 +178,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         reactions=_read_reactions(file, k),
         contact=Interfaces(path, read_names(file["contact"]), k),
         pairs=AllPairs(path, read_names(file["contact"]), k),
-        groups=tuple(Group(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
+        groups=tuple(GeneratedGroup(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
         tips=_read_tips(file, k),
         energy=Energies(*(freeze(_read_energy(file, kind, k)) for kind in ENERGIES)),
         balance=read_balance(file, k),
@@ -264,5 +264,5 @@ def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:
     return Interior(path, freeze(group["position"][...]), _read_indices(group, "region"), steps)
 
 
-def _read_indices(group: h5py.Group, name: str) -> Integer:
+def _read_indices(group: h5py.GeneratedGroup, name: str) -> Integer:
     return freeze(group[name][...].astype(np.int64))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Complex, Real
 from pbem.mesh.interpolation import interpolate_tips
-from pbem.mesh.shapes import interpolate_shapes
+from pbem.mesh.shape_functions import interpolate_shapes
 from pbem.results.eigenfield import evaluate_eigenfield
 from pbem.results.tip_field import Field, TipShape, place_gauss
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.mesh.mesh import Mesh
-from pbem.mesh.shapes import place_nodes
+from pbem.mesh.shape_functions import place_nodes
 from pbem.model.material import Material
 from pbem.solve.problem.step import Step
 from tests.identities.bodies import Body

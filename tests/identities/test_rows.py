@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.rows import Sources, evaluate_rows
-from pbem.mesh.shapes import interpolate_shapes, place_nodes, tip_shapes
+from pbem.mesh.shape_functions import interpolate_shapes, place_nodes, tip_shapes
 from pbem.model.material import Material
 from tests.identities.kelvin import Kelvin, integrate
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.geometry.elements import Elements
-from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 
 Complex = NDArray[np.complex128]
 

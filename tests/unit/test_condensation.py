@@ -16,8 +16,8 @@ from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.petsc.effort import Effort, Work
 from pbem.solve.petsc.linear import LinearSolver
+from pbem.solve.petsc.refactoring import Effort, Work
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved
 from pbem.solve.system.assembly import assemble_problem

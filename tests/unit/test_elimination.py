@@ -51,7 +51,7 @@ def test_eliminated_unknowns_follow_from_their_own_nodes_equations(name: str) ->
 
 def test_sticking_cracks_leave_nothing_slipping_ones_half_and_open_ones_all() -> None:
     problem = assemble("cracks", "hierarchical")
-    count, nodes = problem.mesh.pairs.count, problem.mesh.pairs.slot
+    count, nodes = problem.mesh.pairs.count, problem.mesh.pairs.slave
     preconditioner = problem.make_tangent().preconditioner
     for mode, eliminated in ((STICK, 2), (SLIP, 1), (OPEN, 0)):
         modes = ModeState(np.full(count, mode, dtype=np.int8), np.ones(count))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pbem.contact.anchor import anchor_motions
+from pbem.contact.free_motions import CLOSED_AT_LEAST, close_nearest_pairs, find_ties
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, collect_laws
-from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, find_ties
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model

@@ -10,7 +10,7 @@ import pytest
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
-from pbem.mesh.shapes import place_crack_nodes, place_nodes
+from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 from pbem.model.model import Model
 from tests.identities.bodies import ROCK, Body, mesh_body
 

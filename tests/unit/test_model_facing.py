@@ -11,8 +11,8 @@ import pytest
 from pbem.geometry.curve import Leg
 from pbem.mesh.equations import choose_equations
 from pbem.mesh.generate import generate_mesh
-from pbem.model.facing import Surroundings
 from pbem.model.rigid_body_modes import find_rigid_body_modes
+from pbem.model.sight import Surroundings
 from pbem.results.coverage import describe_sparse_contacts
 from tests.unit.case_sample import MATERIAL, SQUARE, add_curves, build, change, find_only_fault
 
@@ -197,7 +197,7 @@ boundary = [{names}]
 [boundary.bottom]
 ux = 0.0
 uy = 0.0
-[contacts.slot]
+[contacts.slave]
 between = ["lower", "upper"]
 friction = 0.3
 [analysis]

@@ -103,8 +103,8 @@ def test_nearby_elements_answer_nearly_as_the_whole_model_does(many_groups: None
 
 def test_pairs_at_the_ends_of_the_comb_are_two_sets() -> None:
     mesh = assemble().mesh
-    x = mesh.position[mesh.pairs.slot].real
-    nodes = mesh.pairs.slot[(x < 0.5) | (x > 8.0)]
+    x = mesh.position[mesh.pairs.slave].real
+    nodes = mesh.pairs.slave[(x < 0.5) | (x > 8.0)]
     parts = part_by_distance(mesh, nodes)
     assert len(parts) == 2
     for part in parts:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
+from pbem.contact.free_motions import find_free_motions, find_ties
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
-from pbem.contact.support import find_support, find_ties
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.rigid_body_modes import find_rigid_body_modes
@@ -53,7 +53,7 @@ def choose_modes(problem: Problem, mode: int, pairs: slice, name: str = "j2") ->
 def test_closed_pairs_hold_what_they_can(mode: int, pairs: slice, free: int, tmp_path: Path) -> None:
     problem = make_stack(tmp_path)
     modes = choose_modes(problem, mode, pairs)
-    support = problem.find_support(modes)
+    support = problem.find_free_motions(modes)
     assert len(support.motions) == free and support.unheld is None
     assert support.acting.shape == (3, free) and support.released.shape == (3, 3 - free)
     whole = np.hstack([support.acting, support.released])
@@ -72,7 +72,9 @@ def test_motions_that_no_anchor_sees_are_not_held(tmp_path: Path) -> None:
     free = replace(problem.model, conditions={**problem.model.conditions, "j3": problem.model.conditions["r2"]})
     motions = find_rigid_body_modes(free, {**ties, "j1": "both", "j2": "none"})
     assert len(motions) == 3 == len(problem.anchors)
-    support = find_support(free, problem.mesh, problem.anchors, problem.anchored, {**ties, "j1": "both", "j2": "none"})
+    support = find_free_motions(
+        free, problem.mesh, problem.anchors, problem.anchored, {**ties, "j1": "both", "j2": "none"}
+    )
     assert support.unheld is not None and "'b2'" in support.unheld
 
 
@@ -99,7 +101,7 @@ def test_released_anchors_leave_the_equations_without_them(linear: str, tmp_path
     step, bent = 1e-3, replace(law, offset=law.offset.copy())
     bent.offset[pairs[0]] += step * directions[0, :, 1]
     moved = np.linalg.solve(matrix, -problem.apply(problem.constrain(bent, load).offset, load, np.eye(3)))
-    own = (2 * problem.mesh.pairs.slot[pairs][:, None] + np.arange(2)).ravel()
+    own = (2 * problem.mesh.pairs.slave[pairs][:, None] + np.arange(2)).ravel()
     change = (moved - expected)[own] / step
     np.testing.assert_allclose(found[:, 1], change, rtol=0, atol=1e-7 * np.abs(change).max())
     tangent.destroy()
@@ -112,7 +114,7 @@ def test_anchors_of_motions_that_stay_free_go_on_acting(tmp_path: Path) -> None:
     constraints = Hold(problem).release(problem.constrain(law, load), modes)
     tangent = problem.make_tangent()
     solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
-    support = problem.find_support(modes)
+    support = problem.find_free_motions(modes)
     seen = problem.anchor_parts[1] @ solved.v
     moved = np.abs(solved.v[: 2 * problem.mesh.nodes]).max()
     assert support.acting.shape == (3, 1)
@@ -124,7 +126,7 @@ def test_anchors_of_motions_that_stay_free_go_on_acting(tmp_path: Path) -> None:
 def test_what_is_left_over_is_measured(tmp_path: Path) -> None:
     problem = make_stack(tmp_path)
     mesh, load = problem.mesh, problem.evaluate_load(0, 1.0)
-    support = problem.find_support(choose_modes(problem, OPEN, slice(0, 0)))
+    support = problem.find_free_motions(choose_modes(problem, OPEN, slice(0, 0)))
     stress = np.array([[3.0, 1.0], [1.0, -2.0]])
     normal = np.stack([mesh.normal.real, mesh.normal.imag], axis=1)
     balanced = normal @ stress

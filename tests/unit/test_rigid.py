@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from pbem.model.rigid import GROUND, Link, find_null_motions
+from pbem.model.rigid_links import GROUND, Link, find_null_motions
 
 
 def find_null_motions_at_once(bodies: int, links: list[Link]) -> np.ndarray:

@@ -17,7 +17,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.preconditioner.subdomains import Group
+from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.system import dense as dense_system
 from pbem.solve.system.assembly import assemble_problem
@@ -139,9 +139,9 @@ def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) ->
     changed = ModeState(modes.mode.copy(), modes.sign.copy())
     changed.mode[0] = OPEN if modes.mode[0] == STICK else STICK
     affected = preconditioner.update(constrain(problem, changed))
-    slot = problem.mesh.node_element[problem.mesh.pairs.slot[0]]
+    slave = problem.mesh.node_element[problem.mesh.pairs.slave[0]]
     assert 1 <= affected < count or count < 8
-    assert affected >= sum(slot in group.around for group in problem.system.groups)
+    assert affected >= sum(slave in group.around for group in problem.system.groups)
     fresh = precondition(problem)
     fresh.update(constrain(problem, changed))
     assert_same(apply(preconditioner, residual), apply(fresh, residual))
@@ -206,7 +206,7 @@ def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.Mo
     """With the whole model around every group the preconditioner is the inverse again."""
     problem = assemble("cracks")
     whole = np.arange(problem.mesh.elements)
-    groups = tuple(Group(group.elements, whole) for group in problem.system.groups)
+    groups = tuple(Subdomain(group.elements, whole) for group in problem.system.groups)
     problem = replace(problem, system=replace(problem.system, groups=groups))
     preconditioner = precondition(problem)
     preconditioner.update(constrain(problem))

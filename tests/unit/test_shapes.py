@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.mesh.shapes import integrate_shapes, interpolate_shapes, place_nodes, tip_shapes
+from pbem.mesh.shape_functions import integrate_shapes, interpolate_shapes, place_nodes, tip_shapes
 
 Real = NDArray[np.float64]
 

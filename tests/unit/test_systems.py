@@ -17,9 +17,9 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
-from pbem.solve.estimate.beside import put_beside
+from pbem.solve.estimate.coarser_mesh import put_beside
 from pbem.solve.problem.problem import Problem, System
-from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.choice import SYSTEMS, choose_system
 
@@ -89,7 +89,7 @@ def evaluate_inside(problem: Problem) -> Real:
 
 def solve(problem: Problem) -> Real:
     """What the tangent operator answers to all that is asked of it, in drawn modes."""
-    tangent: AnyTangent = problem.system.make_tangent(problem)
+    tangent: TangentOperator = problem.system.make_tangent(problem)
     law, load, constraints = constrain(problem)
     solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
     assert solved.checked and solved.residual <= 1e-9

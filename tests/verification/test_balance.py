@@ -77,7 +77,8 @@ def prepare(text: str) -> Problem:
 def test_what_is_left_over_is_measured_by_the_faces_of_cracks_too(unit: float) -> None:
     problem = prepare(write_bar(4.0, "crack", unit))
     mesh, load = problem.mesh, problem.evaluate_load(0, 1.0)
-    support = problem.find_support(ModeState(np.full(mesh.pairs.count, OPEN, dtype=np.int8), np.ones(mesh.pairs.count)))
+    is_open = ModeState(np.full(mesh.pairs.count, OPEN, dtype=np.int8), np.ones(mesh.pairs.count))
+    support = problem.find_free_motions(is_open)
     # One stress everywhere balances on the boundary; fluid on both faces of the crack.
     traction = np.where(mesh.node_crack, -5.0 * mesh.normal, 0.1 * mesh.normal)
     traction = traction + np.where(mesh.node_curve == mesh.curve_names.index("l"), 0.02, 0.0)

@@ -20,7 +20,7 @@ from pbem.model.model import Model
 from pbem.results import accuracy as limits
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
-from pbem.solve.estimate import second
+from pbem.solve.estimate import second_solution
 from pbem.solve.problem.step import Step
 from tests.cli.cli_sample import BLOCKS
 from tests.verification.proofs import PROOFS, proof
@@ -317,7 +317,7 @@ def test_statuses_that_do_not_settle_on_the_coarser_mesh_are_those_of_the_run(
     def refuse(*_: Any) -> None:
         raise ConvergenceError("unsound mesh", "pairs part when they are pressed")
 
-    monkeypatch.setattr(second, "solve_step", refuse)
+    monkeypatch.setattr(second_solution, "solve_step", refuse)
     held = pbem.run(tmp_path / "blocks.toml", tmp_path / "held.h5").errors
     assert not held.missing
     for kind in ("reactions", "jumps", "tractions"):

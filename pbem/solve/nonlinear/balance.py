@@ -13,8 +13,8 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.anchor import group_motions
+from pbem.contact.free_motions import FreeMotions
 from pbem.contact.loads import Load
-from pbem.contact.support import Support
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Balance
@@ -25,7 +25,7 @@ ROUNDING, FAINT = 1e-9, 1e-6
 SAME = 1e-9
 
 
-def measure_balance(problem: Problem, v: Real, load: Load, support: Support) -> Balance:
+def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions) -> Balance:
     """The balance of displacements and tractions v (4 nodes,) under a load, with the anchors that acted.
 
     (theory, 72)

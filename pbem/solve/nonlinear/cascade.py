@@ -25,7 +25,7 @@ from pbem.contact.subset import settle_subset
 from pbem.mesh.numbering import number_components
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
-from pbem.solve.problem.tangent import AnyTangent, Solved
+from pbem.solve.problem.tangent import Solved, TangentOperator
 
 # Newton's steps among the broken pairs alone before they are settled by pivoting.
 MOST_STEPS = 15
@@ -42,8 +42,8 @@ class Cascade:
 
 
 def run_cascade(
-    problem: Problem, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
-    law: Linearisation, solved: Solved, failing: Bool, floor: float, most: int,
+    problem: Problem, tangent: TangentOperator, constraints: ConstraintMap, modes: ModeState, memory: Memory,
+    load: Load, law: Linearisation, solved: Solved, failing: Bool, floor: float, most: int,
 ) -> Cascade:
     """Let bonds fail, the worst first, until no other fails; all ranks together.
 

@@ -9,9 +9,9 @@ import numpy as np
 from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.cut_parts import describe_cut_motions
+from pbem.contact.free_motions import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, stick_creeping
 from pbem.contact.loads import Load
-from pbem.contact.support import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance
@@ -53,7 +53,7 @@ class Hold:
         """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
         if not self.problem.anchors:
             return constraints
-        released = broadcast(self.problem.comm, self.problem.find_support(modes).released)
+        released = broadcast(self.problem.comm, self.problem.find_free_motions(modes).released)
         return replace(constraints, released=released)
 
     def is_driven(self, modes: ModeState, v: Real, load: Load) -> bool:
@@ -63,7 +63,7 @@ class Hold:
         """
         if self.driven or not self.problem.anchors:
             return False
-        support = self.problem.find_support(modes)
+        support = self.problem.find_free_motions(modes)
         carried = measure_balance(self.problem, v, load, support).carried.max(initial=0.0) > DRIVEN
         self.driven = broadcast(self.problem.comm, bool(carried))
         return self.driven
@@ -128,7 +128,7 @@ class Hold:
 
     def find_free(self, modes: ModeState) -> str | None:
         """The motions that neither pairs nor anchors hold, in words; None if there are none."""
-        support = self.problem.find_support(modes)
+        support = self.problem.find_free_motions(modes)
         return (support.text or None) if self.driven else support.unheld
 
     def _find_cut_motion(self, modes: ModeState) -> str | None:

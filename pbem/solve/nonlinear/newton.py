@@ -36,7 +36,7 @@ from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
 from pbem.solve.problem.step import Iteration, Reporter
-from pbem.solve.problem.tangent import AnyTangent, Solved
+from pbem.solve.problem.tangent import Solved, TangentOperator
 from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
 
 
@@ -66,7 +66,7 @@ UNSETTLED = ("iteration limit", "mode cycle")
 
 
 def solve_step(
-    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Reporter,
     refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None, hurried: bool = False,
 ) -> Solution:
     """Converge one load step from the memory of the last.
@@ -92,7 +92,7 @@ def solve_step(
     return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, last, iterations)
 
 
-def _list_searches(problem: Problem, tangent: AnyTangent) -> list[Search]:
+def _list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
     """The searches of one step, one after the other where the former does not settle."""
     settling, linear = tangent.settling, find_linear(problem.laws)
     sweeps = settling.nearby and not is_one_group(problem.mesh) and bool(linear.all())
@@ -107,7 +107,7 @@ def _list_searches(problem: Problem, tangent: AnyTangent) -> list[Search]:
 
 
 def _search_modes(
-    problem: Problem, tangent: AnyTangent, memory: Memory, load: Load, reporter: Reporter,
+    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Reporter,
     refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, search: Search, iterations: list[Iteration],
 ) -> Solution:
     """See solve_step; by one search, whose iterations join those before."""
@@ -198,7 +198,7 @@ def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> Converg
 
 
 def _pivot(
-    hold: Hold, tangent: AnyTangent, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
+    hold: Hold, tangent: TangentOperator, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
     law: Linearisation, solved: Solved, search: Search,
 ) -> ModeState | None:
     """The modes that all groups of a crack network settle on by themselves, or else with those of the search's group

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from pbem.arrays import Integer, Real
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
-from pbem.solve.petsc.effort import Work
+from pbem.solve.petsc.refactoring import Work
 from pbem.solve.petsc.session import PREFIX, PETSc, factor_in_place, pass_over_divergence
 from pbem.solve.petsc.shares import change_shares, find_own_blocks, share_equally
 

@@ -16,7 +16,7 @@ from scipy.linalg import lapack
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
-from pbem.bem.rigid import RigidMotions
+from pbem.bem.rigid_motions import RigidMotions
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap
@@ -24,7 +24,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
-from pbem.solve.preconditioner.subdomains import Group
+from pbem.solve.preconditioner.subdomains import Subdomain
 
 # Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
 MOST_LEFT = 900
@@ -39,7 +39,7 @@ class LocalInverse:
     formed: whether it has been tried.
     """
 
-    group: Group
+    group: Subdomain
     own: Integer
     around: Integer
     inside: Integer
@@ -54,7 +54,7 @@ class SchwarzPreconditioner:
 
     def __init__(
         self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
-        groups: Sequence[Group], nodes: Integer, rigid: Sequence[RigidMotions] = (),
+        groups: Sequence[Subdomain], nodes: Integer, rigid: Sequence[RigidMotions] = (),
     ) -> None:
         self._mesh, self._anchors = mesh, tuple(anchors)
         self._rigid = [motions for motions in rigid if motions.interpolated]
@@ -72,12 +72,12 @@ class SchwarzPreconditioner:
         self.singular = 0  # groups without an inverse, of those formed last
         self.inverses = [self._place(group) for group in groups]
 
-    def regroup(self, groups: Sequence[Group]) -> None:
+    def regroup(self, groups: Sequence[Subdomain]) -> None:
         """Take other surroundings of the same groups; `update` then forms all inverses."""
         self._formed = None
         self.inverses = [self._place(group) for group in groups]
 
-    def _place(self, group: Group) -> LocalInverse:
+    def _place(self, group: Subdomain) -> LocalInverse:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
         around = list_nodes(self._mesh, group.around)
         inside = number_components(np.searchsorted(around, list_nodes(self._mesh, group.elements)))

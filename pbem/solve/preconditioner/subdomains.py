@@ -37,7 +37,7 @@ MOST_AROUND = 3000
 
 
 @dataclass(frozen=True)
-class Group:
+class Subdomain:
     """elements: of the group, sorted; around: those and the elements around it, sorted.
 
     nearest: of the elements around, those that may be left out where there are too many unknowns, the nearest first;
@@ -108,7 +108,7 @@ def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tu
 
 def surround_groups(
     mesh: Mesh, groups: list[Integer], first: int, last: int, widening: int = 1
-) -> tuple[Group, ...]:
+) -> tuple[Subdomain, ...]:
     """The groups of the numbers first .. last - 1, each with those around it: so many times as many as at first."""
     center, radius = _enclose_groups(mesh, groups)
     size = np.array([len(group) for group in groups]) * 2 * (mesh.order + 1)
@@ -135,14 +135,14 @@ def surround_groups(
         near = np.concatenate([near[touching], near[~touching]])
         taken = near[(np.cumsum(size[near]) <= room) | (np.arange(len(near)) < touching.sum())]
         around = np.sort(np.concatenate([groups[number], *(groups[k] for k in taken)]))
-        result.append(Group(groups[number], around))
+        result.append(Subdomain(groups[number], around))
     return tuple(result)
 
 
-def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Group:
+def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Subdomain:
     least = NEIGHBOUR_UNKNOWNS // (2 * (mesh.order + 1))
     nearest = find_nearest(mesh, group, elements, int(NEAREST_SHARE * widening * max(len(group), least)))
-    return Group(group, np.union1d(group, nearest), nearest)
+    return Subdomain(group, np.union1d(group, nearest), nearest)
 
 
 def find_nearest(mesh: Mesh, group: Integer, elements: cKDTree, count: int) -> Integer:

@@ -17,10 +17,10 @@ from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.custom import asked_by_one_rank
+from pbem.contact.free_motions import FreeMotions, find_free_motions, find_ties
 from pbem.contact.laws import ModeState, PairLaws, stick_creeping
 from pbem.contact.loads import Load, OuterNodes, evaluate_load
 from pbem.contact.modes import Linearisation
-from pbem.contact.support import Support, find_support, find_ties
 from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh, second_face_nodes
 from pbem.mesh.numbering import number_components, split_components
@@ -28,7 +28,7 @@ from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import RigidBodyMode, find_plane_translations
 from pbem.parallel import do_on_first, gather_parts, norm_of_parts
-from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.problem.tangent import TangentOperator
 
 T = TypeVar("T")
 
@@ -76,7 +76,7 @@ class System(Protocol):
         The parts of all ranks, one after the other, are those of all crack nodes in mesh order.
         """
 
-    def make_tangent(self, problem: Problem) -> AnyTangent:
+    def make_tangent(self, problem: Problem) -> TangentOperator:
         """The tangent operator K = B M of the problem whose system it is."""
 
     def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> InteriorRows:
@@ -142,25 +142,25 @@ class Problem:
         """Translations of an infinite region that no prescribed displacement and no spring holds."""
         return find_plane_translations(self.model)
 
-    def find_support(self, modes: ModeState) -> Support:
+    def find_free_motions(self, modes: ModeState) -> FreeMotions:
         """What holds the bodies in given modes; remembered, as modes are asked of several times."""
         return self._supports(stick_creeping(self.laws, modes).mode.tobytes())
 
     @cached_property
-    def _supports(self) -> Callable[[bytes], Support]:
+    def _supports(self) -> Callable[[bytes], FreeMotions]:
         sign = np.ones(self.mesh.pairs.count)
 
-        def find(mode: bytes) -> Support:
+        def find(mode: bytes) -> FreeMotions:
             ties = find_ties(self.model, self.mesh, ModeState(np.frombuffer(mode, dtype=np.int8), sign))
             key = str(sorted(ties.items())) if all(isinstance(tie, str) for tie in ties.values()) else None
             if key is None or key not in known:
-                support = find_support(self.model, self.mesh, self.anchors, self.anchored, ties)
+                support = find_free_motions(self.model, self.mesh, self.anchors, self.anchored, ties)
                 if key is None:
                     return support
                 known[key] = support
             return known[key]
 
-        known: dict[str, Support] = {}
+        known: dict[str, FreeMotions] = {}
         return lru_cache(maxsize=64)(find)
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
@@ -212,6 +212,6 @@ class Problem:
         whole = gather_parts(self.comm, self.system.recover(v - load.known))
         return whole[0::2] + 1j * whole[1::2] + load.background[self.all_crack_nodes]
 
-    def make_tangent(self) -> AnyTangent:
+    def make_tangent(self) -> TangentOperator:
         """The tangent operator that belongs to the system."""
         return self.system.make_tangent(self)

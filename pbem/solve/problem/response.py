@@ -11,11 +11,11 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.tangent import AnyTangent, Solved
+from pbem.solve.problem.tangent import Solved, TangentOperator
 
 
 def find_response(
-    problem: Problem, tangent: AnyTangent, constraints: ConstraintMap, load: Load, law: Linearisation,
+    problem: Problem, tangent: TangentOperator, constraints: ConstraintMap, load: Load, law: Linearisation,
     solved: Solved, pairs: Integer,
 ) -> Response:
     """The response of pairs (s,) to all that their own laws could demand; all ranks together.
@@ -51,6 +51,6 @@ def select_states(
     spread = np.zeros_like(law.tangent)
     spread[pairs] = directions
     matrix = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
-    unknowns = number_components(problem.mesh.pairs.slot[pairs])
+    unknowns = number_components(problem.mesh.pairs.slave[pairs])
     # The carriers' displacements are columns of their own: those of the pairs' unknowns are their states alone.
     return matrix[:, unknowns].toarray(), unknowns

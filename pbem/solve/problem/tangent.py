@@ -52,7 +52,7 @@ class Settling:
     nearby: bool
 
 
-class AnyTangent(Protocol):
+class TangentOperator(Protocol):
     """Solves the linear systems of Newton's method; all ranks call it together and get the same."""
 
     @property

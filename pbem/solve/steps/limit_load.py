@@ -113,7 +113,7 @@ def _maximise(
     mesh, laws = problem.mesh, problem.laws
     scale = size / problem.model.size
     columns = 2 * mesh.nodes
-    at_n, at_s = 2 * mesh.pairs.slot, 2 * mesh.pairs.slot + 1
+    at_n, at_s = 2 * mesh.pairs.slave, 2 * mesh.pairs.slave + 1
     pressure, rise = loads[0].pressure / scale, (loads[1].pressure - loads[0].pressure) / scale
     friction, cohesion = _find_strongest(laws, memory)
     limit = tensile_limit(laws, memory)

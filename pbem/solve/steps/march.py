@@ -13,7 +13,7 @@ from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, Reporter, Step
-from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.ceiling import SAFE, Ceiling
 from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, refuse_load
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
@@ -83,8 +83,8 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
 
 
 def _advance(
-    problem: Problem, tangent: AnyTangent, memory: Memory, stage: int, reached: float, planned: float, ceiling: Ceiling,
-    reporter: Reporter,
+    problem: Problem, tangent: TangentOperator, memory: Memory, stage: int, reached: float, planned: float,
+    ceiling: Ceiling, reporter: Reporter,
 ) -> tuple[Solution, float, Ceiling]:
     """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
 

@@ -45,7 +45,7 @@ def describe_step(
             traction_s=pairs.p_s,
             internal=memory.internal,
         ),
-        balance=measure_balance(problem, solution.v, load, problem.find_support(solution.modes)),
+        balance=measure_balance(problem, solution.v, load, problem.find_free_motions(solution.modes)),
         linearity=measure_linearity(mesh, everywhere, pairs.g_s),
         duration=solution.memory.duration,
     )

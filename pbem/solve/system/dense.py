@@ -11,7 +11,7 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
 from pbem.bem.operator import Block, RowOperator, add_anchor, assemble_displacement_rows, assemble_rows
-from pbem.bem.rigid import find_rigid_motions, free_rotations, need_rotations
+from pbem.bem.rigid_motions import find_rigid_motions, free_rotations, need_rotations
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import build_constraints
 from pbem.contact.laws import PairLaws
@@ -24,7 +24,7 @@ from pbem.solve.petsc.linear import choose_method
 from pbem.solve.petsc.session import list_options
 from pbem.solve.petsc.shares import cut_equally, refuse_shares
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.tangent.condensed import CondensedTangent
 from pbem.solve.tangent.factored import FactoredTangent
 from pbem.solve.tangent.reference import TangentRows
@@ -110,11 +110,11 @@ class DenseSystem:
             part[block.rows] = block.matrix @ v[block.columns]
         return part
 
-    def make_tangent(self, problem: Problem) -> AnyTangent:
+    def make_tangent(self, problem: Problem) -> TangentOperator:
         """Condensed, or by GMRES if that is asked for; freed from the anchors if there are any."""
         rows, laws = self.tangent_rows, problem.laws
         varying = ~(laws.bonded | laws.parted | laws.follows)
-        tangent: AnyTangent
+        tangent: TangentOperator
         # Options of the Krylov solver are heeded where it does the work.
         asked = any(name.startswith(("ksp_", "pc_type")) for name in list_options())
         if problem.model.solver.linear == "gmres" or asked:

@@ -29,10 +29,10 @@ from pbem.model.model import Model
 from pbem.parallel import add_up
 from pbem.solve.petsc.shares import cut_equally
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.preconditioner.subdomains import Group, divide_model, share_groups, surround_groups
+from pbem.solve.preconditioner.subdomains import Subdomain, divide_model, share_groups, surround_groups
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.tangent import AnyTangent
-from pbem.solve.system.accuracy import measure_product_error
+from pbem.solve.problem.tangent import TangentOperator
+from pbem.solve.system.product_error import measure_product_error
 from pbem.solve.tangent.krylov import KrylovTangent
 
 # Beyond this rounding in the expansions outweighs what further terms bring.
@@ -49,8 +49,8 @@ class HierarchicalSystem:
 
     operator: HierarchicalOperator
     crack_points: PointRows | None
-    groups: tuple[Group, ...]
-    widen_groups: Callable[[int], tuple[Group, ...]]
+    groups: tuple[Subdomain, ...]
+    widen_groups: Callable[[int], tuple[Subdomain, ...]]
     tolerance: float
     notes: tuple[str, ...]
 
@@ -102,7 +102,7 @@ class HierarchicalSystem:
         """See System (theory, 13)."""
         return np.zeros(0) if self.crack_points is None else split_components(self.crack_points.displacement(v))
 
-    def make_tangent(self, problem: Problem) -> AnyTangent:
+    def make_tangent(self, problem: Problem) -> TangentOperator:
         """GMRES, preconditioned by the groups."""
         preconditioner = SchwarzPreconditioner(
             problem.mesh, [region.material for region in problem.model.regions], problem.model.size, problem.anchors,

@@ -17,9 +17,9 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import G_N, P_N, P_S, Linearisation
 from pbem.mesh.numbering import number_components
 from pbem.parallel import broadcast, gather_rows
-from pbem.solve.petsc.effort import Effort
+from pbem.solve.petsc.refactoring import Effort
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.tangent import AnyTangent, Solved, describe_residual, size_residual
+from pbem.solve.problem.tangent import Solved, TangentOperator, describe_residual, size_residual
 from pbem.solve.tangent.condensation import PairBases, PairSolution, Split, respond_pairs, solve_pairs
 from pbem.solve.tangent.load_basis import LoadBasis
 from pbem.solve.tangent.pair_columns import PairColumns, start_columns
@@ -68,7 +68,7 @@ class Known:
     load: LoadSolution | None = None
 
 
-class CondensedTangent(AnyTangent):
+class CondensedTangent(TangentOperator):
     """Factors of one reference operator; the contact pairs' unknowns are condensed (see condensation).
 
     varying (m,): pairs whose mode can change. If they are few, their columns are computed at once; crack pairs are
@@ -85,11 +85,11 @@ class CondensedTangent(AnyTangent):
         pairs = problem.mesh.pairs
         self.eliminated = pairs.crack & varying & few
         self.reference = Reference(problem, rows, np.flatnonzero(self.eliminated))
-        self.unknowns = number_components(pairs.slot[self.varying])
+        self.unknowns = number_components(pairs.slave[self.varying])
         self.known: Known | None = None
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent. The first solution after a factorisation is checked, others are not."""
+        """See TangentOperator. The first solution after a factorisation is checked, others are not."""
         fresh = not self._reach(law)
         if fresh:
             self._factorise(load, law)
@@ -102,7 +102,7 @@ class CondensedTangent(AnyTangent):
         return self.check(solved, constraints, load, law) if fresh or pairs.rcond < LEAST_RCOND else solved
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent."""
+        """See TangentOperator."""
         if solved.checked:
             return solved
         tolerance = self.problem.model.solver.newton_tolerance
@@ -249,7 +249,7 @@ class CondensedTangent(AnyTangent):
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
     ) -> Real:
-        """See AnyTangent; by the first rank, from the columns of these pairs."""
+        """See TangentOperator; by the first rank, from the columns of these pairs."""
         own = np.searchsorted(self.varying, pairs)
         missing = np.setdiff1d(own, self._present.columns.known)
         if len(missing):
@@ -267,11 +267,11 @@ class CondensedTangent(AnyTangent):
         return found
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
-        """See AnyTangent."""
+        """See TangentOperator."""
         return self._condense(self._solve_system(forces), self._split(law).drop_offsets())[0]
 
     def destroy(self) -> None:
-        """See AnyTangent."""
+        """See TangentOperator."""
         self.reference.destroy()
 
 

@@ -13,14 +13,14 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
-from pbem.solve.problem.tangent import AnyTangent, Solved, describe_residual, size_residual
+from pbem.solve.problem.tangent import Solved, TangentOperator, describe_residual, size_residual
 from pbem.solve.tangent.reference import Reference, TangentRows
 
 # Of GMRES with old factors: fewer are not worth a try, more take too much storage.
 LEAST_ITERATIONS, MOST_ITERATIONS = 4, 100
 
 
-class FactoredTangent(AnyTangent):
+class FactoredTangent(TangentOperator):
     """The operator of the present modes, solved by GMRES with the factors of the same or of earlier modes.
 
     Old factors are kept until the further iterations with them have taken as many operations as new factors would.
@@ -39,7 +39,7 @@ class FactoredTangent(AnyTangent):
             self._factorise(constraints)
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent."""
+        """See TangentOperator."""
         problem = self.problem
         self.reference.present = constraints.matrix
         forced = problem.apply(constraints.offset, load)
@@ -61,20 +61,20 @@ class FactoredTangent(AnyTangent):
         raise describe_residual(residual, tolerance)
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent; every solution is checked."""
+        """See TangentOperator; every solution is checked."""
         return solved
 
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
     ) -> Real:
-        """See AnyTangent."""
+        """See TangentOperator."""
         self.reference.present = constraints.matrix
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
         forces = (self.problem.system.apply(-states[:, k]) for k in range(states.shape[1]))
         return np.stack([self._solve_by_any(constraints, each)[unknowns] for each in forces], axis=1)
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
-        """See AnyTangent."""
+        """See TangentOperator."""
         self.reference.present = constraints.matrix
         return np.stack([self._solve_by_any(constraints, each) for each in forces.T], axis=1)
 
@@ -122,7 +122,7 @@ class FactoredTangent(AnyTangent):
         self.factored = constraints.matrix
 
     def destroy(self) -> None:
-        """See AnyTangent."""
+        """See TangentOperator."""
         self.reference.destroy()
 
 

@@ -16,10 +16,10 @@ from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence, petsc_options
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.preconditioner.subdomains import Group
+from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
-from pbem.solve.problem.tangent import MOST_SETTLED, AnyTangent, Judge, Settling, Solved, size_residual
+from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.tangent.sweeps import Sweeps
 
@@ -40,12 +40,12 @@ MOST_SETTLED_BY_GMRES = 12
 RESPONSE = 3e-2
 
 
-class KrylovTangent(AnyTangent):
+class KrylovTangent(TangentOperator):
     """The tangent operator K = B M as a PETSc shell; its preconditioner follows the modes."""
 
     def __init__(
-        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Group],
-        widen: Callable[[int], Sequence[Group]],
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Subdomain],
+        widen: Callable[[int], Sequence[Subdomain]],
     ) -> None:
         """groups: of the preconditioner; widen: makes them with so many times as many elements around them."""
         self.problem = problem
@@ -93,7 +93,7 @@ class KrylovTangent(AnyTangent):
 
     @property
     def settling(self) -> Settling:
-        """See AnyTangent."""
+        """See TangentOperator."""
         return self._settling
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
@@ -175,13 +175,13 @@ class KrylovTangent(AnyTangent):
         return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent; every solution is checked."""
+        """See TangentOperator; every solution is checked."""
         return solved
 
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
     ) -> Real:
-        """See AnyTangent; to RESPONSE of the forces only, as the modes that follow are judged by a full solution.
+        """See TangentOperator; to RESPONSE of the forces only, as the modes that follow are judged by a full solution.
 
         Of cracks that meet, where the pairs are many, with the elements near to them alone.
         """
@@ -204,7 +204,7 @@ class KrylovTangent(AnyTangent):
         self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,
         solved: Solved, judge: Judge,
     ) -> ModeState:
-        """See AnyTangent; the next solution begins from the states that go with the modes."""
+        """See TangentOperator; the next solution begins from the states that go with the modes."""
         if self._sweeps is None:
             self._sweeps = Sweeps(self.problem, self.preconditioner, self._groups, load)
         settled, self.expected = self._sweeps.settle(constraints, modes, memory, load, law, solved, judge)
@@ -214,13 +214,13 @@ class KrylovTangent(AnyTangent):
         """The last solution, or the states expected of the pairs, in the present unknowns; None if there is none."""
         if self.solution is None or law is None or self.law is None:
             return self.solution
-        slot = self.problem.mesh.pairs.slot
+        slave = self.problem.mesh.pairs.slave
         carried = self.solution.reshape(-1, 2).copy()
-        state = np.einsum("mij,mj->mi", self.law.tangent, carried[slot]) + self.law.offset
+        state = np.einsum("mij,mj->mi", self.law.tangent, carried[slave]) + self.law.offset
         if self.expected is not None:
             state = np.where(self.problem.laws.follows[:, None], state, self.expected)
             self.expected = None
-        carried[slot] = carry_over(state, law, self.problem.traction_scale)
+        carried[slave] = carry_over(state, law, self.problem.traction_scale)
         return carried.ravel()
 
     def _guess(self, right: Real, begin: Real | None) -> Real:
@@ -253,7 +253,7 @@ class KrylovTangent(AnyTangent):
         return self.problem.system.apply(v) - self.problem.find_released(v, self.constraints.released)
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
-        """See AnyTangent; without the anchors that the constraint map releases."""
+        """See TangentOperator; without the anchors that the constraint map releases."""
         self.constraints = constraints
         self._solver.setTolerances(rtol=self._tolerance)
         self._left.set(0.0)

@@ -77,7 +77,7 @@ def respond_nearby(
     problem: Problem, preconditioner: SchwarzPreconditioner, constraints: ConstraintMap, load: Load,
     law: Linearisation, pairs: Integer, directions: Real,
 ) -> Real:
-    """As AnyTangent.respond, (2 s, 2 s), for crack pairs, after the preconditioner took the same constraints.
+    """As TangentOperator.respond, (2 s, 2 s), for crack pairs, after the preconditioner took the same constraints.
 
     Zero between sets of pairs that are far apart.
     """
@@ -85,14 +85,14 @@ def respond_nearby(
     spread[pairs] = directions
     offsets = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
     result = np.zeros((2 * len(pairs), 2 * len(pairs)))
-    slot = problem.mesh.pairs.slot[pairs]
+    slave = problem.mesh.pairs.slave[pairs]
     tree = cKDTree(_at(0.5 * (problem.mesh.start + problem.mesh.end)))
-    for number, members in enumerate(part_by_distance(problem.mesh, slot)):
+    for number, members in enumerate(part_by_distance(problem.mesh, slave)):
         if number % problem.comm.size != problem.comm.rank:
             continue
-        own = np.unique(problem.mesh.node_element[slot[members]])
+        own = np.unique(problem.mesh.node_element[slave[members]])
         further = find_nearest(problem.mesh, own, tree, max(AROUND * len(own), LEAST_AROUND))
-        unknowns = number_components(slot[members])
+        unknowns = number_components(slave[members])
         at = number_components(members)
         result[np.ix_(at, at)] = preconditioner.respond(
             constraints.matrix, offsets, np.union1d(own, further), unknowns

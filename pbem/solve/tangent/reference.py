@@ -92,7 +92,7 @@ class Reference:
     def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer) -> None:
         self.problem, self.operator, self.block_unknowns = problem, rows.operator, rows.block_unknowns
         method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
-        nodes = problem.mesh.pairs.slot[eliminated]
+        nodes = problem.mesh.pairs.slave[eliminated]
         kept = np.ones(problem.unknowns, dtype=bool)
         kept.reshape(-1, 2)[nodes] = False
         self.kept, self.number = kept, np.cumsum(kept) - 1

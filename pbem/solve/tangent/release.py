@@ -21,7 +21,7 @@ from pbem.contact.modes import Linearisation
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
-from pbem.solve.problem.tangent import AnyTangent, Solved, describe_residual, size_residual
+from pbem.solve.problem.tangent import Solved, TangentOperator, describe_residual, size_residual
 
 # Solutions are corrected until they are as good as this, though the tolerance may be weaker.
 GOOD_RESIDUAL = 1e-12
@@ -30,23 +30,23 @@ MOST_CORRECTIONS = 2
 COLUMNS_AT_ONCE = 512
 
 
-class ReleasedTangent(AnyTangent):
+class ReleasedTangent(TangentOperator):
     """Another tangent operator, whose solutions it frees from the anchors that a constraint map releases."""
 
-    def __init__(self, problem: Problem, anchored: AnyTangent) -> None:
+    def __init__(self, problem: Problem, anchored: TangentOperator) -> None:
         self.problem, self.anchored = problem, anchored
         self.held: Solved | None = None  # the last solution with all anchors
         self.responses = np.zeros((problem.unknowns, 0))  # X
 
     def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent."""
+        """See TangentOperator."""
         self.held = self.anchored.solve(constraints, load, law)
         if not _releases(constraints):
             return self.held
         return self._release(self.held, constraints, load, law)
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See AnyTangent."""
+        """See TangentOperator."""
         if solved.checked:
             return solved
         assert self.held is not None
@@ -105,7 +105,7 @@ class ReleasedTangent(AnyTangent):
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
     ) -> Real:
-        """See AnyTangent; with released anchors by whole solutions, many at a time."""
+        """See TangentOperator; with released anchors by whole solutions, many at a time."""
         if not _releases(constraints):
             return self.anchored.respond(constraints, load, law, pairs, directions)
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
@@ -118,11 +118,11 @@ class ReleasedTangent(AnyTangent):
         return result
 
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
-        """See AnyTangent."""
+        """See TangentOperator."""
         return self.anchored.solve_forces(constraints, load, law, forces)
 
     def destroy(self) -> None:
-        """See AnyTangent."""
+        """See TangentOperator."""
         self.anchored.destroy()
 
 

@@ -28,7 +28,7 @@ from pbem.mesh.numbering import list_nodes
 from pbem.parallel import add_up
 from pbem.solve.preconditioner.elimination import take_blocks
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.preconditioner.subdomains import Group, find_nearest
+from pbem.solve.preconditioner.subdomains import Subdomain, find_nearest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Judge, Solved
 
@@ -50,29 +50,29 @@ class Sweeps:
 
     All groups take a step of Newton's method at a time. Their pairs (k,), one group after the other, are in `pairs`,
     most of them in more than one group; owned (k,): those that belong to the group and not to what is around it.
-    Group j has those from first[j] to first[j + 1], and their stiffness (see pbem.contact.local_laws).
+    Subdomain j has those from first[j] to first[j + 1], and their stiffness (see pbem.contact.local_laws).
     """
 
     def __init__(
-        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Iterable[Group], load: Load
+        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Iterable[Subdomain], load: Load
     ) -> None:
         self._problem, mesh = problem, problem.mesh
         self._jumps = _free(problem, ~problem.laws.follows)
         constraints = problem.constrain(self._jumps, load)
         closed = problem.constrain(_free(problem, np.zeros(problem.laws.count, dtype=bool)), load)
         # The tractions of a crack's pair are in its own node's equations alone.
-        own_equations = take_blocks((preconditioner.free @ closed.matrix).tocsr(), mesh.nodes)[mesh.pairs.slot]
+        own_equations = take_blocks((preconditioner.free @ closed.matrix).tocsr(), mesh.nodes)[mesh.pairs.slave]
         self._softness = np.linalg.inv(own_equations)
-        self._held = np.flatnonzero(np.isin(mesh.pairs.slot, problem.system.nodes))
+        self._held = np.flatnonzero(np.isin(mesh.pairs.slave, problem.system.nodes))
         pair_of_node = np.full(mesh.nodes, -1)
-        pair_of_node[mesh.pairs.slot] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
+        pair_of_node[mesh.pairs.slave] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
         pairs, owned = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=bool)]
         self._stiffness = []
         for own, around in _divide(mesh, groups):
             near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (around, own))
             if not len(inside):
                 continue
-            formed = preconditioner.form_block(constraints.matrix, around, mesh.pairs.slot[near])
+            formed = preconditioner.form_block(constraints.matrix, around, mesh.pairs.slave[near])
             formed = self._softness[near] @ formed.reshape(len(near), 2, -1)
             self._stiffness.append(-formed.reshape(2 * len(near), -1).astype(np.float32))
             pairs.append(near)
@@ -151,16 +151,16 @@ class Sweeps:
         """
         problem, mesh = self._problem, self._problem.mesh
         unknowns = solved.unknowns.reshape(-1, 2).copy()
-        unknowns[mesh.pairs.slot] = np.where(problem.laws.follows[:, None], 0.0, jumps)
+        unknowns[mesh.pairs.slave] = np.where(problem.laws.follows[:, None], 0.0, jumps)
         v = problem.constrain(self._jumps, load).evaluate(unknowns.ravel())
         equations = problem.apply(v, load, constraints.released).reshape(-1, 2)
-        place = np.searchsorted(problem.system.nodes, mesh.pairs.slot[self._held])
+        place = np.searchsorted(problem.system.nodes, mesh.pairs.slave[self._held])
         result = np.zeros((mesh.pairs.count, 2))
         result[self._held] = -(self._softness[self._held] @ equations[place][..., None])[..., 0]
         return add_up(problem.comm, result)
 
 
-def _divide(mesh: Mesh, groups: Iterable[Group]) -> Iterator[tuple[Integer, Integer]]:
+def _divide(mesh: Mesh, groups: Iterable[Subdomain]) -> Iterator[tuple[Integer, Integer]]:
     """The elements of parts of the groups, and those with the elements around them, each rising."""
     middle = 0.5 * (mesh.start + mesh.end)
     tree = cKDTree(np.column_stack([middle.real, middle.imag]))

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from pbem.arrays import Real
 from pbem.bem.hierarchical import HierarchicalOperator
 from pbem.bem.operator import scale_equations
-from pbem.bem.rigid import take_off_rotations
+from pbem.bem.rigid_motions import take_off_rotations
 from pbem.bem.rows import evaluate_rows
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.parallel import add_up

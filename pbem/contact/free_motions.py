@@ -55,7 +55,7 @@ def _measure_span(mesh: Mesh, chosen: Integer) -> Real:
 
 
 @dataclass(frozen=True)
-class Support:
+class FreeMotions:
     """What holds the bodies in the present modes.
 
     motions: that the pairs leave free. unheld: those that no anchor holds either, in words; None if there are none.
@@ -74,10 +74,10 @@ class Support:
         return "; ".join(motion.text for motion in self.motions)
 
 
-def find_support(
+def find_free_motions(
     model: Model, mesh: Mesh, anchors: tuple[Anchor, ...], anchored: tuple[RigidBodyMode, ...],
     ties: Mapping[str, Tie | PairTie],
-) -> Support:
+) -> FreeMotions:
     """Which rigid motions are free with these ties, and which of the anchors, made for `anchored`, hold them."""
     motions = find_rigid_body_modes(model, ties)
     whole = np.eye(len(anchors))
@@ -99,7 +99,7 @@ def find_support(
         acting.append(whole[:, at] @ basis[:, : len(free)])
         released.append(whole[:, at] @ basis[:, len(free) :])
     text = "; ".join(unheld) or None
-    return Support(motions, text, np.concatenate(acting, axis=1), np.concatenate(released, axis=1))
+    return FreeMotions(motions, text, np.concatenate(acting, axis=1), np.concatenate(released, axis=1))
 
 
 def _is_spanned(

@@ -16,13 +16,13 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import linearise
 from pbem.errors import ConvergenceError
 from pbem.parallel import StopSignals, do_on_first
-from pbem.solve.estimate.beside import Beside
+from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.launch.watch import Watch
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, SilentReporter, Step
-from pbem.solve.problem.tangent import AnyTangent
+from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.system.assembly import assemble_problem
 
@@ -37,7 +37,7 @@ class SecondSolution:
         """
         self.beside = beside
         self.problem: Problem = assemble_problem(beside.model, beside.mesh, comm)
-        self.tangent: AnyTangent = self.problem.make_tangent()
+        self.tangent: TangentOperator = self.problem.make_tangent()
         self.memory: Memory = start_memory(self.problem.laws)
         self._watch = Watch(comm, SilentReporter(), StopSignals())
         self._watch.look_after(self.problem.laws)

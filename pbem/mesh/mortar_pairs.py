@@ -80,12 +80,12 @@ def pair_contact(
     nearest = np.zeros(len(nodes), dtype=np.int64)
     by_weight = np.argsort(product, kind="stable")
     nearest[pair_of_node[own[by_weight]] - count] = master.first_node + other[by_weight]
-    slot = slave.first_node + nodes
+    slave_node = slave.first_node + nodes
     follows = slave.curve == joint.second
     made |= {
-        "first": nearest if follows else slot,
-        "second": slot if follows else nearest,
-        "slot": slot,
+        "first": nearest if follows else slave_node,
+        "second": slave_node if follows else nearest,
+        "slave": slave_node,
         "sense": np.full(len(nodes), 1.0 if follows else -1.0),
         "distance": np.where(distance > _rounding(slave.elements, master.elements), distance, 0.0),
     }
@@ -93,7 +93,7 @@ def pair_contact(
 
 
 def describe_sparse_meshes(contacts: Sequence[tuple[str, Integer]], order: int) -> tuple[str, ...]:
-    """A sentence for every contact (name, slot nodes) that has less than five elements with pairs."""
+    """A sentence for every contact (name, slave nodes) that has less than five elements with pairs."""
     counts = {name: len(np.unique(slots // (order + 1))) for name, slots in contacts}
     return tuple(
         f"Contact '{name}' has {count} element{'s' * (count != 1)} that face each other: fewer than {FEWEST} do not "

@@ -26,7 +26,7 @@ class Beside:
     """A coarser model and mesh beside those of a run, and how values of the run are read there.
 
     kind: how it was made, see `pbem.model.refinement`. carry: to the coarse mesh's nodes. seen (c,): of each of its
-    pairs, whether all fine pairs that it is compared with are there. pair_of_node (n,): the fine pair whose slot node
+    pairs, whether all fine pairs that it is compared with are there. pair_of_node (n,): the fine pair whose slave node
     a fine node is, or -1. nearest (c,): the nearest fine pair, or -1.
     """
 
@@ -45,9 +45,9 @@ class Beside:
         jumps: on crack-tip elements with the shape of the square root.
         """
         at_nodes = np.zeros(self.fine.nodes)
-        at_nodes[self.fine.pairs.slot] = values
+        at_nodes[self.fine.pairs.slave] = values
         matrix = self.carry.rooted if jumps else self.carry.plain
-        return np.asarray((matrix @ at_nodes)[self.mesh.pairs.slot])
+        return np.asarray((matrix @ at_nodes)[self.mesh.pairs.slave])
 
 
 def put_beside(model: Model, mesh: Mesh) -> Beside | None:
@@ -67,7 +67,8 @@ def relate_meshes(
     """What reads values of a run on the mesh of another model, each of whose elements is made of whole ones."""
     carry = carry_nodes(model, mesh, second, second_mesh)
     pair_of_node = np.full(mesh.nodes, -1)
-    pair_of_node[mesh.pairs.slot] = np.arange(mesh.pairs.count)
-    slot = second_mesh.pairs.slot
-    lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slot]
-    return Beside(kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, pair_of_node[carry.nearest[slot]])
+    pair_of_node[mesh.pairs.slave] = np.arange(mesh.pairs.count)
+    slave = second_mesh.pairs.slave
+    lacking = (abs(carry.plain) @ (pair_of_node < 0).astype(float))[slave]
+    nearest = pair_of_node[carry.nearest[slave]]
+    return Beside(kind, second, second_mesh, mesh, carry, lacking == 0, pair_of_node, nearest)

@@ -12,6 +12,7 @@ import platform
 
 from setuptools import Extension, find_packages, setup
 from setuptools.command.build_ext import build_ext
+from setuptools.command.sdist import sdist
 from setuptools.errors import CompileError
 
 # The parts of -ffast-math that let logarithm and arc tangent be vectorised. NaN and infinity keep their meaning, and
@@ -54,8 +55,17 @@ class BuildKernels(build_ext):
             super().build_extension(ext)
 
 
+class CompleteSource(sdist):
+    """A source package with the kernels' headers, which setuptools takes no notice of."""
+
+    def make_distribution(self) -> None:
+        """Pack all files."""
+        self.filelist.extend(sorted(glob.glob("pbem/bem/*.h")))
+        super().make_distribution()
+
+
 setup(
-    cmdclass={"build_ext": BuildKernels},
+    cmdclass={"build_ext": BuildKernels, "sdist": CompleteSource},
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
     package_dir={"pbem.cases": "cases"},
     package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"], "pbem.pages": ["*.md"]},

@@ -33,7 +33,7 @@ class Case(description.Case):
         return cls.parse(read_case_text(path), str(path))
 
     @classmethod
-    def parse(cls, text: str, source: str = "case") -> Self:
+    def parse(cls, text: str, source: str = description.UNNAMED) -> Self:
         """The case of the text of a file; `source` names it in messages. Raises CaseError as `read` does."""
         draft = parse_draft(text, source)
         if draft.faults or draft.case is None:
@@ -61,6 +61,6 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     return Case.read(path)
 
 
-def parse_case(text: str, source: str = "case") -> Case:
+def parse_case(text: str, source: str = description.UNNAMED) -> Case:
     """Validate the text of a case file; `source` names it in messages. Raises CaseError with every fault."""
     return Case.parse(text, source)

@@ -245,7 +245,8 @@ def update_active_set(
     # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to the last stick.
     adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), slide, pressure).bound
     # Not where even stiff surroundings would not reach it: cohesion far above all tractions would push them back.
-    weak = is_open & (np.abs(tangential) * STIFFEST > bound)
+    reached = np.abs(state.p_s + laws.stiffness * np.where(still, 0.0, slip - memory.slip)) * STIFFEST
+    weak = is_open & (reached > bound)
     excess = np.abs(tangential) - np.where(weak, np.maximum(bound - adhesion, 0.0), bound)
     free = ~resists_slip(laws)
     # A pair that goes on slipping is held against the traction that it has, whatever its bound was taken at.

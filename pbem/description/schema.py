@@ -328,7 +328,10 @@ class SolverTable(Table):
     )
     tolerance: ProductTolerance = Field(1e-8, description="relative error of the hierarchical operator's products")
     newton_tolerance: Tolerance = Field(1e-9, description="relative residual of the discrete equations")
-    newton_max_iterations: Count = Field(50, description="after so many iterations the load step is halved")
+    newton_max_iterations: Count = Field(
+        50, description="after so many iterations of one search the load step is halved; with friction that changes "
+                        "with slip there are two searches",
+    )  # fmt: skip
     min_step: Fraction = Field(1e-4, description="least load step, as a fraction of a stage")
 
 

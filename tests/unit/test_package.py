@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
+import tarfile
+from pathlib import Path
 
 import pytest
 
@@ -37,3 +40,20 @@ sys.exit(" ".join({"numpy", "h5py", "mpi4py", "petsc4py", "pydantic"} & set(sys.
 """
     process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert process.returncode == 0, process.stderr
+
+
+def test_a_source_package_has_all_that_the_kernels_and_commands_need(tmp_path: Path) -> None:
+    root, made = Path(__file__).resolve().parents[2], tmp_path / "copy"
+    for folder in ("pbem", "cases"):
+        shutil.copytree(root / folder, made / folder, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    for name in ("setup.py", "pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(root / name, made)
+    command = [sys.executable, "setup.py", "-q", "sdist", "--formats=tar", "-d", str(tmp_path)]
+    process = subprocess.run(command, cwd=made, capture_output=True, text=True, timeout=120)
+    assert process.returncode == 0, process.stderr
+    with tarfile.open(next(tmp_path.glob("*.tar"))) as package:
+        packed = {name.partition("/")[2] for name in package.getnames()}
+    needed = {str(path.relative_to(made)) for pattern in ("pbem/**/*.py", "pbem/bem/*.[ch]", "pbem/pages/*.md",
+              "cases/*.toml") for path in made.glob(pattern)}  # fmt: skip
+    assert len(needed) > 200
+    assert sorted(needed - packed) == []

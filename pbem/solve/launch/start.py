@@ -23,7 +23,7 @@ from pbem.solve.system.choice import choose_system
 # The library itself, not its Fortran and C++ parts: libmpi.so.40, libmpich.so.12, libmpi_cray.so.12.
 MPI_LIBRARY = re.compile(r"/lib(mpi|mpich|mpi_cray|mpi_gnu_\d+|mpigcc|mpi_abi|msmpi)\.so[.\d]*$")
 
-# Bytes of address space that OpenBLAS takes at its first call, once for all: 128 MB, and a little for its own lists.
+# Bytes of address space that OpenBLAS takes at its first call, once for all: at most 128 MB, and a little for lists.
 WORK_SPACE = 2**27 + 2**20
 
 
@@ -62,7 +62,8 @@ def claim_work_space() -> None:
 
     Raises MemoryError.
     """
-    np.empty(WORK_SPACE, dtype=np.uint8)  # only asked for, and given back
+    if any("openblas" in file.lower() for file in _list_mapped_files()):
+        np.empty(WORK_SPACE, dtype=np.uint8)  # only asked for, and given back
     np.linalg.solve(np.eye(2), np.ones(2))
 
 

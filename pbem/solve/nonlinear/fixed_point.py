@@ -37,10 +37,10 @@ class FixedPoint:
         result, change = found.copy(), found[moving] - taken[moving]
         if self._taken:
             last = self._found[-1] - self._taken[-1]
-            ratio = float(np.linalg.norm(change) / (np.linalg.norm(last) or 1.0))
+            ratio = float(np.linalg.norm(change) / np.linalg.norm(last)) if last.any() else np.inf
             if not ratio < 1:
                 self._begin(fingerprint)
-                if change @ last >= ALONG * ratio * (last @ last):
+                if ratio < np.inf and change @ last >= ALONG * ratio * (last @ last):
                     result[moving] += change * sum(ratio**k for k in range(1, LEFT_OUT + 1))
         self._taken, self._found = (
             [*terms[-MOST_COMBINED:], new[moving]] for terms, new in ((self._taken, taken), (self._found, found))

@@ -61,8 +61,6 @@ STRAIN_FLOOR = 0.1
 
 # After so many iterations, and so many more, it is asked whether anything could balance the loads.
 PATIENCE = 8
-# Ends of a search that another one may not have.
-UNSETTLED = ("iteration limit", "mode cycle")
 
 
 def solve_step(
@@ -86,8 +84,8 @@ def solve_step(
     for search in first:
         try:
             return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
-        except ConvergenceError as error:
-            if not (search.swept or (search.varying and error.reason in UNSETTLED)):
+        except ConvergenceError:
+            if not (search.swept or (search.varying and search.unsettled)):
                 raise
     return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, last, iterations)
 
@@ -184,7 +182,8 @@ def _search_modes(
         )
         normal_traction, found = pairs.p_n, plastic_slip(laws, pairs)
         if search.wary and frozen == "slip" and not proposal.changed.any():
-            found = fixed_point.choose(modes.fingerprint(), slip, found, modes.mode == SLIP)
+            found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]
+                now.fingerprint(), at, new, now.mode == SLIP))
         slip = choose_slip(laws, modes, memory, slip, found, former)
         if search.just_returned:
             kept = (modes, normal_traction, slip)
@@ -192,6 +191,7 @@ def _search_modes(
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
     """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
+    search.unsettled = reason != "no admissible modes"
     return hold.problem.decide(lambda: (
         hold.describe_free_motion(proposal.modes)
         or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))

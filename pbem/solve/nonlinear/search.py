@@ -90,6 +90,7 @@ class Search:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept = sweeps, False
+        self.unsettled = False  # whether it ended as modes came back, or took too long
         self.wary = wary
         self.restart()
 
@@ -221,7 +222,7 @@ class Search:
             self.widening, self.group = False, self.narrow
             return False
         most = MOST_IN_ALL if ends else FEW_IN_ALL
-        if self.widened == MOST_WIDENED - (not ends) or not len(self.group) < len(self._list_all()) <= most:
+        if self.widened >= MOST_WIDENED - (not ends) or not len(self.group) < len(self._list_all()) <= most:
             return False
         self.widened, self.widening, self.narrow = self.widened + 1, True, self.group
         return True

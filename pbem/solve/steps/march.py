@@ -50,9 +50,11 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
 def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
     """Yield the converged steps of all stages in turn.
 
-    A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction;
-    the factors of a stage's own steps are always met. Raises ConvergenceError with the reason of the last failure, or
-    "limit load" or "not in balance", after the steps before it were yielded.
+    A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction.
+    Where small steps from rest are all alike (see is_proportional_at_last) the least is tried after TRIED_FROM_REST: if
+    that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
+    always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
+    the steps before it were yielded.
     """
     begin = start or start_from_rest(problem)
     tangent = problem.make_tangent()

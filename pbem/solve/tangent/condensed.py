@@ -144,8 +144,9 @@ class CondensedTangent(TangentOperator):
 
         Raises ConvergenceError ("singular tangent", "linear solver"); then nothing is known.
         """
-        problem, before = self.problem, self.known
-        self.known = None
+        problem = self.problem
+        loads = LoadBasis(problem.unknowns, self.reference.rows) if self.known is None else self.known.loads
+        self.known = None  # its columns too, before there are others
         tangent = self._refer(law)
         none = np.zeros(tangent.shape[:2])
         self.reference.form(problem.constrain(Linearisation(tangent, none, law.leader), load).matrix)
@@ -157,7 +158,6 @@ class CondensedTangent(TangentOperator):
         if self.few:
             columns = columns.extend(np.arange(len(self.varying)))
         effort = Effort(problem.comm.size, self.reference.solver.work, limited=not self.few)
-        loads = LoadBasis(problem.unknowns, self.reference.rows) if before is None else before.loads
         self.known = Known(tangent, bases, columns, effort, loads.renew(self._solve_load))
 
     def _refer(self, law: Linearisation) -> Real:

@@ -79,15 +79,15 @@ def test_a_group_that_grows_too_large_is_left_for_its_latest_pairs() -> None:
 
 def test_the_full_tangent_comes_back_once_no_mode_changes_under_a_frozen_bound() -> None:
     search = Search(4)
-    assert search.descend() and search.caution.frozen == "slip"
+    assert search.descend() and search.globalisation.frozen == "slip"
     search.note(propose([1]))
     assert search.level == 1
     search.note(propose([]))
-    assert search.caution.frozen == "nothing"
+    assert search.globalisation.frozen == "nothing"
     # Where it changes modes again, the fixed point is followed to its end.
     search.descend()
     search.note(propose([]))
-    assert search.caution.frozen == "slip"
+    assert search.globalisation.frozen == "slip"
 
 
 def test_all_levels_of_caution_are_tried_in_turn() -> None:

@@ -119,15 +119,16 @@ def _search_modes(
     while True:
         begin = time.perf_counter()
         law = linearise(
-            laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale, search.caution.frozen
+            laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale,
+            search.globalisation.frozen,
         )
         constraints = hold.release(problem.constrain(law, load), modes)
         try:
             solved = tangent.solve(constraints, load, law)
-            outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
+            outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)
-                outcome = _judge(problem, modes, memory, load, law, solved, search.caution)
+                outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
         except ConvergenceError:
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
@@ -140,7 +141,7 @@ def _search_modes(
                 min(search.most_pivoted, MOST_PIVOTED),
             )
             memory = memory.lose(cascade.broken)
-            proposal = _judge(problem, modes, memory, load, law, solved, search.caution).proposal
+            proposal = _judge(problem, modes, memory, load, law, solved, search.globalisation).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
         reporter.iterate(iterations[-1])
@@ -156,7 +157,7 @@ def _search_modes(
         if refused:
             moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
             raise ConvergenceError(refused.reason, refused.detail + moves)
-        frozen, left = search.caution.frozen, search.leaves(outcome.law_error)
+        frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(proposal, outcome.law_error)
         if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
@@ -165,9 +166,9 @@ def _search_modes(
             continue
         chosen = cascade.modes if cascade else None
         # The first rank alone knows which pairs hold a body.
-        share = broadcast(comm, max(search.caution.share, hold.share))
+        share = broadcast(comm, max(search.globalisation.share, hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
-        if not cascade and not (share > search.caution.share):
+        if not cascade and not (share > search.globalisation.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
         if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
             raise _end(hold, "mode cycle", proposal, search)
@@ -207,7 +208,7 @@ def _pivot(
     Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
     """
     problem = hold.problem
-    judge = _make_judge(problem, solved, search.caution)
+    judge = _make_judge(problem, solved, search.globalisation)
     if search.may_sweep():
         swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
         if swept.fingerprint() != modes.fingerprint():
@@ -254,11 +255,11 @@ def _pivot(
     return settled
 
 
-def _make_judge(problem: Problem, solved: Solved, caution: Globalisation) -> Callable[..., Proposal]:
+def _make_judge(problem: Problem, solved: Solved, globalisation: Globalisation) -> Callable[..., Proposal]:
     """The choice of modes, with what it takes for rounding."""
     floor = _find_floor(problem, solved)
     return lambda laws, modes, state, memory, pressure: update_active_set(
-        laws, modes, state, memory, pressure, caution.softening, floor
+        laws, modes, state, memory, pressure, globalisation.softening, floor
     )
 
 
@@ -279,14 +280,14 @@ class _Outcome:
 
 def _judge(
     problem: Problem, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved,
-    caution: Globalisation,
+    globalisation: Globalisation,
 ) -> _Outcome:
     laws = problem.laws
 
     def judge() -> _Outcome:
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
         floor = _find_floor(problem, solved)
-        proposal = _make_judge(problem, solved, caution)(laws, modes, pairs, memory, load.pressure)
+        proposal = _make_judge(problem, solved, globalisation)(laws, modes, pairs, memory, load.pressure)
         law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
         failing = find_failures(laws, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance

@@ -111,7 +111,7 @@ class Search:
         self.seen: set[bytes] = set()
 
     @property
-    def caution(self) -> Globalisation:
+    def globalisation(self) -> Globalisation:
         return GLOBALISATIONS[self.level]
 
     def note(self, proposal: Proposal, law_error: float = 0.0) -> None:

@@ -47,7 +47,7 @@ class System(Protocol):
     """The integral equations B v = 0 of all collocation points, each rank with its rows; anchors are in them for good.
 
     What the solution asks of them, however they are stored (pbem.solve.system.dense, pbem.solve.system.hierarchical):
-    the system is chosen in pbem.solve.system.choice, and nowhere else is it asked which it is. All ranks call all
+    the system is chosen in pbem.bem.operator_choice, and nowhere else is it asked which it is. All ranks call all
     methods together.
     """
 

@@ -1,4 +1,4 @@
-"""Which system of equations a model is computed with: the one place where that is decided."""
+"""The system of equations of the operator that is chosen in pbem.bem.operator_choice."""
 
 from __future__ import annotations
 

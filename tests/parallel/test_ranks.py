@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +53,9 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     return {1: launch_all(tmp_path_factory.mktemp("ranks_1"), 1)}
 
 
-def launch_all(folder: Path, ranks: int) -> Path:
-    """Run all cases on so many ranks; returns the folder."""
-    run = launch_snippet(ranks, RUN_ALL, folder, *CASES.values(), timeout=600)
+def launch_all(folder: Path, ranks: int, names: Iterable[str] = CASES) -> Path:
+    """Run cases on so many ranks; returns the folder."""
+    run = launch_snippet(ranks, RUN_ALL, folder, *(CASES[name] for name in names), timeout=600)
     assert run.returncode == 0, run.stderr
     return folder
 
@@ -113,10 +114,11 @@ def find_differences(one: dict[str, Array], other: dict[str, Array], rounding: f
 def test_ranks_do_not_change_the_results(
     ranks: int, folders: dict[int, Path], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    folders[ranks] = launch_all(tmp_path_factory.mktemp(f"ranks_{ranks}"), ranks)
+    names = list(CASES)[:: 1 if ranks < 4 else 3]  # four processes take turns on fewer cores
+    folders[ranks] = launch_all(tmp_path_factory.mktemp(f"ranks_{ranks}"), ranks, names)
     faults = {
         name: differences
-        for name in CASES
+        for name in names
         if (differences := find_differences(*(read_results(folders[n] / f"{name}.h5") for n in (1, ranks))))
     }
     assert not faults

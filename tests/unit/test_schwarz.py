@@ -115,7 +115,7 @@ analysis = {{ steps = 1 }}
 def test_a_rotation_that_an_anchor_holds_is_in_the_inverse(x: float) -> None:
     _, model = parse_model(DISC.format(x=x, operator="hierarchical"))
     problem = assemble_problem(model, generate_mesh(model), world)
-    assert len(problem.anchors) == 1 and any(motions.interpolated for motions in problem.operator.rigid)
+    assert len(problem.anchors) == 1 and any(motions.interpolated for motions in problem.system.operator.rigid)
     tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent)
     solved = tangent.solve(constrain(problem), problem.evaluate_load(0, 1.0))

@@ -6,7 +6,7 @@ adds an elastic jump, compliance times traction, in front of its law; what is le
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,9 +17,9 @@ from pbem.arrays import Bool, Integer, Real
 from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
 from pbem.contact.friction_bound import Strength
 from pbem.contact.strength import choose_strength
-from pbem.geometry.expression import evaluate_expression
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
+from pbem.model.varying import Places, Value, Varying
 
 Modes = NDArray[np.int8]
 
@@ -141,13 +141,16 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
     modulus = np.minimum(material[node_region[pairs.first]], material[node_region[pairs.second]])
     length = np.bincount(pairs.interface, pairs.weight, minlength=len(laws))[pairs.interface]
 
+    places = Places(pairs.position + model.origin, pairs.arc_length)
+
     def spread(values: list) -> np.ndarray:
         return np.array(values)[pairs.interface] if values else np.zeros(0)
 
     return PairLaws(
-        strengths=_group_strengths(laws, pairs.interface, model.law_texts),
-        tensile_strength=spread([law.tensile_strength for law in laws]),
-        gap=_evaluate_gaps(laws, mesh, model.origin),
+        strengths=_group_strengths(laws, pairs.interface, model.law_texts, places),
+        tensile_strength=spread_values([law.tensile_strength for law in laws], pairs.interface, places),
+        gap=pairs.distance + spread_values([0.0 if law.kind == "bonded" else law.gap for law in laws],
+                                           pairs.interface, places),
         bonded=spread([law.kind == "bonded" for law in laws]).astype(bool),
         parted=spread([law.kind == "open" for law in laws]).astype(bool),
         brittle=spread([law.cohesion_lost for law in laws]).astype(bool),
@@ -181,9 +184,11 @@ def _find_leaders(model: Model, mesh: Mesh) -> Integer:
     return leader
 
 
-def _group_strengths(laws: list[Law], interface: Integer, texts: Mapping[str, str]) -> tuple[StrengthGroup, ...]:
+def _group_strengths(
+    laws: list[Law], interface: Integer, texts: Mapping[str, str], places: Places
+) -> tuple[StrengthGroup, ...]:
     functions: dict[str | None, FrictionLaw] = {}  # of each file, which is run once
-    chosen = []
+    chosen: list[tuple[FrictionLaw, dict[str, Value]]] = []
     for law in laws:
         if law.kind == "custom" and law.file in functions:
             chosen.append((functions[law.file], dict(law.parameters)))
@@ -196,21 +201,22 @@ def _group_strengths(laws: list[Law], interface: Integer, texts: Mapping[str, st
         members = np.array([(law, tuple(parameters)) == (function, names) for law, parameters in chosen])
         pairs = np.flatnonzero(members[interface])
         values = {
-            name: np.array([parameters.get(name, 0.0) for _, parameters in chosen])[interface[pairs]] for name in names
+            name: spread_values([parameters.get(name, 0.0) for _, parameters in chosen], interface[pairs],
+                                places.take(pairs))
+            for name in names
         }
         groups.append(StrengthGroup(function, pairs, values))
     return tuple(groups)
 
 
-def _evaluate_gaps(laws: list[Law], mesh: Mesh, origin: complex) -> Real:
-    pairs = mesh.pairs
-    given = [0.0 if isinstance(law.gap, str) or law.kind == "bonded" else law.gap for law in laws]
-    gap = pairs.distance + np.array([*given, 0.0])[pairs.interface]
-    for text in dict.fromkeys(law.gap for law in laws if isinstance(law.gap, str)):
-        own = np.array([law.gap == text for law in laws])[pairs.interface]
-        place = pairs.position[own] + origin
-        gap[own] += evaluate_expression(text, x=place.real, y=place.imag)
-    return gap
+def spread_values(values: Sequence[Value], owner: Integer, places: Places) -> Real:
+    """The values of owners, such as interfaces, at places (k,) that each have one."""
+    numbers = np.array([0.0 if isinstance(value, Varying) else value for value in values] or [0.0], dtype=float)
+    result = np.asarray(numbers[owner])
+    for value in {value for value in values if isinstance(value, Varying)}:
+        own = np.flatnonzero(np.array([each == value for each in values])[owner])
+        result[own] = value.evaluate(places.take(own))
+    return result
 
 
 def evaluate_strength(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -> Strength:

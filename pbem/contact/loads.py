@@ -12,6 +12,7 @@ from pbem.bem.particular_solution import ParticularSolution
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Region, Stage
+from pbem.model.varying import Moment, Places, Value, Varying, blend
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class OuterNodes:
 
     direction (k, 2): complex unit vectors. displacement_known (k, 2). condition (k,): index of the condition.
     stiffness (k, 2): of springs against the ground, stress/length along each direction; 0 where there is none.
+    places (k,): in the user's coordinates, with the length from their curve's first point.
     """
 
     node: Integer
@@ -27,6 +29,7 @@ class OuterNodes:
     displacement_known: Bool
     condition: Integer
     stiffness: Real
+    places: Places
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,25 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     first = np.where(local, mesh.normal[node], 1.0)
     known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
     stiffness = np.array([value for c in conditions for value in c.stiffness], dtype=float)
+    places = Places(mesh.position[node] + model.origin, measure_along(model, mesh)[node])
     return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
-                      stiffness.reshape(-1, 2)[which])
+                      stiffness.reshape(-1, 2)[which], places)
+
+
+def measure_along(model: Model, mesh: Mesh) -> Real:
+    """The length (nodes,) from the first point of every node's curve; 0 on cracks, whose pairs have their own."""
+    along = np.zeros(mesh.nodes)
+    elements_of = np.argsort(mesh.curve, kind="stable")
+    bounds = np.searchsorted(mesh.curve[elements_of], np.arange(len(mesh.curve_names) + 1))
+    for number, region in enumerate(model.regions):
+        for side in (side for loop in region.loops for side in loop.sides):
+            curve = mesh.curve_names.index(side.curve)
+            own = np.sort(elements_of[bounds[curve]:bounds[curve + 1]])
+            own = own[mesh.region[own] == number]
+            lengths = mesh.geometry.select(own).arc_lengths(mesh.local)
+            lengths = lengths if side.forward else model.curves[side.curve].length - lengths
+            along.reshape(-1, mesh.order + 1)[own] = lengths
+    return along
 
 
 def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, factor: float) -> Load:
@@ -70,15 +90,20 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         start, end = np.array(old, dtype=float), np.array(new, dtype=float)
         return start + factor * (end - start)
 
-    none = (0.0, 0.0)
-    values = interpolate(*([stage.boundary.get(name, none) for name in model.conditions] for stage in (before, after)))
+    none: tuple[Value, Value] = (0.0, 0.0)
+    values = np.zeros((len(outer.node), 2))
+    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
+    for direction in (0, 1):
+        pairs = [(before.boundary.get(name, none)[direction], after.boundary.get(name, none)[direction])
+                 for name in model.conditions]
+        values[:, direction] = _blend_all(pairs, outer.condition, outer.places, moment)
     gravity = complex(*interpolate(before.gravity, after.gravity))
     remote = interpolate(before.remote, after.remote)
     balanced = _sample(mesh, [balanced_background(model, region, gravity) for region in model.regions])
     far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
-        values=values.reshape(-1, 2)[outer.condition],
+        values=values,
         pressure=evaluate_pressure(model, mesh, stage, factor),
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
@@ -88,11 +113,25 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
 
 def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
     """Fluid pressure (m,) of the pairs at the fraction `factor` of a stage."""
-    values = []
-    for name in mesh.interface_names:
-        start = model.stages[stage - 1].pressure.get(name, 0.0) if stage > 0 else 0.0
-        values.append(start + factor * (model.stages[stage].pressure.get(name, 0.0) - start))
-    return np.array(values, dtype=float)[mesh.pairs.interface]
+    before = model.stages[stage - 1].pressure if stage > 0 else {}
+    after = model.stages[stage].pressure
+    values = [(before.get(name, 0.0), after.get(name, 0.0)) for name in mesh.interface_names]
+    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
+    places = Places(mesh.pairs.position + model.origin, mesh.pairs.arc_length)
+    return _blend_all(values, mesh.pairs.interface, places, moment)
+
+
+def _blend_all(values: Sequence[tuple[Value, Value]], owner: Integer, places: Places, moment: Moment) -> Real:
+    """At places (k,), each with an owner: of the owners' values before and after a stage those at a moment of it."""
+    plain = [[0.0 if isinstance(each, Varying) else each for each in pair] for pair in values]
+    numbers = np.array(plain, dtype=float).reshape(-1, 2)
+    given = numbers[:, 0] + moment.factor * (numbers[:, 1] - numbers[:, 0])
+    result = np.asarray(given[owner], dtype=float)
+    for number, (before, after) in enumerate(values):
+        if isinstance(before, Varying) or isinstance(after, Varying):
+            own = np.flatnonzero(owner == number)
+            result[own] = blend(before, after, places.take(own), moment)
+    return result
 
 
 def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
@@ -140,7 +179,8 @@ def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:
     known = np.zeros(4 * mesh.nodes, dtype=bool)
     for stage in range(len(model.stages)):
         load = evaluate_load(model, mesh, outer, stage, 1.0)
-        ever |= load.values != 0
+        # What depends on time by itself may be zero at the ends of the stages alone.
+        ever |= (load.values != 0) | model.timed
         known |= load.known != 0
     parts = np.stack([outer.direction.real, outer.direction.imag], axis=2) != 0  # (k, direction, component)
     for first, free in ((0, ~outer.displacement_known), (2 * mesh.nodes, outer.displacement_known)):

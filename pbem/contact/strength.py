@@ -21,6 +21,7 @@ from pbem.contact.friction_bound import Strength
 from pbem.contact.rate_and_state import RateAndState
 from pbem.errors import Fault
 from pbem.model.model import Law, Model
+from pbem.model.varying import Value
 
 
 class Coulomb(FrictionLaw):
@@ -80,14 +81,14 @@ def list_model_variables(model: Model) -> tuple[InternalVariable, ...]:
     return list_variables(LAWS[law.kind] for law in list_laws(model).values() if law.kind in LAWS)
 
 
-def choose_strength(law: Law, text: str | None = None) -> tuple[FrictionLaw, dict[str, float]]:
+def choose_strength(law: Law, text: str | None = None) -> tuple[FrictionLaw, dict[str, Value]]:
     """The law and the parameters of an interface; text: of a custom law's file, which is read if not given."""
     if law.kind in LAWS:
         return LAWS[law.kind], dict(law.parameters)
     if law.kind == "custom":
         assert law.file is not None
         return CustomLaw(law.file, read_law_texts([law.file])[law.file] if text is None else text), dict(law.parameters)
-    parameters = {"friction": law.friction, "cohesion": law.cohesion}
+    parameters: dict[str, Value] = {"friction": law.friction, "cohesion": law.cohesion}
     if law.friction_dynamic is None or law.slip_distance is None:
         return coulomb, parameters
     return slip_weakening, parameters | {"friction_dynamic": law.friction_dynamic, "slip_distance": law.slip_distance}

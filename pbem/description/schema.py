@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from pbem.description.table import Table
 from pbem.description.values import (
     MOST_ELEMENTS,
     MOST_GENERATED,
@@ -33,15 +34,9 @@ from pbem.description.values import (
     Spread,
     Text,
     Tolerance,
-    check_gap,
     check_option,
 )
-
-
-class Table(BaseModel):
-    """A table of the case file: frozen, and without keys beyond its own."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+from pbem.description.varying import Strength, Value
 
 
 class UnitsTable(Table):
@@ -122,17 +117,17 @@ class SpringTable(Table):
 class StageConditionTable(Table):
     """Displacement or traction in two directions; what is not given is free of traction."""
 
-    ux: Number | None = Field(None, description="displacement along x")
-    uy: Number | None = Field(None, description="displacement along y")
-    tx: Number | None = Field(None, description="or traction along x")
-    ty: Number | None = Field(None, description="or traction along y")
-    un: Number | None = Field(
+    ux: Value | None = Field(None, description="displacement along x")
+    uy: Value | None = Field(None, description="displacement along y")
+    tx: Value | None = Field(None, description="or traction along x")
+    ty: Value | None = Field(None, description="or traction along y")
+    un: Value | None = Field(
         None, description="or displacement along the outward normal; not together with x and y components"
     )
-    us: Number | None = Field(None, description="displacement along the normal turned by +90 degrees")
-    tn: Number | None = Field(None, description="or traction along the outward normal")
-    ts: Number | None = Field(None, description="or traction along the normal turned by +90 degrees")
-    pressure: Number | None = Field(None, description="`tn = -pressure`, `ts = 0`")
+    us: Value | None = Field(None, description="displacement along the normal turned by +90 degrees")
+    tn: Value | None = Field(None, description="or traction along the outward normal")
+    ts: Value | None = Field(None, description="or traction along the normal turned by +90 degrees")
+    pressure: Value | None = Field(None, description="`tn = -pressure`, `ts = 0`")
 
 
 class ConditionTable(StageConditionTable):
@@ -140,12 +135,6 @@ class ConditionTable(StageConditionTable):
     traction."""
 
     spring: SpringTable | None = Field(None, description="an elastic support in place of displacements")
-
-
-class ExpressionTable(Table):
-    """A quantity as a function of x and y."""
-
-    expression: Text = Field(description="a function of `x` and `y`")
 
 
 class LawTable(Table):
@@ -158,16 +147,16 @@ class LawTable(Table):
         'faces never touch; `"rate_and_state"`: friction coefficient f0 + a ln(V/V0) + b ln(V0 theta/L) at the slip '
         'rate V and the state theta, with d theta/dt = 1 - V theta/L; `"custom"`: see `pbem help laws`',
     )
-    friction: NotNegative | None = Field(
+    friction: Strength | None = Field(
         None, description="friction coefficient; 0 if its angle is not given either; f0 of `rate_and_state`"
     )
     friction_angle: FrictionAngle | None = Field(None, description="or its angle, degrees")
-    cohesion: NotNegative = Field(0.0, description="friction bound without normal traction")
-    tensile_strength: NotNegative = Field(0.0, description="normal tension carried before the faces part")
+    cohesion: Strength = Field(0.0, description="friction bound without normal traction")
+    tensile_strength: Strength = Field(0.0, description="normal tension carried before the faces part")
     cohesion_lost: Flag = Field(
         False, description="cohesion and tensile strength end with the first slip or parting (a brittle bond)"
     )
-    friction_dynamic: NotNegative | None = Field(None, description="friction falls linearly to this coefficient ...")
+    friction_dynamic: Strength | None = Field(None, description="friction falls linearly to this coefficient ...")
     slip_distance: Positive | None = Field(
         None, description="... over this length of slip; L of `rate_and_state`, over which the state changes"
     )
@@ -183,10 +172,8 @@ class LawTable(Table):
         None, description="elastic joint in front of the law, stress per length; without this key rigid"
     )
     tangential_stiffness: Positive | None = Field(None, description="the same along the faces")
-    gap: Annotated[float | ExpressionTable, BeforeValidator(check_gap)] = Field(
-        0.0, description="initial opening, not negative; an expression is a function of `x` and `y`"
-    )
-    pressure: Number = Field(
+    gap: Strength = Field(0.0, description="initial opening, not negative")
+    pressure: Value = Field(
         0.0, description="fluid pressure on open faces; the faces part when their compression falls to it"
     )
     pressurised: Literal["open", "all"] = Field(
@@ -291,7 +278,7 @@ class AnalysisTable(Table):
 class StageInterfaceTable(Table):
     """What of an interface can change from stage to stage."""
 
-    pressure: Number = Field(description="fluid pressure at the end of the stage")
+    pressure: Value = Field(description="fluid pressure at the end of the stage")
 
 
 class StageTable(Table):

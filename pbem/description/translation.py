@@ -12,7 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from pbem.description.finding import Finding
-from pbem.description.schema import CaseFile, ExpressionTable
+from pbem.description.schema import CaseFile
+from pbem.description.varying import NUMBER, VARYING
 from pbem.errors import KeyPath, format_path
 from pbem.wording import list_names, show, suggest
 
@@ -28,19 +29,16 @@ def find_schema_findings(raw: Mapping[str, Any]) -> list[Finding]:
 
 def _simplify(details: ErrorDetails) -> ErrorDetails:
     """The path without the member of a union that was tried."""
-    details["loc"] = tuple(part for part in details["loc"] if part != ExpressionTable.__name__)
+    details["loc"] = tuple(part for part in details["loc"] if part not in (NUMBER, VARYING))
     return details
 
 
 def _follows(details: ErrorDetails) -> bool:
     """Faults that only repeat others.
 
-    A list is counted as too short by its faulty entries, each of which has its own fault; a gap that is a table is no
-    number either.
+    A list is counted as too short by its faulty entries, each of which has its own fault.
     """
     value = details.get("input")
-    if details["loc"][-2:] == ("gap", "float"):
-        return True
     return details["type"] == "too_short" and isinstance(value, (list, dict)) and (
         len(value) >= details["ctx"]["min_length"]
     )
@@ -89,6 +87,15 @@ def _other_bound(loc: KeyPath) -> str:
     return {"poisson": " (-1 < poisson < 0.5)", "order": " (0, 1, 2 or 3)"}.get(str(loc[-1]), "")
 
 
+def _list_members(annotation: Any) -> list[Any]:
+    """The types that an annotation allows, out of unions and without what is said about them."""
+    if typing.get_origin(annotation) is typing.Annotated:
+        return _list_members(typing.get_args(annotation)[0])
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return [member for each in typing.get_args(annotation) for member in _list_members(each)]
+    return [annotation]
+
+
 def known_keys(loc: KeyPath) -> set[str]:
     """Keys of the table at `loc` (none if it has no fixed keys), found by walking down the schema."""
     table: Any = CaseFile
@@ -98,7 +105,6 @@ def known_keys(loc: KeyPath) -> set[str]:
             table = field.annotation if field else None
         else:
             table = (*(a for a in typing.get_args(table) if a is not str and a is not Ellipsis), None)[0]
-        while typing.get_origin(table) in (typing.Annotated, typing.Union, types.UnionType):
-            options = [a for a in typing.get_args(table) if isinstance(a, type) and issubclass(a, BaseModel)]
-            table = (options or [*typing.get_args(table)])[0]
+        members = _list_members(table)
+        table = next((each for each in members if isinstance(each, type) and issubclass(each, BaseModel)), members[0])
     return set(table.model_fields) if isinstance(table, type) and issubclass(table, BaseModel) else set()

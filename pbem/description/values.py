@@ -11,7 +11,8 @@ MOST_ELEMENTS = 100_000
 MOST_GENERATED = 1_000_000
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Whether a value is a number as it is written: whole or not, but not true or false."""
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
@@ -32,16 +33,6 @@ def _check_elements(value: object) -> object:
         if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= MOST_ELEMENTS:
             raise PydanticCustomError("expected", "{expected}", {"expected": expected})
     return tuple(value) if isinstance(value, list) else value
-
-
-def check_gap(value: object) -> object:
-    """A number, or a table with an expression."""
-    if isinstance(value, dict):
-        return value
-    if not _is_number(value) or not 0 <= value <= LARGEST:  # type: ignore[operator]
-        expected = "a finite number >= 0, or { expression = \"...\" }"
-        raise PydanticCustomError("expected", "{expected}", {"expected": expected})
-    return value
 
 
 def check_option(value: object) -> object:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import special
 
 from pbem.arrays import Real
 
@@ -15,6 +16,7 @@ CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 FUNCTIONS: Mapping[str, Callable[[Real], Real]] = {
     "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan,
     "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "exp": np.exp, "log": np.log, "sqrt": np.sqrt, "abs": np.abs,
+    "erf": special.erf, "erfc": special.erfc,
 }
 FUNCTIONS_OF_TWO: Mapping[str, Callable[[Real, Real], Real]] = {
     "atan2": np.arctan2, "min": np.minimum, "max": np.maximum,
@@ -50,6 +52,14 @@ def evaluate_expression(text: str, **variables: ArrayLike) -> Real:
     except RecursionError:
         raise ExpressionError(*_UNREADABLE) from None
     return np.array(np.broadcast_to(value, shape))
+
+
+def list_names(text: str) -> set[str]:
+    """The names that an expression has anywhere, those of functions included; none of a text that is no expression."""
+    try:
+        return {node.id for node in ast.walk(_parse(text)) if isinstance(node, ast.Name)}
+    except ExpressionError:
+        return set()
 
 
 def _parse(text: str) -> ast.expr:

@@ -23,8 +23,9 @@ from pbem.model.crack import (
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
-from pbem.model.law import check_gap
+from pbem.model.law import check_along
 from pbem.model.loading import Loading, read_loading
+from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
@@ -93,18 +94,19 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
     model, faults = _compose(case, roles, loading, topology)
     model = replace(model, interior_points=interior)
     faults += [*check_turning(case, model.curves), *check_facing(model)]
-    gaps = [
+    varying = [
         fault for name, interface in model.interfaces.items()
-        for fault in check_gap(("interfaces", name), interface.law, model.curves[name])
+        for fault in check_along(("interfaces", name), interface.law, model.curves[name])
     ]
-    gaps += [
+    varying += [
         fault for name, contact in model.contacts.items()
-        for fault in check_gap(("contacts", name), contact.law, model.curves[contact.first])
+        for fault in check_along(("contacts", name), contact.law, model.curves[contact.first])
     ]
-    faults += gaps
+    varying += check_loads(case, model)
+    faults += varying
     radii = {name: table.radius for name, table in case.curves.items() if table.radius is not None}
     model = move_to_own_origin(model, radii)
-    if conditions_known and not gaps:
+    if conditions_known and not varying:
         wrong, notes = _check_support(model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))

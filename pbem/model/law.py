@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,17 +10,21 @@ from typing import Literal
 
 import numpy as np
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Real
 from pbem.description.case import Case
 from pbem.description.effects import NEEDED, OPTIONAL, OWN_KEYS, WITHOUT_EFFECT, Kind
 from pbem.description.schema import LawTable
+from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.curve import Curve
-from pbem.geometry.expression import ExpressionError, evaluate_expression
 from pbem.geometry.junction import format_point
+from pbem.model.given import read_value
 from pbem.model.model import Law
-from pbem.model.touching import find_least, sample_gap
+from pbem.model.touching import find_least
+from pbem.model.varying import Places, Value, Varying, evaluate
 
+# What of a law may vary along its curve.
+VARYING_KEYS = ("friction", "cohesion", "tensile_strength", "friction_dynamic", "gap")
 # A tensile strength may be written with so few digits that it exceeds cohesion/friction by this part.
 APEX = 1e-4
 
@@ -30,14 +35,9 @@ def read_law(
     """The law that a table at `loc` asks for, with its faults; `default`: its kind if the table does not say."""
     kind: Kind = table.law or default
     faults = [*_check_effect(case, loc, table, kind), *_check_strengths(loc, table, kind)]
-    friction = _find_friction(table)
-    gap = table.gap if isinstance(table.gap, float) else table.gap.expression
-    if isinstance(gap, str):
-        try:
-            evaluate_expression(gap, x=0.0, y=0.0)
-        except ExpressionError as error:
-            faults.append(Fault.at((*loc, "gap"), error.found, error.expected))
-            gap = 0.0
+    values, wrong = _read_values(loc, table)
+    faults += wrong
+    friction, gap = values["friction"] or 0.0, values["gap"] or 0.0
     joint = (table.normal_stiffness, table.tangential_stiffness)
     if kind == "bonded":
         return Law("bonded", normal_stiffness=joint[0], tangential_stiffness=joint[1]), faults
@@ -58,12 +58,12 @@ def read_law(
     law = Law(
         kind="custom" if kind == "custom" else "coulomb",
         friction=0.0 if smooth else friction,
-        cohesion=0.0 if smooth else table.cohesion,
-        tensile_strength=table.tensile_strength,
+        cohesion=0.0 if smooth else values["cohesion"] or 0.0,
+        tensile_strength=values["tensile_strength"] or 0.0,
         gap=gap,
         pressurised=table.pressurised,
         cohesion_lost=table.cohesion_lost,
-        friction_dynamic=None if smooth else table.friction_dynamic,
+        friction_dynamic=None if smooth else values["friction_dynamic"],
         slip_distance=None if smooth else table.slip_distance,
         normal_stiffness=joint[0],
         tangential_stiffness=joint[1],
@@ -78,6 +78,9 @@ def _read_parameters(loc: KeyPath, table: LawTable, kind: Kind) -> tuple[dict[st
     angle = table.friction_angle is not None
     given = {key: getattr(table, key) for key in (*NEEDED[kind], *OPTIONAL[kind])}
     given["friction"] = _find_friction(table) if angle else table.friction
+    if isinstance(given["friction"], VaryingTable):
+        found = f"a friction that varies along the curve with law = \"{kind}\""
+        return {}, [Fault.at((*loc, "friction"), found, "a number")]
     missing = [key for key in NEEDED[kind] if given[key] is None]
     if missing:
         found = f'law = "{kind}" on \'{loc[-1]}\' without {", ".join(missing)}'
@@ -87,27 +90,66 @@ def _read_parameters(loc: KeyPath, table: LawTable, kind: Kind) -> tuple[dict[st
     return given, []
 
 
-def check_gap(loc: KeyPath, law: Law, curve: Curve) -> list[Fault]:
-    """A fault if a gap by an expression is negative or without value somewhere on its curve."""
-    if not isinstance(law.gap, str):
-        return []
+def _read_values(loc: KeyPath, table: LawTable) -> tuple[dict[str, Value | None], list[Fault]]:
+    """What of a law may vary along the curve, by its keys, friction from its angle where that is given."""
+    values: dict[str, Value | None] = {}
+    faults: list[Fault] = []
+    for key in VARYING_KEYS:
+        values[key], wrong = read_value((*loc, key), getattr(table, key), timed=False)
+        faults += wrong
+    if table.friction_angle is not None:
+        values["friction"] = _find_friction(table)
+    return values, faults
 
-    def evaluate(points: Complex) -> Real:
-        gap = sample_gap(law, points)
-        return np.where(np.isfinite(gap), gap, np.nan)  # the least of numbers with a nan among them is nan
 
-    least, place = find_least(curve, evaluate)
-    if math.isfinite(least) and least >= 0:
-        return []
-    what = f"{least:.6g}" if math.isfinite(least) else "no finite value"
-    found = f"a gap that is {what} at {format_point(place)} on curve '{curve.name}'"
-    return [Fault.at((*loc, "gap"), found, "a finite gap >= 0 everywhere on the curve")]
+def check_along(loc: KeyPath, law: Law, curve: Curve) -> list[Fault]:
+    """Faults of what varies along a curve and is negative or without value there, and of strengths that do not fit
+    each other somewhere."""
+    faults = []
+    for key in VARYING_KEYS:
+        value = getattr(law, key)
+        if isinstance(value, Varying):
+            least, place = find_least(curve, functools.partial(_evaluate_or_nan, value))
+            if not (math.isfinite(least) and least >= 0):
+                what, name = f"{least:.6g}" if math.isfinite(least) else "no finite value", key.replace("_", " ")
+                found = f"a {name} that is {what} at {format_point(place)} on curve '{curve.name}'"
+                faults.append(Fault.at((*loc, key), found, f"a finite {name} >= 0 everywhere on the curve"))
+    return faults or [*_check_strengths_along(loc, law, curve)]
+
+
+def _evaluate_or_nan(value: Value, places: Places) -> Real:
+    values = evaluate(value, places)
+    return np.where(np.isfinite(values), values, np.nan)  # the least of numbers with a nan among them is nan
+
+
+def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fault]:
+    """What `_check_strengths` asks of numbers, where one of them varies along the curve."""
+    strengths = (law.friction, law.cohesion, law.tensile_strength, law.friction_dynamic)
+    if not any(isinstance(value, Varying) for value in strengths):
+        return
+
+    def falls(places: Places) -> Real:
+        return evaluate(law.friction, places) * (1 + 1e-12) - evaluate(law.friction_dynamic or 0.0, places)
+
+    def reaches(places: Places) -> Real:
+        bound = evaluate(law.cohesion, places) * (1 + APEX)
+        return bound - evaluate(law.tensile_strength, places) * evaluate(law.friction, places)
+
+    least, place = find_least(curve, falls)
+    if law.friction_dynamic is not None and least < 0:
+        found = f"friction_dynamic above the static friction at {format_point(place)}"
+        yield Fault.at((*loc, "friction_dynamic"), found, "friction that falls with slip everywhere on the curve")
+    least, place = find_least(curve, reaches)
+    if law.tensile_strength and least < 0:
+        found = f"tensile_strength beyond the apex of the cone of friction at {format_point(place)}"
+        yield Fault.at((*loc, "tensile_strength"), found, "at most cohesion/friction everywhere on the curve")
 
 
 def _find_friction(table: LawTable) -> float:
+    """The coefficient where it is a number, and 0 where it varies."""
     if table.friction_angle is not None:
         return math.tan(math.radians(table.friction_angle))
-    return table.friction or 0.0
+    return table.friction if isinstance(table.friction, float) else 0.0
 
 
 def _check_effect(case: Case, loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Fault]:
@@ -132,16 +174,18 @@ def _check_effect(case: Case, loc: KeyPath, table: LawTable, kind: Kind) -> Iter
 
 def _check_strengths(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Fault]:
     """What of a law weakens has to be there before; and no tension beyond the apex of the cone of friction."""
-    if kind == "coulomb" and table.friction_dynamic is not None:
-        friction = _find_friction(table)
-        if table.friction_dynamic > friction * (1 + 1e-12):
-            found = f"friction_dynamic = {table.friction_dynamic:g} above the static friction of {friction:g}"
-            expected = "friction that falls with slip: friction_dynamic <= friction"
-            yield Fault.at((*loc, "friction_dynamic"), found, expected)
     friction = _find_friction(table) if kind == "coulomb" else 0.0
-    if friction > 0 and table.tensile_strength * friction > table.cohesion * (1 + APEX):
-        apex = table.cohesion / friction
-        found = f"tensile_strength = {table.tensile_strength:g} beyond the apex of the cone of friction, {apex:.6g}"
+    dynamic, tension, cohesion = table.friction_dynamic, table.tensile_strength, table.cohesion
+    plain = not isinstance(table.friction, VaryingTable)
+    if kind == "coulomb" and isinstance(dynamic, float) and plain and dynamic > friction * (1 + 1e-12):
+        found = f"friction_dynamic = {dynamic:g} above the static friction of {friction:g}"
+        expected = "friction that falls with slip: friction_dynamic <= friction"
+        yield Fault.at((*loc, "friction_dynamic"), found, expected)
+    if friction > 0 and isinstance(tension, float) and isinstance(cohesion, float) and (
+        tension * friction > cohesion * (1 + APEX)
+    ):
+        apex = cohesion / friction
+        found = f"tensile_strength = {tension:g} beyond the apex of the cone of friction, {apex:.6g}"
         expected = f"at most cohesion/friction = {apex:.6g}: faces that slide without any strength carry no tension"
         yield Fault.at((*loc, "tensile_strength"), found, expected)
     strengths = {"coulomb": ("cohesion", "tensile_strength"), "frictionless": ("tensile_strength",)}.get(kind, ())

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from pbem.description.case import Case
 from pbem.description.effects import TIMED
-from pbem.description.schema import LawTable, StageConditionTable
+from pbem.description.schema import LawTable, StageConditionTable, StageInterfaceTable
+from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
+from pbem.model.given import read_value
 from pbem.model.law import read_law
-from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage
+from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
+from pbem.model.varying import Value, negate
 
 # Key to frame, direction and quantity.
 _KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {
@@ -38,7 +41,7 @@ class Loading:
 
 def read_loading(case: Case, roles: Roles) -> Loading:
     """Conditions of every outer curve, laws of every interface and crack, and complete values for every stage."""
-    faults = _check_names(case, roles)
+    faults = [*_check_names(case, roles), *_check_values(case)]
     conditions = {}
     for name in (name for name in roles.outer if name not in roles.in_contact):
         condition, wrong = _find_condition(case, name)
@@ -64,19 +67,37 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         contacts[name] = Contact(name, first, second, law)
         faults += wrong
     joints = {name: each.law for name, each in interfaces.items()} | {name: each.law for name, each in contacts.items()}
-    faults += _check_durations(case, joints)
     backgrounds = read_backgrounds(case)
     faults += backgrounds.faults
     stages = _find_stages(case, conditions, [*interfaces, *contacts], backgrounds)
+    faults += _check_durations(case, joints, stages)
     return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress, tuple(faults))
 
 
-def _given(table: StageConditionTable) -> dict[str, float]:
-    """Values by the keys ux ... ts, with pressure written out."""
-    values = {key: getattr(table, key) for key in _KEYS if getattr(table, key) is not None}
+def _given(table: StageConditionTable) -> dict[str, Value]:
+    """Values by the keys ux ... ts, with pressure written out; 0 for what is no expression."""
+    values = {key: _read(getattr(table, key)) for key in _KEYS if getattr(table, key) is not None}
     if table.pressure is not None:
-        values |= {"tn": -table.pressure, "ts": 0.0}
+        values |= {"tn": negate(_read(table.pressure)), "ts": 0.0}
     return values
+
+
+def _read(given: float | VaryingTable) -> Value:
+    return read_value((), given, timed=True)[0] or 0.0
+
+
+def _check_values(case: Case) -> Iterator[Fault]:
+    """Expressions of conditions and pressures that are none."""
+    tables: list[tuple[KeyPath, StageConditionTable | StageInterfaceTable | LawTable]] = []
+    tables += [(("boundary", name), table) for name, table in case.boundary.items()]
+    tables += [(("interfaces", name), table) for name, table in case.interfaces.items()]
+    tables += [(("contacts", name), table) for name, table in case.contacts.items()]
+    for number, stage in enumerate(case.stages):
+        for key in ("boundary", "interfaces", "contacts"):
+            tables += [(("stages", number, key, name), table) for name, table in getattr(stage, key).items()]
+    for loc, table in tables:
+        for key in (*_KEYS, "pressure"):
+            yield from read_value((*loc, key), getattr(table, key, None), timed=True)[1]
 
 
 def _tables(case: Case, curve: str) -> list[tuple[KeyPath, StageConditionTable]]:
@@ -170,17 +191,17 @@ def _find_stages(
     case: Case, conditions: Mapping[str, Condition], joints: list[str], backgrounds: Backgrounds
 ) -> tuple[Stage, ...]:
     """joints: names of the interfaces, cracks and contacts."""
-    values = {name: [0.0, 0.0] for name in conditions}
-    pressure = {name: 0.0 for name in joints}
+    values: dict[str, list[Value]] = {name: [0.0, 0.0] for name in conditions}
+    pressure: dict[str, Value] = {name: 0.0 for name in joints}
     laws = {**case.contacts, **case.interfaces}
     for name in conditions:
         _update(values[name], case.boundary.get(name))
     for name in joints:
         if name in laws:
-            pressure[name] = laws[name].pressure
+            pressure[name] = _read(laws[name].pressure)
     fields = list(zip(backgrounds.remote, backgrounds.gravity, strict=True))
     if not case.stages:
-        return (Stage("load", case.analysis.steps, _freeze(values), pressure, *fields[0]),)
+        return (Stage("load", case.analysis.steps, _freeze(values), dict(pressure), *fields[0]),)
     stages = []
     for number, stage in enumerate(case.stages):
         for name in conditions:
@@ -188,32 +209,39 @@ def _find_stages(
         changes = {**stage.contacts, **stage.interfaces}
         for name in joints:
             if name in changes:
-                pressure[name] = changes[name].pressure
+                pressure[name] = _read(changes[name].pressure)
         name = stage.name or f"stage {number + 1}"
         duration = stage.duration or 0.0
         stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number], duration=duration))
     return tuple(stages)
 
 
-def _check_durations(case: Case, laws: Mapping[str, Law]) -> Iterator[Fault]:
-    """Laws that depend on time need the duration of every stage; without one, durations have no effect."""
+def _check_durations(case: Case, laws: Mapping[str, Law], stages: Sequence[Stage]) -> Iterator[Fault]:
+    """Laws that depend on time need the duration of every stage, loads that do need that of all stages or of none;
+    without either, durations have no effect."""
     timed = next(((name, law.kind) for name, law in laws.items() if law.kind in TIMED), None)
+    loads = any(list_timed(stage) for stage in stages)
     if timed is not None and not case.stages:
         found = f"no [[stages]], but the law of '{timed[0]}' is {timed[1]}, which depends on time"
         yield Fault.at(("analysis", "steps"), found, "[[stages]] with the duration of each")
+    some = any(stage.duration is not None for stage in case.stages)
     for number, stage in enumerate(case.stages):
         if timed is not None and stage.duration is None:
             found = f"a stage without duration, but the law of '{timed[0]}' is {timed[1]}, which depends on time"
             yield Fault.at(("stages", number), found, "duration = the time that the stage takes")
-        elif timed is None and stage.duration is not None:
-            expected = f"a law that depends on time ({', '.join(TIMED)}) somewhere, or no such key: it has no effect"
+        elif loads and some and stage.duration is None:
+            found = "a stage without duration, but others have one and a load depends on the time t"
+            yield Fault.at(("stages", number), found, "the duration of every stage, or of none: each takes 1 then")
+        elif timed is None and not loads and stage.duration is not None:
+            expected = (f"a law ({', '.join(TIMED)}) or a load that depends on time somewhere, or no such key: it has "
+                        "no effect")
             yield Fault.at(("stages", number, "duration"), f"duration = {stage.duration:g}", expected)
 
 
-def _update(values: list[float], table: StageConditionTable | None) -> None:
+def _update(values: list[Value], table: StageConditionTable | None) -> None:
     for key, value in _given(table).items() if table else ():
         values[_KEYS[key][1]] = value
 
 
-def _freeze(values: Mapping[str, list[float]]) -> dict[str, tuple[float, float]]:
+def _freeze(values: Mapping[str, list[Value]]) -> dict[str, tuple[Value, Value]]:
     return {curve: (pair[0], pair[1]) for curve, pair in values.items()}

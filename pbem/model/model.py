@@ -12,6 +12,7 @@ from pbem.geometry.curve import Curve, find_middle
 from pbem.geometry.loop import Loop
 from pbem.model.material import Material
 from pbem.model.sliver import Tie
+from pbem.model.varying import Value, Varying
 
 Quantity = Literal["displacement", "traction"]
 
@@ -34,7 +35,7 @@ class Law:
     kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches; "custom" is Coulomb-like
     with the friction bound of the function that the Python file `file` registers, called with `parameters`; others are
     those of `pbem.contact.strength.LAWS`, with these parameters and none of the strengths.
-    gap: initial normal opening (length, >= 0), a number or an expression of x, y (see model.expression).
+    gap: initial normal opening (length, >= 0). What may vary along the curve is a number or a Varying.
     pressurised: "open": fluid pressure acts in open parts only; "all": in closed parts too.
     cohesion_lost: cohesion and tensile strength are gone after the first slip or parting.
     friction_dynamic, slip_distance: friction falls linearly from `friction` to friction_dynamic over that slip.
@@ -42,13 +43,13 @@ class Law:
     """
 
     kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state"]
-    friction: float = 0.0
-    cohesion: float = 0.0
-    tensile_strength: float = 0.0
-    gap: float | str = 0.0
+    friction: Value = 0.0
+    cohesion: Value = 0.0
+    tensile_strength: Value = 0.0
+    gap: Value = 0.0
     pressurised: Literal["open", "all"] = "open"
     cohesion_lost: bool = False
-    friction_dynamic: float | None = None
+    friction_dynamic: Value | None = None
     slip_distance: float | None = None
     normal_stiffness: float | None = None
     tangential_stiffness: float | None = None
@@ -101,7 +102,8 @@ class Condition:
 
 @dataclass(frozen=True)
 class Stage:
-    """A part of the load history: the values at its end, linear from those at the end of the stage before (0 at first).
+    """A part of the load history: the values at its end, linear from those at the end of the stage before (0 at first);
+    what depends on time by itself has its own value at every time.
 
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
@@ -111,11 +113,17 @@ class Stage:
 
     name: str
     steps: int
-    boundary: Mapping[str, tuple[float, float]]
-    pressure: Mapping[str, float]
+    boundary: Mapping[str, tuple[Value, Value]]
+    pressure: Mapping[str, Value]
     remote: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gravity: tuple[float, float] = (0.0, 0.0)
     duration: float = 0.0
+
+
+def list_timed(stage: Stage) -> list[Varying]:
+    """The loads of a stage that depend on time by themselves."""
+    values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
+    return [value for value in values if isinstance(value, Varying) and value.timed]
 
 
 @dataclass(frozen=True)
@@ -190,6 +198,16 @@ class Model:
     ties: tuple[Tie, ...] = ()
     law_texts: Mapping[str, str] = field(default_factory=dict)
     origin: complex = 0j
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether some load depends on time by itself, so that loads are not linear within a stage."""
+        return any(list_timed(stage) for stage in self.stages)
+
+    def find_time(self, stage: int, factor: float) -> float:
+        """The time at a fraction of a stage; stages without durations take 1 each."""
+        durations = [each.duration or 1.0 for each in self.stages[: stage + 1]]
+        return sum(durations[:-1]) + factor * durations[-1]
 
     @cached_property
     def middle(self) -> complex:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pbem.arrays import Complex, Real
+from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
-from pbem.geometry.loop import loop_legs, side_legs
-from pbem.model.model import Condition, Model, Region, Stage
+from pbem.geometry.loop import Side, loop_legs, side_legs
+from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.model.varying import Places, Value, Varying, evaluate, negate
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
 BALANCED = 1e-9
+# The same of tractions by expressions, which may have kinks anywhere.
+BALANCED_EXPRESSION = 1e-5
+# Fractions of a stage at which loads that depend on time are looked at.
+FRACTIONS = (0.1, 0.35, 0.6, 0.85, 1.0)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
@@ -21,9 +30,14 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
 
     moving: the motion's regions.
     """
-    for stage in model.stages:
-        force, moment, power, scale = _sum_tractions(model, motion, moving, stage)
-        if abs(power) > BALANCED * scale:
+    for number, stage in enumerate(model.stages):
+        fractions = FRACTIONS if list_timed(stage) else (1.0,)
+        least = BALANCED_EXPRESSION if _has_expressions(stage) else BALANCED
+        for fraction in fractions:
+            time = model.find_time(number, fraction)
+            force, moment, power, scale = _sum_tractions(model, motion, moving, stage, time)
+            if abs(power) <= least * scale:
+                continue
             about = format_point(model.origin)
             loads = "tractions and weight" if any(stage.gravity) else "tractions"
             return (
@@ -33,8 +47,13 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
     return None
 
 
+def _has_expressions(stage: Stage) -> bool:
+    values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
+    return any(isinstance(value, Varying) and value.expression for value in values)
+
+
 def _sum_tractions(
-    model: Model, motion: RigidBodyMode, moving: Sequence[Region], stage: Stage
+    model: Model, motion: RigidBodyMode, moving: Sequence[Region], stage: Stage, time: float
 ) -> tuple[complex, float, float, float]:
     """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs.
 
@@ -50,16 +69,42 @@ def _sum_tractions(
         scale += float(np.abs(weight) * (np.abs(a) + np.abs(spin * lever)))
         for side in (side for loop in region.loops for side in loop.sides):
             condition, values = _find_load(model, stage, side.curve)
-            for leg in side_legs(model.curves, side):
-                points = leg.point(0.5 * (_NODES + 1))
-                weights = 0.5 * _WEIGHTS * leg.length
-                tractions = _tractions(condition, values, leg.normals(points)) * weights
+            for piece in _divide_side(model.curves, side, values):
+                points = piece.places.point
+                shifted = replace(piece.places, point=points + model.origin)
+                tractions = _tractions(condition, values, piece.normals, shifted, time) * piece.weights
                 rates = (np.conj(tractions) * (a + 1j * spin * points)).real
                 force += complex(tractions.sum())
                 moment += float((np.conj(points) * tractions).imag.sum())
                 power += float(rates.sum())
                 scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
     return force, moment, power, scale
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Points of integration on a part of a side, about the model's origin, with outward normals and weights."""
+
+    places: Places
+    normals: Complex
+    weights: Real
+
+
+def _divide_side(curves: Mapping[str, Curve], side: Side, values: tuple[Value, Value]) -> Iterator[_Piece]:
+    """The parts of a side on which the values are smooth: its legs, cut where a table has a kink."""
+    kinks = [value.breaks for value in values if isinstance(value, Varying)]
+    total, passed = curves[side.curve].length, 0.0
+    for leg in side_legs(curves, side):
+        # Lengths from where the side begins to be travelled; the curve may be written the other way.
+        at = np.concatenate([np.zeros(0), *kinks])
+        inner = ((at if side.forward else total - at) - passed) / leg.length
+        ends = np.unique(np.concatenate([[0.0, 1.0], inner[(inner > 0) & (inner < 1)]]))
+        for low, high in itertools.pairwise(ends):
+            fractions = 0.5 * (low + high) + 0.5 * (high - low) * _NODES
+            points, travelled = leg.point(fractions), passed + leg.length * fractions
+            along = travelled if side.forward else total - travelled
+            yield _Piece(Places(points, along), leg.normals(points), 0.5 * (high - low) * _WEIGHTS * leg.length)
+        passed += leg.length
 
 
 def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex]:
@@ -77,17 +122,20 @@ def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex
     return region.material.density * complex(*stage.gravity) * area, origin + first_moment / area
 
 
-def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[float, float]]:
+def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[Value, Value]]:
     if curve in model.conditions:
         return model.conditions[curve], stage.boundary[curve]
     name = next((name for name, one in model.contacts.items() if curve in (one.first, one.second)), curve)
-    return Condition(curve, "local"), (-stage.pressure[name], 0.0)
+    return Condition(curve, "local"), (negate(stage.pressure[name]), 0.0)
 
 
-def _tractions(condition: Condition, values: tuple[float, float], normals: np.ndarray) -> np.ndarray:
+def _tractions(
+    condition: Condition, values: tuple[Value, Value], normals: Complex, places: Places, time: float
+) -> Complex:
     """Known tractions at points with these outward normals; what is unknown counts as zero."""
     first, second = (
-        value if quantity == "traction" else 0.0 for value, quantity in zip(values, condition.known, strict=True)
+        evaluate(value, places, time) if quantity == "traction" else np.zeros(places.point.shape)
+        for value, quantity in zip(values, condition.known, strict=True)
     )
     frame = normals if condition.frame == "local" else np.ones_like(normals)
-    return (first + 1j * second) * frame
+    return np.asarray((first + 1j * second) * frame)

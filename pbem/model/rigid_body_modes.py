@@ -16,6 +16,7 @@ from pbem.geometry.sampling import sample_side
 from pbem.model.model import Contact, Interface, Law, Model, Region
 from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
 from pbem.model.touching import measure_opening
+from pbem.model.varying import Varying
 from pbem.wording import list_names
 
 Tie = Literal["both", "normal", "none"]
@@ -61,7 +62,7 @@ def default_tie(law: Law, touches: bool) -> Tie:
         return "both"
     if law.kind == "open" or not touches:
         return "none"
-    return "both" if law.friction > 0 or law.cohesion > 0 or law.kind != "coulomb" else "normal"
+    return "both" if law.friction or law.cohesion or law.kind != "coulomb" else "normal"
 
 
 def find_rigid_body_modes(model: Model, ties: Mapping[str, Tie | PairTie] | None = None) -> tuple[RigidBodyMode, ...]:
@@ -172,7 +173,7 @@ def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> Real:
 
 
 def _touches(model: Model, joint: Interface | Contact) -> bool:
-    if isinstance(joint, Interface) and not isinstance(joint.law.gap, str):
+    if isinstance(joint, Interface) and not isinstance(joint.law.gap, Varying):
         return joint.law.gap <= 0
     names = [joint.name] if isinstance(joint, Interface) else [joint.first, joint.second]
     shorter = min(model.curves[name].length for name in names)

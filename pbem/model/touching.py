@@ -3,58 +3,68 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Real
 from pbem.geometry.curve import Curve, Leg
-from pbem.geometry.expression import evaluate_expression
 from pbem.geometry.intersection import measure_distances, project
-from pbem.model.model import Contact, Interface, Law, Model
+from pbem.model.model import Contact, Interface, Model
+from pbem.model.varying import Places, evaluate
 
-Opening = Callable[[Complex], Real]
-
-
-def sample_gap(law: Law, points: Complex) -> Real:
-    """The law's own gap at points of the user's coordinates (any shape). Raises ExpressionError if its expression is
-    none."""
-    if isinstance(law.gap, str):
-        return evaluate_expression(law.gap, x=points.real, y=points.imag)
-    return np.full(points.shape, law.gap)
+Opening = Callable[[Places], Real]
 
 
 def measure_opening(model: Model, joint: Interface | Contact) -> float:
     """The least initial opening anywhere on an interface, or between the curves of a contact (distance and gap)."""
+
+    def evaluate_gap(places: Places) -> Real:
+        return evaluate(joint.law.gap, replace(places, point=places.point + model.origin))
+
     if isinstance(joint, Interface):
-        return find_least(model.curves[joint.name], lambda points: sample_gap(joint.law, points + model.origin))[0]
+        return find_least(model.curves[joint.name], evaluate_gap)[0]
     first, second = model.curves[joint.first], model.curves[joint.second]
 
-    def opening(points: Complex) -> Real:
-        return measure_distances(second.legs, points) + sample_gap(joint.law, points + model.origin)
+    def opening(places: Places) -> Real:
+        return measure_distances(second.legs, places.point) + evaluate_gap(places)
 
     # A corner of the second curve may face the first one between two samples.
     corners = [complex(end) for leg in second.legs for end in (leg.start, leg.end)]
-    feet = np.array([_find_foot(first, corner) for corner in corners])
-    return min(find_least(first, opening)[0], float(opening(feet).min()))
+    feet = [find_foot(first, corner) for corner in corners]
+    at_feet = opening(Places(*map(np.array, zip(*feet, strict=True))))
+    return min(find_least(first, opening)[0], float(at_feet.min()))
 
 
 def find_least(curve: Curve, evaluate: Opening) -> tuple[float, complex]:
     """The least value of a function along a curve, and its place: from samples, closer and closer around the least."""
-    found = [_find_least_on_leg(leg, evaluate) for leg in curve.legs]
+    found, passed = [], 0.0
+    for leg in curve.legs:
+        found.append(_find_least_on_leg(leg, passed, evaluate))
+        passed += leg.length
     return min(found, key=lambda pair: pair[0])
 
 
-def _find_least_on_leg(leg: Leg, evaluate: Opening) -> tuple[float, complex]:
+def place_on_leg(leg: Leg, passed: float, fractions: Real) -> Places:
+    """Places at fractions of a leg that begins after so much of its curve's length."""
+    return Places(leg.point(fractions), passed + leg.length * fractions)
+
+
+def _find_least_on_leg(leg: Leg, passed: float, evaluate: Opening) -> tuple[float, complex]:
     low, high, count = 0.0, 1.0, min(4 * leg.elements, 4000)
     for _ in range(10):
         fractions = np.linspace(low, high, count + 1)
-        points = leg.point(fractions)
-        values = evaluate(points)
+        places = place_on_leg(leg, passed, fractions)
+        values = evaluate(places)
         at = int(np.argmin(values))
         low, high, count = fractions[max(at - 1, 0)], fractions[min(at + 1, count)], 16
-    return float(values[at]), complex(points[at])
+    return float(values[at]), complex(places.point[at])
 
 
-def _find_foot(curve: Curve, point: complex) -> complex:
-    nearest = min(curve.legs, key=lambda leg: project(leg, point)[1])
-    return complex(nearest.point(np.array(project(nearest, point)[0])))
+def find_foot(curve: Curve, point: complex) -> tuple[complex, float]:
+    """The nearest point of a curve, and the length from the curve's first point to it."""
+    nearest = min(range(len(curve.legs)), key=lambda number: project(curve.legs[number], point)[1])
+    leg = curve.legs[nearest]
+    fraction = project(leg, point)[0]
+    passed = sum(before.length for before in curve.legs[:nearest])
+    return complex(leg.point(np.array(fraction))), passed + fraction * leg.length

@@ -23,6 +23,10 @@ Lengths and stresses are in any consistent units; angles are in degrees. The pla
 positive in tension. Capitals stand for names of your choice, or for those of the curves and materials of the file. What
 the tables mean together: `pbem help cases`.
 
+A varying value is `{ expression = "..." }`, a function of `x`, `y` and of the length `s` from the curve's first point,
+in conditions and pressures also of the time `t`; or `{ table = [[s, value], ...] }` with rising `s`, linear in between
+and constant beyond its ends.
+
 This page is made from the program's own schema. An optional key without a default is absent unless it is given."""
 
 # What stands in the place of a name of the user's.
@@ -72,7 +76,7 @@ def _write_entries(schema: Schema, table: Schema, prefix: str = "") -> Iterator[
         if table is schema and (inner is not None or named):
             continue
         path = f"{prefix}{key}.{NAMES[key]}" if named and key in NAMES else f"{prefix}{key}"
-        if inner is None or inner["title"] in VALUES or inner["title"] == "ExpressionTable":
+        if inner is None or inner["title"] in VALUES or inner["title"] == "VaryingTable":
             kind = "table" if inner is not None and inner["title"] in VALUES else _describe_kind(schema, entry)
             lines.append(_write_key(path, kind, entry, key in table.get("required", ())))
         else:
@@ -101,18 +105,22 @@ def _find_table(schema: Schema, entry: Schema) -> Schema | None:
     if "$ref" in entry:
         found: Schema = schema["$defs"][entry["$ref"].rsplit("/", 1)[1]]
         return found
-    below = [*entry.get("anyOf", ()), *(entry[key] for key in ("items", "additionalProperties") if key in entry)]
+    below = [*entry.get("anyOf", ()), *entry.get("oneOf", ())]
+    below += [entry[key] for key in ("items", "additionalProperties") if key in entry]
     tables = (_find_table(schema, part) for part in below if isinstance(part, dict))
     return next((table for table in tables if table is not None), None)
 
 
 def _describe_kind(schema: Schema, entry: Schema) -> str:
     """The type of a value and its range, in words."""
+    if "$ref" in entry and entry["$ref"].endswith("/VaryingTable"):
+        return "varying value"
     if "$ref" in entry:
         keys = ", ".join(f"{key} = ..." for key in (_find_table(schema, entry) or {"properties": ()})["properties"])
         return f"{{ {keys} }}"
-    if "anyOf" in entry:
-        return " or ".join(_describe_kind(schema, part) for part in entry["anyOf"] if part.get("type") != "null")
+    parts = [part for part in (entry.get("anyOf") or entry.get("oneOf", ())) if part.get("type") != "null"]
+    if parts:
+        return " or ".join(_describe_kind(schema, part) for part in parts)
     if "enum" in entry:
         return ", ".join(json.dumps(value) for value in entry["enum"])
     if "prefixItems" in entry:

@@ -192,12 +192,7 @@ def describe_law(law: Law) -> str:
         return ", ".join([law.kind, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())])
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
-    return ", ".join([*given, *([f"gap {_describe_gap(law.gap)}"] if law.gap else [])])
-
-
-def _describe_gap(gap: float | str) -> str:
-    """A number, or the expression in quotes."""
-    return f'"{gap}"' if isinstance(gap, str) else f"{gap:.4g}"
+    return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
 
 
 def _describe_loads(model: Model) -> list[str]:

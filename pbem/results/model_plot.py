@@ -13,11 +13,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as OutlinePath
 
-from pbem.arrays import Complex, Integer
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model
 from pbem.model.origin import move_back
+from pbem.model.touching import find_foot
+from pbem.model.varying import Places, Value, evaluate
 from pbem.results.describe import describe_condition
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
@@ -165,16 +167,18 @@ def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, 
         _draw_rollers(axes, model, place, outward)
     for quantity, color in (("traction", FORCE), ("displacement", MOTION)):
         vector = sum(
-            (_pick_last([value[i] for value in values]) * axes_of_curve[i]
+            (_evaluate_last(model, condition.curve, [value[i] for value in values], place) * axes_of_curve[i]
              for i in range(2) if condition.known[i] == quantity),
             start=np.zeros_like(normal),
         )
         _draw_arrows(axes, model.size, place, normal, vector, color)
 
 
-def _pick_last(values: list[float]) -> float:
-    """The last value of the history that is not zero."""
-    return next((value for value in reversed(values) if value), 0.0)
+def _evaluate_last(model: Model, curve: str, values: list[Value], place: Complex) -> Real:
+    """At places of a curve the last value of the history that is not zero, at the end of its stage."""
+    number, value = next(((number, value) for number, value in reversed([*enumerate(values)]) if value), (0, 0.0))
+    along = np.array([find_foot(model.curves[curve], point)[1] for point in place])
+    return evaluate(value, Places(place + model.origin, along), model.find_time(number, 1.0))
 
 
 def _spread_points(mesh: Mesh, elements: Integer, most: int = 6) -> tuple[Complex, Complex]:

@@ -28,6 +28,8 @@ VALUES = {
     "log(e)": 1.0,
     "sqrt(t**2) - abs(-t)": 0.0,
     "max(t, min(2, 3))": 2.0,
+    "erf(t)": math.erf(0.7),
+    "erfc(t)": math.erfc(0.7),
     "  t\n + 1": 1.7,
 }
 

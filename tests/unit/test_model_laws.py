@@ -8,6 +8,7 @@ import pytest
 
 from pbem.model.model import Law, Model
 from pbem.model.rigid_body_modes import find_rigid_body_modes
+from pbem.model.varying import Varying
 from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only_fault
 
 DEFAULT = 'law = "coulomb"\nfriction = 0.5'
@@ -34,8 +35,8 @@ LAWS = {
     'law = "bonded"\nnormal_stiffness = 3\ntangential_stiffness = 4': Law(
         "bonded", normal_stiffness=3.0, tangential_stiffness=4.0
     ),
-    DEFAULT + '\ngap = { expression = "0.1*x*(2 - x)" }': Law("coulomb", 0.5, gap="0.1*x*(2 - x)"),
-    'law = "open"\ngap = { expression = "y" }': Law("open", gap="y"),
+    DEFAULT + '\ngap = { expression = "0.1*x*(2 - x)" }': Law("coulomb", 0.5, gap=Varying("0.1*x*(2 - x)")),
+    'law = "open"\ngap = { expression = "y" }': Law("open", gap=Varying("y")),
     'law = "open"\ncohesion_lost = false': Law("open"),
 }
 
@@ -164,15 +165,15 @@ WRONG = {
     "gap that is no expression": (
         DEFAULT + '\ngap = { expression = "0.1*t" }',
         "interfaces.interface.gap",
-        "the unknown name 't' at character 5 of \"0.1*t\"; expected one of: x, y, pi, e",
+        "the unknown name 't' at character 5 of \"0.1*t\"; expected one of: x, y, s, pi, e",
     ),
-    "gap as a text": (DEFAULT + '\ngap = "x"', "interfaces.interface.gap", 'or { expression = "..." }'),
+    "gap as a text": (DEFAULT + '\ngap = "x"', "interfaces.interface.gap", 'a number, or { expression = "..." }'),
     "gap with another key": (
         DEFAULT + '\ngap = { expression = "x", expr = "x" }',
         "interfaces.interface.gap.expr (line 29)",
         "unknown key 'expr'; expected one of: expression",
     ),
-    "gap of nothing": (DEFAULT + "\ngap = {}", "interfaces.interface.gap.expression", "found no expression"),
+    "gap of nothing": (DEFAULT + "\ngap = {}", "interfaces.interface.gap", '{ expression = "..." } or { table ='),
     "gap with a number": (DEFAULT + "\ngap = { expression = 3 }", "interfaces.interface.gap", "a text in quotes"),
     "gap in a bond": (
         'law = "bonded"\ngap = { expression = "x" }',

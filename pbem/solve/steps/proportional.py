@@ -33,7 +33,7 @@ def is_proportional_at_last(problem: Problem, memory: Memory, stage: int, reache
 
 def _grows_from_rest(problem: Problem, memory: Memory, stage: int, reached: float) -> bool:
     """Whether this is the first step, with all that is prescribed growing from nothing, and no fluid."""
-    if stage > 0 or reached > 0:
+    if stage > 0 or reached > 0 or problem.model.timed:
         return False
     rest = start_memory(problem.laws)
     untouched = not memory.slip.any() and not memory.normal_traction.any()

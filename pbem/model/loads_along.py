@@ -1,0 +1,70 @@
+"""Loads that vary along a curve have a value everywhere on it and at all times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pbem.arrays import Real
+from pbem.description.case import Case
+from pbem.description.varying import VaryingTable
+from pbem.errors import Fault, KeyPath
+from pbem.geometry.curve import Curve
+from pbem.geometry.junction import format_point
+from pbem.model.given import read_value
+from pbem.model.model import Model
+from pbem.model.touching import find_least
+from pbem.model.varying import Places, Varying
+
+# Fractions of a stage at which a load that depends on time is looked at; not its beginning, where t may be 0.
+FRACTIONS = (1e-3, 0.1, 0.5, 0.9, 1.0)
+
+
+def check_loads(case: Case, model: Model) -> list[Fault]:
+    """Faults of conditions and pressures by expressions that have no finite value somewhere, each at its place.
+
+    model: about the origin of the user's coordinates.
+    """
+    faults = []
+    for loc, curve, given, first in _list_given(case):
+        value = read_value(loc, given, timed=True)[0]
+        if not isinstance(value, Varying) or curve not in model.curves:
+            continue
+        stages = range(first, len(model.stages)) if value.timed else [first]
+        times = [model.find_time(stage, fraction) for stage in stages for fraction in FRACTIONS]
+        faults += _check_value(loc, value, model.curves[curve], times if value.timed else times[:1])
+    return faults
+
+
+def _list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, int]]:
+    """Place, curve, what is given, and the first stage in which it acts."""
+    tables: list[tuple[KeyPath, object, int]] = []
+    for key in ("boundary", "interfaces", "contacts"):
+        tables += [((key, name), table, 0) for name, table in getattr(case, key).items()]
+        for number, stage in enumerate(case.stages):
+            tables += [(("stages", number, key, name), table, number) for name, table in getattr(stage, key).items()]
+    for loc, table, first in tables:
+        name = str(loc[-1])
+        curve = case.contacts[name].between[0] if loc[-2] == "contacts" and name in case.contacts else name
+        for key in (*CONDITIONS, "pressure"):
+            given = getattr(table, key, None)
+            if isinstance(given, VaryingTable):
+                yield (*loc, key), curve, given, first
+
+
+CONDITIONS = ("ux", "uy", "tx", "ty", "un", "us", "tn", "ts")
+
+
+def _check_value(loc: KeyPath, value: Varying, curve: Curve, times: list[float]) -> list[Fault]:
+    for time in times:
+
+        def is_finite(places: Places, time: float = time) -> Real:
+            return np.isfinite(value.evaluate(places, time)).astype(float)
+
+        least, place = find_least(curve, is_finite)
+        if least < 1:
+            at = f" at the time {time:.6g}" if value.timed else ""
+            found = f"no finite value{at} at {format_point(place)} on curve '{curve.name}'"
+            return [Fault.at(loc, found, "a finite value everywhere on the curve, at all times")]
+    return []

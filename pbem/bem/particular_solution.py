@@ -1,4 +1,4 @@
-"""Fields that satisfy equilibrium by themselves: uniform stress and gravity. They enter the equations as known parts.
+"""Fields that satisfy equilibrium by themselves: linear stress and gravity. They enter the equations as known parts.
 
 The field of a region under them is total = background + elastic, and only the elastic part obeys the integral
 equations without source. In a finite region the background is the in-situ stress (without displacement) and gravity.
@@ -12,29 +12,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Real
+from pbem.model.in_situ import AT_REST, LinearStress, Stress
 from pbem.model.material import Material
-
-Stress = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class ParticularSolution:
-    """remote, initial: uniform stresses sxx, syy, sxy, with and without the displacement of their strain.
+    """remote: uniform stress sxx, syy, sxy with the displacement of its strain; initial: the in-situ stress, without.
 
-    force: body force per volume, complex. center: where the displacement of both vanishes, and the stress of the force.
-    One near the region keeps rounding as small as the region. Any will do for the force, as fields of uniform pressure
-    obey the integral equations too. To the remote strain it is the place that does not move.
+    force: body force per volume, complex, beyond what the in-situ stress balances; carried: what that balances.
+    center: where the displacement of remote stress and force vanishes, and the stress of the force. One near the region
+    keeps rounding as small as the region. Any will do for the force, as fields of uniform pressure obey the integral
+    equations too. To the remote strain it is the place that does not move.
     """
 
     material: Material
     remote: Stress = (0.0, 0.0, 0.0)
-    initial: Stress = (0.0, 0.0, 0.0)
+    initial: LinearStress = AT_REST
     force: complex = 0.0
+    carried: complex = 0.0
     center: complex = 0.0
 
     @property
     def is_zero(self) -> bool:
-        return not (any(self.remote) or any(self.initial) or self.force)
+        return not (any(self.remote) or self.force) and self.initial.is_zero
 
     def displacement(self, point: Complex) -> Complex:
         """Displacement (complex) at points: of the remote strain about the center, and of gravity (theory, 5, 6).
@@ -51,9 +52,8 @@ class ParticularSolution:
 
     def stress(self, point: Complex) -> Real:
         """sxx, syy, sxy (n, 3) at points (theory, 6)."""
-        uniform = np.add(self.remote, self.initial)
         isotropic = -(np.conj(self.force) * (point - self.center)).real
-        return uniform + isotropic[:, None] * np.array([1.0, 1.0, 0.0])
+        return np.array(self.remote) + self.initial.evaluate(point) + isotropic[:, None] * np.array([1.0, 1.0, 0.0])
 
     def traction(self, point: Complex, normal: Complex) -> Complex:
         """Traction (complex) on unit normals at points."""

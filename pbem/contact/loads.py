@@ -11,6 +11,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
+from pbem.model.in_situ import AT_REST
 from pbem.model.model import Model, Region, Stage
 from pbem.model.varying import Moment, Places, Value, Varying, blend
 
@@ -97,9 +98,8 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         pairs = [(before.boundary.get(name, none)[direction], after.boundary.get(name, none)[direction])
                  for name in model.conditions]
         values[:, direction] = _blend_all(pairs, outer.condition, outer.places, moment)
-    gravity = complex(*interpolate(before.gravity, after.gravity))
     remote = interpolate(before.remote, after.remote)
-    balanced = _sample(mesh, [balanced_background(model, region, gravity) for region in model.regions])
+    balanced = _sample(mesh, [balanced_background(model, region, stage, factor) for region in model.regions])
     far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
@@ -146,12 +146,19 @@ def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
     return fields
 
 
-def balanced_background(model: Model, region: Region, gravity: complex) -> ParticularSolution:
-    """In-situ stress and weight of a region."""
-    initial = model.initial_stress.get(region.material.name, (0.0, 0.0, 0.0))
-    force = region.material.density * gravity
+def balanced_background(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:
+    """In-situ stress and weight of a region at the fraction `factor` of a stage.
+
+    Where the stress grows with the coordinates it balances a weight that acts from the start (theory, 6).
+    """
+    initial = model.initial_stress.get(region.material.name, AT_REST)
+    at_rest = 0j if initial.is_uniform else model.rest_gravity
+    start = complex(*model.stages[stage - 1].gravity) if stage > 0 else at_rest
+    gravity = start + factor * (complex(*model.stages[stage].gravity) - start)
+    carried = region.material.density * at_rest
+    force = region.material.density * gravity - carried
     center = _find_center(model, region) if force else 0
-    return ParticularSolution(region.material, initial=initial, force=force, center=center)
+    return ParticularSolution(region.material, initial=initial, force=force, carried=carried, center=center)
 
 
 def _find_center(model: Model, region: Region) -> complex:

@@ -22,6 +22,7 @@ from pbem.description.schema import (
     CurveTable,
     GenerateTable,
     GravityTable,
+    InSituTable,
     LawTable,
     MaterialTable,
     OutputTable,
@@ -60,7 +61,7 @@ class Case:
     contacts: Mapping[str, ContactTable]
     remote: StressTable | None
     gravity: GravityTable | None
-    initial_stress: Mapping[str, StressTable]
+    initial_stress: Mapping[str, InSituTable]
     analysis: AnalysisTable
     stages: tuple[StageTable, ...]
     solver: SolverTable

@@ -36,7 +36,7 @@ from pbem.description.values import (
     Tolerance,
     check_option,
 )
-from pbem.description.varying import Strength, Value
+from pbem.description.varying import LinearValue, Strength, Value
 
 
 class UnitsTable(Table):
@@ -247,6 +247,14 @@ class StressTable(Table):
     sxy: Number = 0.0
 
 
+class InSituTable(Table):
+    """Components of the stress at rest."""
+
+    sxx: LinearValue = 0.0
+    syy: LinearValue = 0.0
+    sxy: LinearValue = 0.0
+
+
 class GravityTable(Table):
     """Acceleration; a region's weight per volume is its density times this."""
 
@@ -351,8 +359,10 @@ class CaseFile(Table):
     contacts: Mapping[str, ContactTable] = {}
     remote: StressTable | None = Field(None, description="Stress at infinity, for infinite regions.")
     gravity: GravityTable | None = None
-    initial_stress: Mapping[str, StressTable] = Field(
-        {}, description="In-situ stress of a material, there before any load; tractions and stresses include it."
+    initial_stress: Mapping[str, InSituTable] = Field(
+        {}, description="In-situ stress of a material, there before any load; tractions and stresses include it. It is "
+        "uniform, or grows linearly with x and y in balance with the material's weight under `[gravity]`, which then "
+        "acts from the start."
     )
     analysis: AnalysisTable = AnalysisTable()
     stages: tuple[StageTable, ...] = ()

@@ -53,8 +53,14 @@ class VaryingTable(Table):
     )
 
 
+class ExpressionTable(Table):
+    """A quantity that is linear in the coordinates."""
+
+    expression: Text = Field(description="a linear function of `x` and `y`")
+
+
 def _tell_kind(value: object) -> str:
-    return VARYING if isinstance(value, dict | VaryingTable) else NUMBER
+    return VARYING if isinstance(value, dict | Table) else NUMBER
 
 
 # Which of both a value is, so that it has the faults of that one only.
@@ -66,4 +72,8 @@ Value = Annotated[
 ]
 Strength = Annotated[
     Annotated[NotNegative, Tag(NUMBER)] | _Varying, Discriminator(_tell_kind), BeforeValidator(_check_strength)
+]
+# A number, or what is linear in x and y.
+LinearValue = Annotated[
+    Annotated[Number, Tag(NUMBER)] | Annotated[ExpressionTable, Tag(VARYING)], Discriminator(_tell_kind)
 ]

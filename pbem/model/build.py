@@ -192,6 +192,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         interior_grid=case.output.interior.shape if case.output.interior else None,
         notes=(*topology.notes, *grading, *fitted.notes, *_note_choices(case)),
         initial_stress=loading.initial_stress,
+        rest_gravity=loading.rest_gravity,
         contacts=loading.contacts,
         groups=case.groups,
         ties=fitted.ties,
@@ -220,7 +221,7 @@ def _note_loads(model: Model) -> list[str]:
     loads = [value for stage in model.stages for value in (
         *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
         *(stage.gravity if weights else ()))]
-    loads += [value for stress in model.initial_stress.values() for value in stress]
+    loads += [not stress.is_zero for stress in model.initial_stress.values()]
     return [] if any(loads) else ["No load: all prescribed displacements and tractions, pressures, stresses far away, "
                                   "weights and in-situ stresses are zero, and so will be the results."]
 

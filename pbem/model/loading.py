@@ -12,6 +12,7 @@ from pbem.description.schema import LawTable, StageConditionTable, StageInterfac
 from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
 from pbem.model.given import read_value
+from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
 from pbem.model.roles import Roles, unknown_name
@@ -35,7 +36,8 @@ class Loading:
     interfaces: Mapping[str, Interface]
     contacts: Mapping[str, Contact]
     stages: tuple[Stage, ...]
-    initial_stress: Mapping[str, tuple[float, float, float]]
+    initial_stress: Mapping[str, LinearStress]
+    rest_gravity: complex
     faults: tuple[Fault, ...]
 
 
@@ -71,7 +73,8 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     faults += backgrounds.faults
     stages = _find_stages(case, conditions, [*interfaces, *contacts], backgrounds)
     faults += _check_durations(case, joints, stages)
-    return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress, tuple(faults))
+    return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress,
+                   backgrounds.rest_gravity, tuple(faults))
 
 
 def _given(table: StageConditionTable) -> dict[str, Value]:

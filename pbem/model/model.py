@@ -10,6 +10,7 @@ from typing import Literal
 from pbem.description.generation import GeneratedGroup
 from pbem.geometry.curve import Curve, find_middle
 from pbem.geometry.loop import Loop
+from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.sliver import Tie
 from pbem.model.varying import Value, Varying
@@ -167,7 +168,8 @@ class Model:
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
     contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
-    initial_stress: in-situ stress sxx, syy, sxy of materials by name, there before any load.
+    initial_stress: in-situ stress of materials by name, there before any load. rest_gravity: acceleration that it is in
+    balance with where it grows with the coordinates, which acts on these materials from the start.
     origin: point of the user's coordinates about which those of the model are, 0 unless the model is far from there.
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
@@ -190,7 +192,8 @@ class Model:
     output_every: int
     size: float
     notes: tuple[str, ...] = ()
-    initial_stress: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    initial_stress: Mapping[str, LinearStress] = field(default_factory=dict)
+    rest_gravity: complex = 0j
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None

@@ -76,7 +76,7 @@ def _write_entries(schema: Schema, table: Schema, prefix: str = "") -> Iterator[
         if table is schema and (inner is not None or named):
             continue
         path = f"{prefix}{key}.{NAMES[key]}" if named and key in NAMES else f"{prefix}{key}"
-        if inner is None or inner["title"] in VALUES or inner["title"] == "VaryingTable":
+        if inner is None or inner["title"] in VALUES or inner["title"] in ("VaryingTable", "ExpressionTable"):
             kind = "table" if inner is not None and inner["title"] in VALUES else _describe_kind(schema, entry)
             lines.append(_write_key(path, kind, entry, key in table.get("required", ())))
         else:

@@ -210,7 +210,7 @@ def _describe_loads(model: Model) -> list[str]:
         parts += _shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
         lines.append(", ".join(parts))
     for name, stress in model.initial_stress.items():
-        lines.append("in-situ stress of {}: sxx, syy, sxy = {:g}, {:g}, {:g}".format(name, *stress))
+        lines.append("in-situ stress of {}: sxx, syy, sxy = {}, {}, {}".format(name, *stress.describe(model.origin)))
     return lines
 
 

@@ -219,15 +219,17 @@ class EnergyBalance:
         stored = 0.5 * _dot(self._weight, traction + self._in_situ, displacement)
         for reference in self._forces:
             balanced, _ = backgrounds[self._faces.region[reference.faces[0]]]
-            force = np.array([balanced.force.real, balanced.force.imag])
             moved = reference.conjugate(self._weight, elastic, displacement)
             moved += (np.conj(balanced.force) * reference.integral).real
-            loads.append(force)
+            weight = balanced.force + balanced.carried
+            loads.append(np.array([weight.real, weight.imag]))
             conjugates.append(moved)
-            stored += 0.5 * float(force @ moved)
+            # In-situ stress that carries a weight does the work of both.
+            both = weight + balanced.carried
+            stored += 0.5 * float(np.array([both.real, both.imag]) @ moved)
         for reference in self._stresses:
             balanced, far = backgrounds[self._faces.region[reference.faces[0]]]
-            initial, remote = np.array(balanced.initial), np.array(far.remote)
+            initial, remote = np.array(balanced.initial.value), np.array(far.remote)
             strained = reference.conjugate(self._weight, elastic, displacement)
             loads.append(initial + remote)
             conjugates.append(strained)

@@ -136,8 +136,10 @@ class TipRules:
     def _evaluate_initial(self, group: _Alike, backgrounds: list[ParticularSolution]) -> Real:
         """In-situ stress, which has no displacement: what Hooke's law leaves out of the stress along the crack."""
         kappa = group.material.kappa
-        initial = np.array([backgrounds[region].initial for region in group.region])
-        sxx, syy, sxy = initial.T
+        places = self.mesh.pairs.position[group.pair[:, 0]]
+        initial = [backgrounds[region].initial.evaluate(place[None])[0]
+                   for region, place in zip(group.region, places, strict=True)]
+        sxx, syy, sxy = np.array(initial).T
         turned = 0.5 * (sxx - syy) - 1j * sxy  # (s_tt - s_nn)/2 along a direction d: its product with d^2
         deviator = (turned * group.direction**2).real
         mean, lateral = 0.5 * (sxx + syy), (3 - kappa) / (1 + kappa)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -120,10 +121,81 @@ def test_friction_that_varies_bounds_every_pair(tmp_path: Path) -> None:
     """A block drawn over a plate whose friction rises along it: pairs that slip carry their own bound."""
     expression = {"expression": "0.2 + 0.3*s**2"}
     case = dict(pbem.Case.read("cases/two_blocks_sliding.toml").given)
-    results = pbem.run(case | {"interfaces": {"interface": {"law": "coulomb", "friction": expression}}}, tmp_path / "results.h5")
+    law = {"interface": {"law": "coulomb", "friction": expression}}
+    results = pbem.run(case | {"interfaces": law}, tmp_path / "results.h5")
     contact = results.contact["interface"]
     slips = contact.mode[-1] == 1
     assert slips.sum() > 5
     bound = -(0.2 + 0.3 * contact.arc_length**2) * contact.traction_n[-1]
     np.testing.assert_allclose(np.abs(contact.traction_s[-1])[slips], bound[slips], rtol=1e-8)
     assert (np.abs(contact.traction_s[-1]) <= bound * (1 + 1e-8) + 1e-9).all()
+
+
+def make_ground(origin: complex, unit: float, wall: str) -> dict[str, Any]:
+    """A box of soil on rollers, its surface free, with a fault across it, at rest under its own weight."""
+    x, y, density, gravity = origin.real, origin.imag, 2e-6, -9810.0
+    weight = f"({density * gravity!r})*({y + 10 * unit!r} - y)"
+
+    def line(*points: tuple[float, float]) -> dict[str, object]:
+        return {"points": [[x + unit * a, y + unit * b] for a, b in points], "elements": 6}
+
+    return {
+        "materials": {"soil": {"young": 50.0, "poisson": 0.3, "density": density}},
+        "curves": {"bottom": line((0, 0), (20, 0)), "right": line((20, 0), (20, 10)), "top": line((20, 10), (0, 10)),
+                   "left": line((0, 0), (0, 10)), "fault": line((6, 3), (14, 8))},
+        "regions": {"a": {"material": "soil", "boundary": ["bottom", "right", "top", "left"], "cracks": ["fault"]}},
+        "boundary": {"bottom": {"uy": 0.0}, "left": {"ux": 0.0}, "right": {wall: 0.0}},
+        "interfaces": {"fault": {"friction": 0.7}},
+        "gravity": {"gy": gravity},
+        "initial_stress": {"soil": {"sxx": {"expression": f"0.6*{weight}"}, "syy": {"expression": weight}}},
+        "output": {"points": [[x + 5 * unit, y + 4 * unit]]},
+        "analysis": {"steps": 2},
+    }
+
+
+@pytest.mark.parametrize(("origin", "unit"), [(0j, 1.0), (4.5e5 + 7.1e6j, 1e3)])
+def test_ground_at_rest_does_not_move(origin: complex, unit: float, tmp_path: Path) -> None:
+    """The stress at rest is that given; without it the ground settles under its weight, by rho g h^2/(2 E_oed)."""
+    tables = make_ground(origin, unit, "ux")
+    results = pbem.run(tables, tmp_path / "rest.h5")
+    settled = pbem.run({key: table for key, table in tables.items() if key != "initial_stress"}, tmp_path / "free.h5")
+    largest = np.abs(settled.displacement[-1]).max()
+    oedometric = 50.0 * (1 - 0.3) / ((1 + 0.3) * (1 - 2 * 0.3))
+    assert largest == pytest.approx(2e-6 * 9810 * (10 * unit) ** 2 / (2 * oedometric), rel=1e-6)
+    assert np.abs(results.displacement).max() < 1e-9 * largest
+    vertical = -2e-6 * 9810 * 6 * unit
+    np.testing.assert_allclose(results.interior.stress[-1][0], [0.6 * vertical, vertical, 0.0],
+                               atol=1e-8 * abs(vertical))
+    assert (results.contact["fault"].mode[-1] == 0).all()
+
+
+def test_ground_that_loses_its_wall_has_the_energy_of_its_field(tmp_path: Path) -> None:
+    """The integral of (s0 + s)/2 : strain is half that of (s - s0) : strain, as when tractions -s0 n pull at the same
+    body without weight, and that of s0 : strain, the work of t0 on the boundary and of the weight inside."""
+    tables = make_ground(0j, 1.0, "tx")
+    tables["regions"] = {"a": {"material": "soil", "boundary": ["bottom", "right", "top", "left"]}}
+    tables["curves"] = {name: curve for name, curve in tables["curves"].items() if name != "fault"}
+    del tables["interfaces"]
+    points, weights = np.polynomial.legendre.leggauss(10)
+    grid = [[10 + 10 * a, 5 + 5 * b] for a in points for b in points]
+    results = pbem.run(tables | {"output": {"points": grid}}, tmp_path / "open.h5")
+    assert results.reactions["bottom"][-1] == pytest.approx([0.0, 2e-6 * 9810 * 200], rel=1e-5, abs=1e-9)
+    pulled = tables | {"boundary": {"bottom": {"uy": 0.0}, "left": {"ux": 0.0},
+                                    "right": {"tx": {"expression": f"0.6*{2e-6 * 9810}*(10 - y)"}}}}
+    alike = pbem.run({key: table for key, table in pulled.items() if key not in ("initial_stress", "gravity")},
+                     tmp_path / "pulled.h5")
+    np.testing.assert_allclose(results.displacement[-1], alike.displacement[-1], atol=1e-9)
+    weight, outward = np.outer(weights, weights).ravel() * 50, 2 * alike.energy.external[-1]
+    inside = -2e-6 * 9810 * float(weight @ results.interior.displacement[-1][:, 1])
+    assert results.energy.elastic[-1] == pytest.approx(0.5 * outward - outward + inside, rel=2e-3)
+    assert results.energy.external[-1] == pytest.approx(results.energy.elastic[-1], rel=1e-6)
+
+
+def test_stress_at_rest_that_does_not_fit_is_told() -> None:
+    for change, text in (
+        ({"sxx": {"expression": "x*y"}}, "not linear"),
+        ({"syy": {"expression": "1e-3*y"}}, "in balance with the weight"),
+        ({"syy": {"expression": "s"}}, "unknown name 's'"),
+    ):
+        with pytest.raises(pbem.CaseError, match=text):
+            pbem.run(make_ground(0j, 1.0, "ux") | {"initial_stress": {"soil": change}})

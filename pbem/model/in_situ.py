@@ -1,0 +1,124 @@
+"""In-situ stress, uniform or linear in the coordinates, as at rest under its own weight."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pbem.arrays import Complex, Real
+from pbem.description.schema import InSituTable
+from pbem.errors import Fault, KeyPath
+from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.junction import format_point
+
+Stress = tuple[float, float, float]
+NONE: Stress = (0.0, 0.0, 0.0)
+COMPONENTS = ("sxx", "syy", "sxy")
+# An expression is linear to this part of its largest value.
+EXACT = 1e-9
+# A weight is balanced to this part of it; numbers in a file are rounded.
+BALANCED = 1e-6
+
+
+@dataclass(frozen=True)
+class LinearStress:
+    """sxx, syy, sxy: their values at `center`, and what they grow by with x and with y."""
+
+    value: Stress = NONE
+    by_x: Stress = NONE
+    by_y: Stress = NONE
+    center: complex = 0j
+
+    @property
+    def is_uniform(self) -> bool:
+        return not (any(self.by_x) or any(self.by_y))
+
+    @property
+    def is_zero(self) -> bool:
+        return self.is_uniform and not any(self.value)
+
+    @property
+    def divergence(self) -> complex:
+        """Its divergence (complex): minus the body force that it balances."""
+        return complex(self.by_x[0] + self.by_y[2], self.by_x[2] + self.by_y[1])
+
+    def evaluate(self, point: Complex) -> Real:
+        """The components (n, 3) at points (n,)."""
+        away = point - self.center
+        stress: Real = np.outer(away.real, self.by_x) + np.outer(away.imag, self.by_y) + np.array(self.value)
+        return stress
+
+    def describe(self, origin: complex) -> tuple[str, ...]:
+        """The components in words; origin: of the model, in the user's coordinates."""
+        if self.is_uniform:
+            return tuple(f"{value:g}" for value in self.value)
+        at = format_point(self.center + origin)
+        return tuple(
+            f"{value:g}" + "".join(f" {slope:+g} per {axis}" for slope, axis in ((x, "x"), (y, "y")) if slope)
+            + (f" from {at}" if x or y else "")
+            for value, x, y in zip(self.value, self.by_x, self.by_y, strict=True)
+        )
+
+    def move(self, shift: complex) -> LinearStress:
+        """The same about another origin: the places of the model have become less by the shift."""
+        return self if self.is_uniform else replace(self, center=self.center - shift)
+
+
+AT_REST = LinearStress()
+
+
+def read_in_situ(loc: KeyPath, table: InSituTable, corners: Complex) -> tuple[LinearStress, list[Fault]]:
+    """The stress that a table gives, with faults for what is not linear.
+
+    corners (3,): lower left and right, and upper left, of a rectangle in which the case lies.
+    """
+    faults: list[Fault] = []
+    columns = []
+    for key in COMPONENTS:
+        given = getattr(table, key)
+        if isinstance(given, float):
+            columns.append((given, 0.0, 0.0))
+            continue
+        try:
+            columns.append(_fit(given.expression, corners))
+        except ExpressionError as error:
+            faults.append(Fault.at((*loc, key), error.found, error.expected))
+    if faults:
+        return AT_REST, faults
+    value, by_x, by_y = zip(*columns, strict=True)
+    linear = any(by_x) or any(by_y)
+    return LinearStress(value, by_x, by_y, complex(corners[0]) if linear else 0j), []
+
+
+def _fit(text: str, corners: Complex) -> tuple[float, float, float]:
+    """Value at the first corner, and slopes, of a linear expression. Raises ExpressionError for any other."""
+    across, up = corners[1] - corners[0], corners[2] - corners[0]
+    points = corners[0] + np.array([0, 1, 0, 1, 0.37, 0.81]) * across + np.array([0, 0, 1, 1, 0.64, 0.23]) * up
+    values = evaluate_expression(text, x=points.real, y=points.imag)
+    start, by_x, by_y = values[0], (values[1] - values[0]) / across.real, (values[2] - values[0]) / up.imag
+    away = points - corners[0]
+    linear = start + by_x * away.real + by_y * away.imag
+    # A coordinate far from the origin is rounded, and with it what grows with it.
+    rounding = sys.float_info.epsilon * (abs(by_x) * np.abs(points.real).max() + abs(by_y) * np.abs(points.imag).max())
+    if not (np.abs(values - linear) <= EXACT * np.abs(values).max() + 16 * rounding).all():
+        raise ExpressionError(f'"{text}", which is not linear in x and y', "an expression linear in x and y")
+    size = np.abs(values).max() * EXACT + 16 * rounding
+    # What rounding alone makes grow does not.
+    slopes = [float(slope) if abs(slope) * extent > size else 0.0
+              for slope, extent in ((by_x, across.real), (by_y, up.imag))]
+    return float(start), slopes[0], slopes[1]
+
+
+def check_rest(loc: KeyPath, stress: LinearStress, density: float, gravity: complex) -> Iterator[Fault]:
+    """A fault if the stress of a material is not in balance with the weight that it carries at rest."""
+    left = stress.divergence + density * gravity
+    scale = max(abs(stress.divergence), abs(density * gravity))
+    if not stress.is_uniform and abs(left) > BALANCED * scale:
+        found = (f"a stress that grows by ({stress.divergence.real:.6g}, {stress.divergence.imag:.6g}) per length "
+                 f"against a weight of ({density * gravity.real:.6g}, {density * gravity.imag:.6g}) per volume")
+        expected = ("in balance with the weight at rest: d sxx/dx + d sxy/dy = -density gx, "
+                    "d sxy/dx + d syy/dy = -density gy, with the gravity of [gravity]")
+        yield Fault.at(loc, found, expected)

@@ -34,8 +34,8 @@ class Shifts:
 
 
 def prepare_shifts(forest: Forest, terms: int) -> Shifts:
-    """The matrices (k, p + 1, p + 1) of all clusters; a root's are not used."""
-    parent = np.maximum(forest.parent, 0)
+    """The matrices (k, p + 1, p + 1) of all clusters; a root's, as of a cluster in itself, are not used."""
+    parent = np.where(forest.parent < 0, np.arange(forest.clusters), forest.parent)
     offset = forest.center - forest.center[parent]
     outer = forest.radius[parent]
     return Shifts(shift_matrices(offset, forest.radius, outer, terms), offset, outer)

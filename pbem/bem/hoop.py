@@ -20,13 +20,13 @@ def evaluate_hoop_stress(
 ) -> Real:
     """Normal stress along the boundary (f,) at the nodes of `list_faces(mesh)` (theory, 71).
 
-    displacement, traction (f,) complex, at these nodes. initial: per region its material and in-situ stress, which has
-    no displacement. The stretch is the derivative of the polynomial through an element's own nodes and the nearest one
-    of each neighbour on a smooth curve: the own polynomial alone is off by several times as much at its outer nodes. On
-    a crack's faces it is that of their mean displacement, and plus or minus half that of the jump, which at a tip has
-    the square-root shape: the hoop stress then grows like 1/sqrt(distance) in mode II, as it should; jumps keep to
-    their own element. Elements of order 0 have no stretch of their own: there it is the difference between neighbours
-    on the same curve.
+    displacement, traction (f,) complex, at these nodes. initial: per region its material, its in-situ stress, which has
+    no displacement, and its swelling, which has no stress. The stretch is the derivative of the polynomial through an
+    element's own nodes and the nearest one of each neighbour on a smooth curve: the own polynomial alone is off by
+    several times as much at its outer nodes. On a crack's faces it is that of their mean displacement, and plus or
+    minus half that of the jump, which at a tip has the square-root shape: the hoop stress then grows like
+    1/sqrt(distance) in mode II, as it should; jumps keep to their own element. Elements of order 0 have no stretch of
+    their own: there it is the difference between neighbours on the same curve.
     """
     second = second_face_nodes(mesh)
     stretch, direction = evaluate_stretch(mesh, displacement)
@@ -43,10 +43,11 @@ def evaluate_hoop_stress(
         at_rest = ParticularSolution(background.material, initial=background.initial)
         rest_n = (np.conj(n) * at_rest.traction(position[own], n)).real
         rest_s = (np.conj(e) * at_rest.traction(position[own], e)).real
+        elastic = strain[own] - background.swelling.strain_along(position[own], e)
         kappa = background.material.kappa
         lateral = (3 - kappa) / (1 + kappa)  # Poisson's ratio of the plane problem
         pressed = (np.conj(n) * traction[own]).real - rest_n
-        stress[own] = rest_s + background.material.plane_modulus * strain[own] + lateral * pressed
+        stress[own] = rest_s + background.material.plane_modulus * elastic + lateral * pressed
     return stress
 
 

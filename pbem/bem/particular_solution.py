@@ -14,6 +14,7 @@ import numpy as np
 from pbem.arrays import Complex, Real
 from pbem.model.in_situ import AT_REST, LinearStress, Stress
 from pbem.model.material import Material
+from pbem.model.swelling import NO_SWELLING, Swelling
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class ParticularSolution:
     force: body force per volume, complex, beyond what the in-situ stress balances; carried: what that balances.
     center: where the displacement of remote stress and force vanishes, and the stress of the force. One near the region
     keeps rounding as small as the region. Any will do for the force, as fields of uniform pressure obey the integral
-    equations too. To the remote strain it is the place that does not move.
+    equations too. To the remote strain it is the place that does not move. swelling: strain without stress.
     """
 
     material: Material
@@ -32,13 +33,14 @@ class ParticularSolution:
     force: complex = 0.0
     carried: complex = 0.0
     center: complex = 0.0
+    swelling: Swelling = NO_SWELLING
 
     @property
     def is_zero(self) -> bool:
-        return not (any(self.remote) or self.force) and self.initial.is_zero
+        return not (any(self.remote) or self.force) and self.initial.is_zero and self.swelling.is_zero
 
     def displacement(self, point: Complex) -> Complex:
-        """Displacement (complex) at points: of the remote strain about the center, and of gravity (theory, 5, 6).
+        """Displacement (complex) at points: of remote strain about the center, gravity and swelling (theory, 5, 6, 83).
 
         Gravity's stress is isotropic, -(b . (x - center)), so that its displacement is an analytic function of x.
         """
@@ -48,7 +50,7 @@ class ParticularSolution:
         lever = point - self.center
         linear = 0.5 * (kappa - 1) * mean * lever - np.conj(deviator * lever)
         weight = -0.25 * (kappa - 1) * np.conj(self.force) * lever**2
-        return (linear + weight) / (2 * shear_modulus)
+        return (linear + weight) / (2 * shear_modulus) + self.swelling.displacement(point)
 
     def stress(self, point: Complex) -> Real:
         """sxx, syy, sxy (n, 3) at points (theory, 6)."""

@@ -13,6 +13,7 @@ from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.in_situ import AT_REST
 from pbem.model.model import Model, Region, Stage
+from pbem.model.swelling import NO_SWELLING
 from pbem.model.varying import Moment, Places, Value, Varying, blend
 
 
@@ -147,7 +148,7 @@ def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
 
 
 def balanced_background(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:
-    """In-situ stress and weight of a region at the fraction `factor` of a stage.
+    """In-situ stress, weight and swelling of a region at the fraction `factor` of a stage.
 
     Where the stress grows with the coordinates it balances a weight that acts from the start (theory, 6).
     """
@@ -158,7 +159,11 @@ def balanced_background(model: Model, region: Region, stage: int, factor: float)
     carried = region.material.density * at_rest
     force = region.material.density * gravity - carried
     center = _find_center(model, region) if force else 0
-    return ParticularSolution(region.material, initial=initial, force=force, carried=carried, center=center)
+    before = model.stages[stage - 1].swelling if stage > 0 else {}
+    grown = before.get(region.name, NO_SWELLING).mix(model.stages[stage].swelling.get(region.name, NO_SWELLING), factor)
+    return ParticularSolution(
+        region.material, initial=initial, force=force, carried=carried, center=center, swelling=grown
+    )
 
 
 def _find_center(model: Model, region: Region) -> complex:

@@ -20,6 +20,7 @@ from pbem.description.schema import (
     ConditionTable,
     ContactTable,
     CurveTable,
+    EigenstrainTable,
     GenerateTable,
     GravityTable,
     InSituTable,
@@ -33,6 +34,7 @@ from pbem.description.schema import (
     UnitsTable,
 )
 from pbem.description.translation import find_schema_findings
+from pbem.description.varying import ExpressionTable
 from pbem.errors import CaseError, Fault, KeyPath
 
 # What messages call a case that no file has.
@@ -62,6 +64,8 @@ class Case:
     remote: StressTable | None
     gravity: GravityTable | None
     initial_stress: Mapping[str, InSituTable]
+    temperature: Mapping[str, float | ExpressionTable]
+    eigenstrain: Mapping[str, EigenstrainTable]
     analysis: AnalysisTable
     stages: tuple[StageTable, ...]
     solver: SolverTable

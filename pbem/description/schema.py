@@ -53,6 +53,7 @@ class MaterialTable(Table):
     poisson: Poisson = Field(description="Poisson's ratio")
     plane: Literal["strain", "stress"] = Field("strain", description="plane strain or plane stress")
     density: NotNegative = Field(0.0, description="mass per volume, for `[gravity]`")
+    expansion: Number = Field(0.0, description="strain per temperature, for `[temperature]`")
 
 
 class CurveTable(Table):
@@ -255,6 +256,15 @@ class InSituTable(Table):
     sxy: LinearValue = 0.0
 
 
+class EigenstrainTable(Table):
+    """Strain that a region would take without stress if nothing held it."""
+
+    exx: Number = 0.0
+    eyy: Number = 0.0
+    exy: Number = Field(0.0, description="shear component of the tensor, half the change of the right angle")
+    ezz: Number = Field(0.0, description="across the plane; without effect in plane stress")
+
+
 class GravityTable(Table):
     """Acceleration; a region's weight per volume is its density times this."""
 
@@ -306,6 +316,8 @@ class StageTable(Table):
     contacts: Mapping[str, StageInterfaceTable] = Field({}, description="of a contact")
     remote: StressTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
     gravity: GravityTable | None = Field(None, description="`gx`, `gy` at the end of the stage")
+    temperature: Mapping[str, LinearValue] = Field({}, description="of a region at the end of the stage")
+    eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
 
 
 class SolverTable(Table):
@@ -363,6 +375,13 @@ class CaseFile(Table):
         {}, description="In-situ stress of a material, there before any load; tractions and stresses include it. It is "
         "uniform, or grows linearly with x and y in balance with the material's weight under `[gravity]`, which then "
         "acts from the start."
+    )
+    temperature: Mapping[str, LinearValue] = Field(
+        {}, description="Temperature of a region above that at which it fits without stress, times the load; its "
+        "material needs `expansion`. An expression is linear in x and y."
+    )
+    eigenstrain: Mapping[str, EigenstrainTable] = Field(
+        {}, description="Strain of a region that has no stress by itself (misfit, swelling, shrinkage), times the load."
     )
     analysis: AnalysisTable = AnalysisTable()
     stages: tuple[StageTable, ...] = ()

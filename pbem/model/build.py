@@ -221,9 +221,10 @@ def _note_loads(model: Model) -> list[str]:
     loads = [value for stage in model.stages for value in (
         *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
         *(stage.gravity if weights else ()))]
+    loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     return [] if any(loads) else ["No load: all prescribed displacements and tractions, pressures, stresses far away, "
-                                  "weights and in-situ stresses are zero, and so will be the results."]
+                                  "weights, in-situ stresses and swellings are zero, and so will be the results."]
 
 
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:

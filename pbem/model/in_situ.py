@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -11,14 +10,13 @@ import numpy as np
 from pbem.arrays import Complex, Real
 from pbem.description.schema import InSituTable
 from pbem.errors import Fault, KeyPath
-from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.expression import ExpressionError
 from pbem.geometry.junction import format_point
+from pbem.model.linear import fit_linear
 
 Stress = tuple[float, float, float]
 NONE: Stress = (0.0, 0.0, 0.0)
 COMPONENTS = ("sxx", "syy", "sxy")
-# An expression is linear to this part of its largest value.
-EXACT = 1e-9
 # A weight is balanced to this part of it; numbers in a file are rounded.
 BALANCED = 1e-6
 
@@ -83,7 +81,7 @@ def read_in_situ(loc: KeyPath, table: InSituTable, corners: Complex) -> tuple[Li
             columns.append((given, 0.0, 0.0))
             continue
         try:
-            columns.append(_fit(given.expression, corners))
+            columns.append(fit_linear(given.expression, corners))
         except ExpressionError as error:
             faults.append(Fault.at((*loc, key), error.found, error.expected))
     if faults:
@@ -91,25 +89,6 @@ def read_in_situ(loc: KeyPath, table: InSituTable, corners: Complex) -> tuple[Li
     value, by_x, by_y = zip(*columns, strict=True)
     linear = any(by_x) or any(by_y)
     return LinearStress(value, by_x, by_y, complex(corners[0]) if linear else 0j), []
-
-
-def _fit(text: str, corners: Complex) -> tuple[float, float, float]:
-    """Value at the first corner, and slopes, of a linear expression. Raises ExpressionError for any other."""
-    across, up = corners[1] - corners[0], corners[2] - corners[0]
-    points = corners[0] + np.array([0, 1, 0, 1, 0.37, 0.81]) * across + np.array([0, 0, 1, 1, 0.64, 0.23]) * up
-    values = evaluate_expression(text, x=points.real, y=points.imag)
-    start, by_x, by_y = values[0], (values[1] - values[0]) / across.real, (values[2] - values[0]) / up.imag
-    away = points - corners[0]
-    linear = start + by_x * away.real + by_y * away.imag
-    # A coordinate far from the origin is rounded, and with it what grows with it.
-    rounding = sys.float_info.epsilon * (abs(by_x) * np.abs(points.real).max() + abs(by_y) * np.abs(points.imag).max())
-    if not (np.abs(values - linear) <= EXACT * np.abs(values).max() + 16 * rounding).all():
-        raise ExpressionError(f'"{text}", which is not linear in x and y', "an expression linear in x and y")
-    size = np.abs(values).max() * EXACT + 16 * rounding
-    # What rounding alone makes grow does not.
-    slopes = [float(slope) if abs(slope) * extent > size else 0.0
-              for slope, extent in ((by_x, across.real), (by_y, up.imag))]
-    return float(start), slopes[0], slopes[1]
 
 
 def check_rest(loc: KeyPath, stress: LinearStress, density: float, gravity: complex) -> Iterator[Fault]:

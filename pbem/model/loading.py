@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from pbem.description.case import Case
@@ -16,7 +16,9 @@ from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
 from pbem.model.roles import Roles, unknown_name
+from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
+from pbem.model.swelling import read_swellings
 from pbem.model.varying import Value, negate
 
 # Key to frame, direction and quantity.
@@ -71,7 +73,12 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     joints = {name: each.law for name, each in interfaces.items()} | {name: each.law for name, each in contacts.items()}
     backgrounds = read_backgrounds(case)
     faults += backgrounds.faults
-    stages = _find_stages(case, conditions, [*interfaces, *contacts], backgrounds)
+    swellings = read_swellings(case, find_corners(case))
+    faults += swellings.faults
+    stages = tuple(
+        replace(stage, swelling=swelling) for stage, swelling in
+        zip(_find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, strict=True)
+    )
     faults += _check_durations(case, joints, stages)
     return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress,
                    backgrounds.rest_gravity, tuple(faults))

@@ -13,6 +13,7 @@ from pbem.geometry.loop import Loop
 from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.sliver import Tie
+from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
 
 Quantity = Literal["displacement", "traction"]
@@ -109,7 +110,7 @@ class Stage:
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
     infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
-    shared by the steps; 0 where there is no time.
+    shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
     """
 
     name: str
@@ -119,6 +120,7 @@ class Stage:
     remote: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gravity: tuple[float, float] = (0.0, 0.0)
     duration: float = 0.0
+    swelling: Mapping[str, Swelling] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:

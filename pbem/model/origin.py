@@ -70,5 +70,9 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
         model, curves=curves, origin=model.origin + origin,
         ties=tuple(replace(tie, corner=tie.corner - origin) for tie in model.ties),
         interior_points=tuple(point - origin for point in model.interior_points),
+        stages=tuple(
+            replace(stage, swelling={name: each.move(origin) for name, each in stage.swelling.items()})
+            for stage in model.stages
+        ),
         initial_stress={name: stress.move(origin) for name, stress in model.initial_stress.items()},
     )

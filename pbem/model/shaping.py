@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from pbem.arrays import Complex
 from pbem.description.case import Case
 from pbem.description.schema import CurveTable
 from pbem.description.values import MOST_ELEMENTS
@@ -87,3 +90,14 @@ def _draw(name: str, table: CurveTable) -> Curve | Fault:
         return draw_circle(name, complex(*table.center), table.radius, division, table.angles)
     assert table.points is not None
     return draw_polyline(name, [complex(*point) for point in table.points], division)
+
+
+def find_corners(case: Case) -> Complex:
+    """Lower left, lower right and upper left of a rectangle that has the points of all curves."""
+    points = [complex(*point) for curve in case.curves.values() for point in curve.points or ()]
+    for curve in case.curves.values():
+        if curve.center is not None and curve.radius is not None:
+            points += [complex(*curve.center) + curve.radius * each for each in (-1 - 1j, 1 + 1j)]
+    x, y = [point.real for point in points or [0j]], [point.imag for point in points or [0j]]
+    width, height = max(x) - min(x) or max(y) - min(y) or 1.0, max(y) - min(y) or max(x) - min(x) or 1.0
+    return complex(min(x), min(y)) + np.array([0, width, 1j * height])

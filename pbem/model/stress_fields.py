@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from pbem.arrays import Complex
 from pbem.description.case import Case
 from pbem.description.schema import GravityTable, StressTable
 from pbem.errors import Fault, KeyPath
 from pbem.model.in_situ import LinearStress, check_rest, read_in_situ
 from pbem.model.roles import unknown_name
+from pbem.model.shaping import find_corners
 
 Stress = tuple[float, float, float]
 
@@ -45,7 +43,7 @@ def read_backgrounds(case: Case) -> Backgrounds:
     at_rest = complex(case.gravity.gx, case.gravity.gy) if case.gravity else 0j
     initial = {}
     for name, table in case.initial_stress.items():
-        initial[name], wrong = read_in_situ(("initial_stress", name), table, _find_corners(case))
+        initial[name], wrong = read_in_situ(("initial_stress", name), table, find_corners(case))
         faults += wrong
         if name in case.materials and not wrong:
             faults += _check_rest(case, name, initial[name], at_rest)
@@ -59,17 +57,6 @@ def _check_rest(case: Case, name: str, stress: LinearStress, at_rest: complex) -
     if infinite is not None and not stress.is_uniform:
         found = f"a stress that grows with the coordinates, in the infinite region '{infinite}'"
         yield Fault.at(loc, found, "a finite region for it: without end it has no bounds, and no energy")
-
-
-def _find_corners(case: Case) -> Complex:
-    """Lower left, lower right and upper left of a rectangle that has the points of all curves."""
-    points = [complex(*point) for curve in case.curves.values() for point in curve.points or ()]
-    for curve in case.curves.values():
-        if curve.center is not None and curve.radius is not None:
-            points += [complex(*curve.center) + curve.radius * each for each in (-1 - 1j, 1 + 1j)]
-    x, y = ([*values] for values in ((p.real for p in points or [0j]), (p.imag for p in points or [0j])))
-    width, height = max(x) - min(x) or max(y) - min(y) or 1.0, max(y) - min(y) or max(x) - min(x) or 1.0
-    return complex(min(x), min(y)) + np.array([0, width, 1j * height])
 
 
 def _update(values: list[float], table: StressTable | GravityTable | None, keys: tuple[str, ...]) -> None:

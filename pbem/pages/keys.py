@@ -33,6 +33,7 @@ This page is made from the program's own schema. An optional key without a defau
 NAMES = {
     "materials": "NAME", "curves": "NAME", "regions": "NAME", "contacts": "NAME", "boundary": "CURVE",
     "interfaces": "CURVE", "initial_stress": "MATERIAL",
+    "temperature": "REGION", "eigenstrain": "REGION",
 }  # fmt: skip
 # Numbers beyond this are refused as slips of the pen, which is not worth saying of every key.
 NO_BOUND = 1e100
@@ -59,6 +60,11 @@ def _write_section(schema: Schema, name: str, entry: Schema) -> Iterator[str]:
         return
     table = _find_table(schema, entry)
     if table is None:
+        return
+    if table["title"] == "ExpressionTable":  # numbers by the names of the user's
+        yield f"## `[{name}]`"
+        yield _wrap(entry["description"])
+        yield f"- `{NAMES[name]}` ({_describe_kind(schema, entry['additionalProperties'])}; optional)"
         return
     path = f"{name}.{NAMES[name]}" if name in NAMES else name
     yield f"## `[[{path}]]`" if entry.get("type") == "array" else f"## `[{path}]`"

@@ -63,7 +63,7 @@ MOST_NAMES = 4
 class Energy:
     """Per unit of thickness (stress times length squared), since before any load.
 
-    external: work of prescribed tractions and displacements, fluid pressure, weight, and stress far away.
+    external: work of prescribed tractions and displacements, fluid pressure, weight, stress far away, and swelling.
     elastic: stored in the regions, in springs under outer curves and in the elastic joints of interfaces.
     dissipated: by friction and by bonds that parted; it never falls.
     released: set free where faces ran away within a step, as motion that the quasi-static balance does not follow.
@@ -104,11 +104,13 @@ class _Reference:
 
 @dataclass(frozen=True)
 class _State:
-    """t, u (f,) on all faces; load and conjugate (c,): weights and far stresses of all regions, and what they work on;
-    stored: in the regions; springs: stored in springs; pairs."""
+    """t, u (f,) on all faces; swollen (f,): of u what swelling does without stress; load and conjugate (c,): weights
+    and far stresses of all regions, and what they work on, but for swelling; stored: in the regions; springs: stored in
+    springs; pairs."""
 
     traction: Complex
     displacement: Complex
+    swollen: Complex
     load: Real
     conjugate: Real
     stored: float
@@ -151,6 +153,8 @@ class EnergyBalance:
         moved = (new.displacement - old.displacement)[nodes]
         work = _dot(self._weight[nodes], 0.5 * (old.traction + new.traction)[nodes], moved)
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
+        # What swells does work against the stress.
+        work -= _dot(self._weight, 0.5 * (old.traction + new.traction), new.swollen - old.swollen)
         pairs = measure_work(self.laws, self._pair_weight, old.pairs, new.pairs)
         # What springs take from the boundary they store, and what fluid does is work of its own.
         work += new.springs - old.springs + pairs.fluid
@@ -216,6 +220,8 @@ class EnergyBalance:
         backgrounds = evaluate_particular_solutions(self._model, stage, factor)
         elastic = traction - self._in_situ
         loads, conjugates = [np.zeros(0)], [np.zeros(0)]
+        swollen = self._sample_swelling([balanced for balanced, _ in backgrounds])
+        displacement = displacement - swollen
         stored = 0.5 * _dot(self._weight, traction + self._in_situ, displacement)
         for reference in self._forces:
             balanced, _ = backgrounds[self._faces.region[reference.faces[0]]]
@@ -234,8 +240,11 @@ class EnergyBalance:
             loads.append(initial + remote)
             conjugates.append(strained)
             stored += 0.5 * float((2 * initial + remote) @ strained)
-        springs = 0.5 * self._measure_springs(displacement)
-        return _State(traction, displacement, np.concatenate(loads), np.concatenate(conjugates), stored, springs, pairs)
+        springs = 0.5 * self._measure_springs(displacement + swollen)
+        return _State(
+            traction, displacement + swollen, swollen, np.concatenate(loads), np.concatenate(conjugates), stored,
+            springs, pairs,
+        )
 
     def _measure_springs(self, displacement: Complex) -> float:
         outer = self._outer
@@ -252,6 +261,15 @@ class EnergyBalance:
             own = self._find_faces(number)
             traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
         return traction
+
+    def _sample_swelling(self, backgrounds: Sequence[ParticularSolution]) -> Complex:
+        """Displacement of the strain without stress on all faces (f,)."""
+        moved = np.zeros(len(self._weight), dtype=complex)
+        for number, balanced in enumerate(backgrounds):
+            if not balanced.swelling.is_zero:
+                own = self._find_faces(number)
+                moved[own] = balanced.swelling.displacement(self._faces.position[own])
+        return moved
 
     def _find_faces(self, region: int) -> Integer:
         return self._by_region[self._bounds[region]:self._bounds[region + 1]]

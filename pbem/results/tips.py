@@ -120,6 +120,11 @@ class TipRules:
             moved = (moved - moved.mean(axis=1)[:, None]) @ forms.of_mean
             value = modulus / group.length * (jumps @ forms.parallel + moved.real)
             value += step.contact.traction_n[near] @ forms.of_normal
+            place = self.mesh.pairs.position[group.pair[:, 0]]
+            value -= modulus * np.array([
+                backgrounds[region][0].swelling.strain_along(at[None], along[None])[0]
+                for region, at, along in zip(group.region, place, group.direction, strict=True)
+            ])
             T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in backgrounds])
         return T.reshape(-1, 2)
 

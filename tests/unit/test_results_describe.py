@@ -9,6 +9,7 @@ import numpy as np
 
 from pbem.bem.operator_choice import estimate_dense_memory
 from pbem.contact.laws import OPEN, SLIP, STICK
+from pbem.model.in_situ import LinearStress
 from pbem.model.model import Condition
 from pbem.results.describe import describe_model, describe_results
 from pbem.results.reader import open_results
@@ -42,7 +43,8 @@ def test_a_model_is_described_with_its_parts_and_sizes() -> None:
 def test_loads_that_belong_to_no_curve_are_described() -> None:
     stage = replace(MODEL.stages[1], remote=(0.0, -1.5, 0.0), gravity=(0.0, -9.81), pressure={"crack": 0.25})
     spring = dict(MODEL.conditions) | {"bottom": Condition("bottom", stiffness=(0.0, 70.0))}
-    model = replace(MODEL, stages=(MODEL.stages[0], stage), conditions=spring, initial_stress={"soft": (1.0, 2.0, 3.0)})
+    at_rest = {"soft": LinearStress((1.0, 2.0, 3.0))}
+    model = replace(MODEL, stages=(MODEL.stages[0], stage), conditions=spring, initial_stress=at_rest)
     text = describe_model(model, MESH)
     assert "press: 2 steps\n" in text
     assert ("shear: 4 steps, remote stress sxx, syy, sxy = 0, -1.5, 0, gravity 0, -9.81, "

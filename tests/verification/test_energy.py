@@ -15,6 +15,7 @@ from pbem.contact.laws import OPEN, SLIP, STICK, PairLaws, collect_laws
 from pbem.geometry.curve import Curve
 from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
+from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.model import (
     Analysis,
@@ -149,7 +150,7 @@ def test_release_of_in_situ_stress_in_a_finite_body() -> None:
     # s0 = -p along y in a column whose top is free: it stretches by p/E and the energy of the stress is gone.
     soft = COLUMN[0]
     model = stack_blocks((Stage("wait", 1, {}, {}),), Law("bonded"), materials=(soft, soft), top=UNHELD)
-    model = replace(model, initial_stress={"one": (0.0, -6.0, 0.0)})
+    model = replace(model, initial_stress={"one": LinearStress((0.0, -6.0, 0.0))})
     lost = -0.5 * 6.0**2 / 3e3 * 4
     expect_energy(add_energies(model)[-1], lost, lost, 0.0, 1e-9)
 
@@ -163,7 +164,8 @@ def test_excess_of_a_hole_far_stress() -> None:
 
 def test_excavation_of_a_hole() -> None:
     # The excess of the hole, and the energy 1/2 of its area times S^2/E' that its ground had.
-    model = replace(make_plane((0.0, 0.0, 0.0), hole=make_circle(1.5, 48)), initial_stress={"rock": (2.0, 0.0, 0.0)})
+    at_rest = {"rock": LinearStress((2.0, 0.0, 0.0))}
+    model = replace(make_plane((0.0, 0.0, 0.0), hole=make_circle(1.5, 48)), initial_stress=at_rest)
     change = 2.0 * math.pi * 1.5**2 * 2.0**2 / ROCK.plane_modulus
     expect_energy(add_energies(model)[-1], change, change, 0.0, 1e-6)
 

@@ -22,6 +22,7 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.loop import Loop, Side
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces
+from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Condition, Model, Region, SolverOptions, Stage
 from pbem.parallel import world
@@ -183,7 +184,7 @@ def test_weight_and_in_situ_stress_are_in_the_field() -> None:
     # The in-situ shear and the pressure from above have to be carried, so that the sides do not move by them.
     tractions = {"bottom": (-shear, 0.0), "top": (shear, side), "right": (0.0, shear), "left": (0.0, -shear)}
     model = replace(
-        model, conditions=rolling, initial_stress={"heavy": (2 * side, side, shear)},
+        model, conditions=rolling, initial_stress={"heavy": LinearStress((2 * side, side, shear))},
         stages=(Stage("load", 1, tractions, {}, gravity=(0.0, -gravity)),),
     )  # fmt: skip
     mesh, step, found = find_interior(model)

@@ -1,0 +1,141 @@
+"""Heated and swollen bodies against exact solutions: Eshelby's inclusion, Lame's ring, bodies that are free to grow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+
+FINE = {"elements": 24}
+
+
+def shear_modulus(material: dict[str, Any]) -> float:
+    return material["young"] / (2 * (1 + material["poisson"]))
+
+
+def make_inclusion(center: complex, radius: float, inside: dict[str, Any], order: int, **more: Any) -> dict[str, Any]:
+    """A circle in an infinite plane, bonded; points inside and outside."""
+    x, y = center.real, center.imag
+    return {
+        "materials": {"inside": inside, "outside": {"young": 3e3, "poisson": 0.2}},
+        "curves": {"circle": {"center": [x, y], "radius": radius, **FINE}},
+        "regions": {"plane": {"material": "outside", "infinite": True, "boundary": ["circle"]},
+                    "core": {"material": "inside", "boundary": ["circle"]}},
+        "analysis": {"order": order, "steps": 2},
+        "output": {"points": [[x + 0.3 * radius, y - 0.5 * radius], [x, y + 2 * radius]]},
+        **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("center", "radius"), [(0j, 1.0), (3e6 - 2e5j, 40.0)])
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_heated_inclusion(center: complex, radius: float, order: int, operator: str, tmp_path: Path) -> None:
+    """Pressure p (1/(2 G_out) + (1 - 2 nu)/(2 G_in)) = (1 + nu) alpha T; outside it falls with the square of a/r."""
+    inside = {"young": 7e3, "poisson": 0.3, "expansion": 1.2e-5}
+    case = make_inclusion(center, radius, inside, order, temperature={"core": 80.0}, solver={"operator": operator})
+    results = pbem.run(case, tmp_path / "heated.h5")
+    strain = 1.3 * 1.2e-5 * 80
+    pressure = strain / (1 / (2 * 3e3 / 2.4) + 0.4 / (2 * shear_modulus(inside)))
+    accuracy = {1: 3e-3, 2: 3e-5, 3: 1e-5}[order] * pressure
+    stress = results.interior.stress
+    np.testing.assert_allclose(stress[-1][0], [-pressure, -pressure, 0], atol=accuracy)
+    np.testing.assert_allclose(stress[-1][1], [pressure / 4, -pressure / 4, 0], atol=accuracy)
+    np.testing.assert_allclose(stress[0], 0.5 * stress[1], atol=1e-6 * pressure)
+    # What swelling does against the pressure is stored, by half of p times the misfit along the circle.
+    stored = np.pi * radius**2 * pressure * strain
+    assert results.energy.elastic[-1] == pytest.approx(stored, rel=1e-2 if order == 1 else 1e-4)
+    assert results.energy.external[-1] == pytest.approx(results.energy.elastic[-1], rel=1e-5)
+
+
+def test_inclusion_that_changes_its_shape(tmp_path: Path) -> None:
+    """Eshelby's cylinder in a plane of its own material: sxy = -G exy/(2 (1 - nu)), sxx - syy alike, none outside."""
+    material = {"young": 3e3, "poisson": 0.2}
+    strain = {"exx": 2e-3, "eyy": -2e-3, "exy": 1e-3}
+    results = pbem.run(make_inclusion(0j, 2.0, material, 2, eigenstrain={"core": strain}), tmp_path / "sheared.h5")
+    factor = -shear_modulus(material) / (2 * (1 - 0.2))
+    exact = np.array([2e-3 * factor, -2e-3 * factor, 1e-3 * factor])
+    np.testing.assert_allclose(results.interior.stress[-1][0], exact, atol=1e-4 * np.abs(exact).max())
+
+
+def make_ring(plane: str, **more: Any) -> dict[str, Any]:
+    return {
+        "materials": {"steel": {"young": 2.1e5, "poisson": 0.3, "plane": plane, "expansion": 1.1e-5}},
+        "curves": {"inner": {"center": [5, 5], "radius": 20.0, **FINE},
+                   "outer": {"center": [5, 5], "radius": 30.0, **FINE}},
+        "regions": {"ring": {"material": "steel", "boundary": ["inner", "outer"]}},
+        "analysis": {"steps": 1}, "output": {"points": [[5.0, 31.0], [-16.0, -8.0]]},
+        **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_heated_ring_in_a_rigid_hole(plane: str, tmp_path: Path) -> None:
+    """Lame: u = (e + A) r + B/r, free inside, held outside."""
+    case = make_ring(plane, boundary={"outer": {"un": 0.0}}, temperature={"ring": 100.0})
+    results = pbem.run(case, tmp_path / "ring.h5")
+    young, nu = (2.1e5 / (1 - 0.09), 0.3 / 0.7) if plane == "strain" else (2.1e5, 0.3)
+    strain = 1.1e-5 * 100 * (1.3 if plane == "strain" else 1.0)
+    a, b = 20.0, 30.0
+    # Plane stress in the moduli above: srr = E (A/(1 - nu) - B/((1 + nu) r^2)).
+    A = -strain / (1 + (1 + nu) / (1 - nu) * (a / b) ** 2)
+    B = A * (1 + nu) / (1 - nu) * a**2
+    for point, stress in zip(results.interior.position, results.interior.stress[-1], strict=True):
+        away = complex(point[0] - 5, point[1] - 5)
+        mean, half = young * A / (1 - nu), -young * B / ((1 + nu) * abs(away) ** 2)
+        turned = half * (away / abs(away)) ** 2
+        exact = [mean + turned.real, mean - turned.real, turned.imag]
+        np.testing.assert_allclose(stress, exact, atol=1e-4 * abs(mean))
+
+
+def test_a_free_body_grows_without_stress(tmp_path: Path) -> None:
+    """Temperature linear in x and y, and an eigenstrain: no stress, no K, no T; a cracked ring, pinned by nothing."""
+    case = make_ring(
+        "strain", temperature={"ring": {"expression": "40 + 2*x - y"}}, eigenstrain={"ring": {"exx": 1e-4, "ezz": 2e-4}}
+    )
+    case["curves"]["crack"] = {"points": [[28, 6], [32, 7]], "elements": 8}
+    case["regions"]["ring"]["cracks"] = ["crack"]
+    results = pbem.run(case, tmp_path / "free.h5")
+    hot = 2.1e5 * 1.1e-5 * 100
+    assert np.abs(results.interior.stress).max() < 1e-6 * hot
+    assert np.abs(results.hoop_stress).max() < 1e-4 * hot
+    tip = results.tips["crack"]
+    assert max(np.abs(tip.KI).max(), np.abs(tip.KII).max()) < 1e-6 * hot
+    assert np.abs(tip.T).max() < 1e-3 * hot
+
+
+def test_a_disc_that_grows_closes_its_gap(tmp_path: Path) -> None:
+    """A loose disc in a hole with clearance: no stress until it fills the hole, then as bonded for the rest.
+
+    Without friction, as a loose disc may lean on the hole before it fills it.
+    """
+    inside = {"young": 7e3, "poisson": 0.3, "expansion": 1e-5}
+    stages = [{"temperature": {"core": 50.0}, "steps": 1}, {"temperature": {"core": 180.0}, "steps": 2}]
+    law = {"circle": {"law": "frictionless", "gap": 1.3e-3}}
+    case = make_inclusion(0j, 1.0, inside, 2, interfaces=law, stages=stages)
+    results = pbem.run(case, tmp_path / "disc.h5")
+    strain = 1.3e-5 * (180 - 100)
+    pressure = strain / (1 / (2 * 3e3 / 2.4) + 0.4 / (2 * shear_modulus(inside)))
+    assert np.abs(results.interior.stress[0]).max() < 1e-9 * pressure
+    np.testing.assert_allclose(results.contact["circle"].traction_n[-1], -pressure, rtol=1e-3)
+
+
+FAULTS = {
+    "of no region": ({"temperature": {"cor": 1.0}}, "did you mean 'core'"),
+    "of a plane": ({"eigenstrain": {"plane": {"exx": 1.0}}}, "of the infinite region"),
+    "without expansion": ({"temperature": {"core": 1.0}}, "does not expand"),
+    "not linear": ({"temperature": {"core": {"expression": "x*y"}}}, "not linear"),
+    "of a stage": ({"stages": [{"eigenstrain": {"circle": {"exx": 1.0}}}]}, "stages"),
+}
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_wrong_swelling_is_told(kind: str) -> None:
+    tables, text = FAULTS[kind]
+    material = {"young": 7e3, "poisson": 0.3} | ({"expansion": 1.0} if kind == "not linear" else {})
+    with pytest.raises(pbem.CaseError, match=text):
+        pbem.run(make_inclusion(0j, 1.0, material, 2, **tables))

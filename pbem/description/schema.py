@@ -173,7 +173,9 @@ class LawTable(Table):
         None, description="elastic joint in front of the law, stress per length; without this key rigid"
     )
     tangential_stiffness: Positive | None = Field(None, description="the same along the faces")
-    gap: Strength = Field(0.0, description="initial opening, not negative")
+    gap: Value = Field(
+        0.0, description="initial opening; negative: interference, by which the faces would overlap without pressure"
+    )
     pressure: Value = Field(
         0.0, description="fluid pressure on open faces; the faces part when their compression falls to it"
     )

@@ -108,12 +108,18 @@ def check_along(loc: KeyPath, law: Law, curve: Curve) -> list[Fault]:
     faults = []
     for key in VARYING_KEYS:
         value = getattr(law, key)
+        # Faces may overlap by a negative gap, where they press on each other.
+        floor = -math.inf if key == "gap" and law.kind != "open" else 0.0
         if isinstance(value, Varying):
             least, place = find_least(curve, functools.partial(_evaluate_or_nan, value))
-            if not (math.isfinite(least) and least >= 0):
+            if not (math.isfinite(least) and least >= floor):
                 what, name = f"{least:.6g}" if math.isfinite(least) else "no finite value", key.replace("_", " ")
                 found = f"a {name} that is {what} at {format_point(place)} on curve '{curve.name}'"
-                faults.append(Fault.at((*loc, key), found, f"a finite {name} >= 0 everywhere on the curve"))
+                bound = " >= 0" if floor == 0 else ""
+                faults.append(Fault.at((*loc, key), found, f"a finite {name}{bound} everywhere on the curve"))
+        elif value is not None and value < floor:
+            found = f"gap = {value:g} on '{loc[-1]}', whose faces never touch"
+            faults.append(Fault.at((*loc, key), found, 'a gap >= 0, or law = "coulomb" for faces pressed together'))
     return faults or [*_check_strengths_along(loc, law, curve)]
 
 

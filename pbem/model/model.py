@@ -37,7 +37,7 @@ class Law:
     kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches; "custom" is Coulomb-like
     with the friction bound of the function that the Python file `file` registers, called with `parameters`; others are
     those of `pbem.contact.strength.LAWS`, with these parameters and none of the strengths.
-    gap: initial normal opening (length, >= 0). What may vary along the curve is a number or a Varying.
+    gap: initial normal opening (length); negative: interference. What may vary along the curve is a number or Varying.
     pressurised: "open": fluid pressure acts in open parts only; "all": in closed parts too.
     cohesion_lost: cohesion and tensile strength are gone after the first slip or parting.
     friction_dynamic, slip_distance: friction falls linearly from `friction` to friction_dynamic over that slip.

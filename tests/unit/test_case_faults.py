@@ -23,7 +23,7 @@ WRONG = {
         "poisson = 0.3",
         "poisson = 0.3\nqqq = 1",
         "materials.soft.qqq",
-        "one of: density, plane",
+        "one of: density, expansion, plane",
     ),
     "unknown table": (
         "[interfaces.interface]\n" + INTERFACE,
@@ -316,7 +316,6 @@ WRONG = {
     "friction angle": ("friction = 0.5", "friction_angle = 90", "interfaces.interface.friction_angle", "a number < 90"),
     "negative friction": ("friction = 0.5", "friction = -0.5", "interfaces.interface.friction", "a number >= 0"),
     "negative cohesion": ("friction = 0.5", "cohesion = -0.5", "interfaces.interface.cohesion", "a number >= 0"),
-    "negative gap": ("friction = 0.5", "gap = -0.5", "interfaces.interface.gap", "a number >= 0"),
     "gap not a number": ("friction = 0.5", "gap = nan", "interfaces.interface.gap", "a finite number"),
     "unknown law": ('"coulomb"', '"colomb"', "interfaces.interface.law", "did you mean 'coulomb'?"),
     "friction without friction": (

@@ -153,8 +153,8 @@ WRONG = {
     "negative joint": (DEFAULT + "\ntangential_stiffness = -1", "interfaces.interface.tangential_stiffness", "> 0"),
     "joint not a number": (DEFAULT + "\nnormal_stiffness = nan", "interfaces.interface.normal_stiffness", "finite"),
     "gap negative somewhere": (
-        DEFAULT + '\ngap = { expression = "(x - 0.7)**2 - 0.01" }',
-        "interfaces.interface.gap (line 29)",
+        'law = "open"\ngap = { expression = "(x - 0.7)**2 - 0.01" }',
+        "interfaces.interface.gap (line 28)",
         "a gap that is -0.01 at (0.7, 1) on curve 'interface'; expected a finite gap >= 0",
     ),
     "gap without value": (

@@ -23,7 +23,7 @@ class OuterNodes:
 
     direction (k, 2): complex unit vectors. displacement_known (k, 2). condition (k,): index of the condition.
     stiffness (k, 2): of springs against the ground, stress/length along each direction; 0 where there is none.
-    places (k,): in the user's coordinates, with the length from their curve's first point.
+    places (k,): in the user's coordinates, with the length from their curve's first point where a condition varies.
     """
 
     node: Integer
@@ -62,25 +62,23 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     first = np.where(local, mesh.normal[node], 1.0)
     known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
     stiffness = np.array([value for c in conditions for value in c.stiffness], dtype=float)
-    places = Places(mesh.position[node] + model.origin, measure_along(model, mesh)[node])
+    places = Places(mesh.position[node] + model.origin, _measure_along(model, mesh)[node])
     return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
                       stiffness.reshape(-1, 2)[which], places)
 
 
-def measure_along(model: Model, mesh: Mesh) -> Real:
-    """The length (nodes,) from the first point of every node's curve; 0 on cracks, whose pairs have their own."""
-    along = np.zeros(mesh.nodes)
-    elements_of = np.argsort(mesh.curve, kind="stable")
-    bounds = np.searchsorted(mesh.curve[elements_of], np.arange(len(mesh.curve_names) + 1))
-    for number, region in enumerate(model.regions):
-        for side in (side for loop in region.loops for side in loop.sides):
-            curve = mesh.curve_names.index(side.curve)
-            own = np.sort(elements_of[bounds[curve]:bounds[curve + 1]])
-            own = own[mesh.region[own] == number]
+def _measure_along(model: Model, mesh: Mesh) -> Real:
+    """The length (nodes,) from the first point of its curve to every node where a condition varies; 0 elsewhere."""
+    along = np.zeros((mesh.elements, mesh.order + 1))
+    varying = {name for stage in model.stages for name, pair in stage.boundary.items()
+               if any(isinstance(value, Varying) for value in pair)}
+    number = {name: k for k, name in enumerate(mesh.curve_names) if name in varying}
+    for side in (side for region in model.regions for loop in region.loops for side in loop.sides):
+        if side.curve in number:
+            own = np.flatnonzero(mesh.curve == number[side.curve])
             lengths = mesh.geometry.select(own).arc_lengths(mesh.local)
-            lengths = lengths if side.forward else model.curves[side.curve].length - lengths
-            along.reshape(-1, mesh.order + 1)[own] = lengths
-    return along
+            along[own] = lengths if side.forward else model.curves[side.curve].length - lengths
+    return along.ravel()
 
 
 def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, factor: float) -> Load:

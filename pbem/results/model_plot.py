@@ -18,7 +18,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model
 from pbem.model.origin import move_back
-from pbem.results.describe import describe_condition
+from pbem.results.model_text import describe_condition
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
 from pbem.results.refinement_plot import draw_levels

@@ -16,7 +16,7 @@ ORDER = (
     "make_command", "bundled", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
-BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact")
+BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = ("solve", "driver", "cli", "__main__", "parallel")
 

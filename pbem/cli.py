@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbem.bundled import find_case
+from pbem.check_command import add_check_options, check
 from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import (
     ConvergenceError,
@@ -169,9 +170,7 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
-    check = add("check", _check, "validate a case and show what would be computed")
-    check.add_argument("case", metavar="CASE")
-    check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
+    add_check_options(add("check", _check, "validate a case, show what would be computed, and what that would take"))
     run = add("run", None, "compute a case and write its results", RUN_NOTES)
     run.add_argument("case", metavar="CASE")
     run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
@@ -220,21 +219,7 @@ def _make(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from pbem.case.build import read_checked_model
-    from pbem.mesh.generate import generate_mesh
-    from pbem.results.model_text import describe_model
-    from pbem.results.output import check_picture_path
-
-    model = read_checked_model(find_case(options.case))
-    if options.plot:
-        check_picture_path(options.plot)
-    mesh = generate_mesh(model)
-    _tell(describe_model(model, mesh))
-    if options.plot:
-        from pbem.results.plots import plot_model
-
-        plot_model(model, mesh, options.plot)
-        _tell(f"\npicture: {options.plot}")
+    _tell(check(find_case(options.case), options.ranks, options.json, options.plot))
     return 0
 
 

@@ -25,9 +25,10 @@ WITHIN = "/"
 
 @dataclass
 class Share:
-    """What a piece has had: seconds, calls, and bytes that it has stored or moved."""
+    """What a piece has had: seconds, those of them of the processor, calls, and bytes that it has stored or moved."""
 
     seconds: float = 0.0
+    processor: float = 0.0
     calls: int = 0
     bytes: float = 0.0
 
@@ -45,23 +46,29 @@ class Listener(Protocol):
 class Clock:
     """Shares by path, such as "steps/product". Its time starts when it is made, or set back."""
 
-    def __init__(self, now: Callable[[], float] = time.perf_counter) -> None:
-        self._now = now
+    def __init__(
+        self, now: Callable[[], float] = time.perf_counter, worked: Callable[[], float] = time.process_time
+    ) -> None:
+        """now, worked: seconds that have passed, and that the processor has worked, since any moment."""
+        self._now, self._worked = now, worked
         self.listener: Listener | None = None
         self.restart()
 
     def restart(self) -> None:
         """Forget everything; time starts now, with no piece running."""
         self.begun = self._last = self._now()
+        self._last_worked = self._first_worked = self._worked()
         self._path: tuple[str, ...] = ()
         self.shares: dict[str, Share] = {}
 
-    def add(self, name: str, seconds: float) -> None:
+    def add(self, name: str, seconds: float, processor: float = 0.0) -> None:
         """Count time before the start of the clock to a piece, and to the whole."""
         share = self._find((name,))
         share.seconds += seconds
+        share.processor += processor
         share.calls += 1
         self.begun -= seconds
+        self._first_worked -= processor
 
     @contextmanager
     def piece(self, name: str, size: float = 0.0) -> Iterator[None]:
@@ -98,19 +105,23 @@ class Clock:
     def read(self) -> tuple[float, dict[str, Share]]:
         """Seconds since the start, and the shares until now, OTHER among them: their seconds add up to the whole."""
         self._pass()
-        rest = Share(0.0, 1)
+        rest = Share(calls=1)
         shares = {OTHER: rest} | {path: Share(**vars(share)) for path, share in self.shares.items()}
         whole = self._last - self.begun
-        shares[OTHER].seconds += whole - sum(share.seconds for share in shares.values())
+        rest.seconds = whole - sum(share.seconds for share in self.shares.values())
+        worked = self._last_worked - self._first_worked
+        rest.processor = worked - sum(share.processor for share in self.shares.values())
         order = [*PIECES, *shares]
         return whole, dict(sorted(shares.items(), key=lambda item: order.index(item[0].split(WITHIN)[0])))
 
     def _pass(self) -> None:
         """Give the time since the last change to the piece that runs."""
-        now = self._now()
+        now, worked = self._now(), self._worked()
         if self._path:
-            self._find(self._path).seconds += now - self._last
-        self._last = now
+            share = self._find(self._path)
+            share.seconds += now - self._last
+            share.processor += worked - self._last_worked
+        self._last, self._last_worked = now, worked
 
     def _find(self, path: tuple[str, ...]) -> Share:
         return self.shares.setdefault(WITHIN.join(path), Share())

@@ -6,16 +6,19 @@ from collections.abc import Collection
 
 import numpy as np
 
-from pbem.bem.operator_choice import choose_operator
 from pbem.description.generation import GeneratedGroup
+from pbem.forecast.forecast import Forecast
 from pbem.geometry.curve import Curve
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Condition, Law, Model, Region
-from pbem.results.tables import count, format_bytes, section, shorten, table
+from pbem.model.model import Condition, Law, Model, Region, Stage
+from pbem.results.doubts import list_doubts
+from pbem.results.law_text import TITLES, list_law_rows
+from pbem.results.tables import count, format_bytes, format_number, section, shorten, table
 
 
-def describe_model(model: Model, mesh: Mesh) -> str:
-    """What `pbem check` prints: regions, curves with their grading, conditions, interfaces, size, notes."""
+def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -> str:
+    """What `pbem check` prints: regions, curves with their grading, conditions, interfaces, contacts, laws, loads, size,
+    forecast, notes, and what is probably not meant."""
     made = {name for group in model.groups for name in group.members}
     parts = [
         model.title,
@@ -29,9 +32,14 @@ def describe_model(model: Model, mesh: Mesh) -> str:
                                        for each in model.conditions.values()])),
         section("interfaces", table(["interface", "first side", "second side", "pairs", "law"],
                                       _interface_rows(model, mesh, made))),
+        section("contacts", table(["contact", "first curve", "second curve", "pairs", "least distance"],
+                                  _contact_rows(model, mesh))),
+        section("laws", table(TITLES, list_law_rows(model))),
         section("load", _describe_loads(model)),
-        section("size", _describe_memory(model, mesh)),
+        section("size", [describe_size(model, mesh)]),
+        section("forecast", [] if forecast is None else describe_forecast(forecast)),
         section("notes", shorten([*model.notes, *mesh.notes])),
+        section("probably not meant", shorten(list_doubts(model, mesh))),
     ]
     return "\n\n".join(part for part in parts if part)
 
@@ -109,6 +117,23 @@ def _interface_rows(model: Model, mesh: Mesh, made: Collection[str]) -> list[lis
             for each in model.interfaces.values() if each.name not in made]
 
 
+def _contact_rows(model: Model, mesh: Mesh) -> list[list[str]]:
+    counts = np.bincount(mesh.pairs.interface, minlength=len(mesh.interface_names))
+    pairs = dict(zip(mesh.interface_names, counts, strict=True))
+    rows = []
+    for each in model.contacts.values():
+        least = find_least_distance(mesh, each.name)
+        rows.append([each.name, each.first, each.second, str(pairs[each.name]),
+                     "-" if least is None else format_number(least)])
+    return rows
+
+
+def find_least_distance(mesh: Mesh, name: str) -> float | None:
+    """Of the pairs of a contact before any load (length); None without pairs."""
+    own = mesh.pairs.distance[mesh.pairs.interface == mesh.interface_names.index(name)]
+    return float(own.min()) if len(own) else None
+
+
 def describe_law(law: Law) -> str:
     """The kind of the law with every strength that is not zero."""
     if law.kind != "coulomb":
@@ -138,9 +163,49 @@ def _describe_loads(model: Model) -> list[str]:
         pressure = {name: value for name, value in stage.pressure.items() if value}
         parts += shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
         lines.append(", ".join(parts))
+        lines += [f"    {text}" for text in shorten(_describe_boundary(model, stage), 12)]
     for name, stress in model.initial_stress.items():
         lines.append("in-situ stress of {}: sxx, syy, sxy = {:g}, {:g}, {:g}".format(name, *stress))
     return lines
+
+
+def _describe_boundary(model: Model, stage: Stage) -> list[str]:
+    """What is prescribed on outer curves at the end of a stage, other than zero."""
+    texts = []
+    for curve, condition in model.conditions.items():
+        names = ("n", "s") if condition.frame == "local" else ("x", "y")
+        values = stage.boundary.get(curve, (0.0, 0.0))
+        given = [
+            f"{'u' if quantity == 'displacement' else 't'}{name} = {value:g}"
+            for quantity, name, value in zip(condition.known, names, values, strict=True) if value
+        ]
+        texts += [f"{curve}: {', '.join(given)}"] if given else []
+    return texts
+
+
+def describe_forecast(forecast: Forecast) -> list[str]:
+    """Memory, time and disk, and what they are made of."""
+    uses = ", ".join(f"{name} {format_bytes(size)}" for name, size in forecast.memory.items() if size >= 1e6)
+    pieces = ", ".join(f"{name} {seconds:.2g}" for name, seconds in forecast.seconds.items())
+    lines = [
+        f"on {count(forecast.ranks, 'rank')}, a core for each:",
+        f"memory of all ranks {format_bytes(forecast.whole_memory)} ({uses}), of one rank at most "
+        f"{format_bytes(forecast.rank_memory)}",
+        f"time {format_seconds(sum(forecast.seconds.values()))} (seconds: {pieces})",
+        f"disk {format_bytes(forecast.disk)}",
+    ]
+    if forecast.passes:
+        lines.append("of the first pass: analysis.accuracy may ask for further ones, on finer meshes")
+    return lines
+
+
+def format_seconds(seconds: float) -> str:
+    """Two digits with the unit that fits."""
+    for unit, size in (("s", 120.0), ("min", 60.0), ("h", 48.0)):
+        if seconds < size:
+            return f"{seconds:.2g} {unit}"
+        seconds /= 60.0 if unit != "h" else 24.0
+    return f"{seconds:.2g} days"
 
 
 def describe_size(model: Model, mesh: Mesh) -> str:
@@ -149,12 +214,3 @@ def describe_size(model: Model, mesh: Mesh) -> str:
         f"{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, {2 * mesh.nodes} unknowns, "
         f"{mesh.pairs.count} contact pairs, scheme {model.analysis.scheme}"
     )
-
-
-def _describe_memory(model: Model, mesh: Mesh) -> list[str]:
-    memory = choose_operator(model, mesh).estimate_memory(model, mesh)
-    parts = [*(f"{name} {format_bytes(size)}" for name, size in memory.stored), memory.note]
-    everywhere = f"; besides, on every rank {format_bytes(memory.everywhere)}" if memory.everywhere else ""
-    return [describe_size(model, mesh), f"memory over all ranks: {', '.join(parts)}{everywhere}"]
-
-

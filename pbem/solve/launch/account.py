@@ -62,7 +62,7 @@ def keep_account(
     together. Raises ResultFileError if the profile cannot be written.
     """
     clock.restart()
-    clock.add("start", find_age())
+    clock.add("start", find_age(), time.process_time())
     if profile is not None:
         do_on_first(comm, ResultFileError, lambda: check_profile_path(profile, others))
     try:
@@ -130,16 +130,16 @@ def tabulate(account: Mapping[str, Any]) -> list[str]:
     first = {name: Share(**share) for name, share in ranks[0]["pieces"].items()}
     whole = account["seconds"]
     lines = [
-        f"# {account['date']}, {len(ranks)} ranks, " + ", ".join(f"{n} {v}" for n, v in account["versions"].items()),
+        f"# {account['date']}, {len(ranks)} rank{'s' * (len(ranks) != 1)}, " + ", ".join(f"{n} {v}" for n, v in account["versions"].items()),
         f"# wall time {whole:.3f} s; peak memory of the ranks, MB: "
         + ", ".join(f"{rank['peak_memory'] / 1e6:.0f}" for rank in ranks),
-        "# seconds without those of the pieces within, of the first rank and of the slowest; bytes stored or moved",
-        f"{'piece':28s} {'seconds':>10s} {'slowest':>10s} {'%':>6s} {'calls':>9s} {'bytes':>10s}",
+        "# of the first rank without the pieces within: seconds, of them by its processor; of the slowest rank: seconds",
+        f"{'piece':28s} {'seconds':>10s} {'%':>6s} {'processor':>10s} {'slowest':>10s} {'calls':>9s} {'bytes':>10s}",
     ]
     for name, share in first.items():
         slowest = max(rank["pieces"].get(name, vars(Share()))["seconds"] for rank in ranks)
-        lines.append(f"{name:28s} {share.seconds:10.3f} {slowest:10.3f} {100 * share.seconds / whole:6.1f} "
-                     f"{share.calls:9d} {share.bytes:10.3g}")
+        lines.append(f"{name:28s} {share.seconds:10.3f} {100 * share.seconds / whole:6.1f} {share.processor:10.3f} "
+                     f"{slowest:10.3f} {share.calls:9d} {share.bytes:10.3g}")
     lines.append(f"{'all':28s} {sum(share.seconds for share in first.values()):10.3f}")
     return lines
 

@@ -29,7 +29,6 @@ def check(case: Path, ranks: int, as_json: bool, plot: str | None) -> str:
 
     Raises CaseError with all its faults, LaunchError where there is not the memory for it or too little of it to share.
     """
-    from pbem.bem.operator_choice import choose_operator
     from pbem.case.build import read_checked_model
     from pbem.forecast.forecast import make_forecast, refuse_memory
     from pbem.forecast.limits import is_allowed, read_limits

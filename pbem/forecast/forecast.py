@@ -7,21 +7,27 @@ with runs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pbem.errors import PbemError
 from pbem.forecast.calibration import Speed, measure_speed
 from pbem.forecast.disk import count_disk
 from pbem.forecast.limits import OVERRIDE, Limit
-from pbem.forecast.work import Work, count_work
+from pbem.forecast.usual import (
+    STARTED,
+    Changes,
+    expect_changes,
+    list_memory,
+    list_overhead,
+    list_seconds,
+    measure_size,
+)
+from pbem.forecast.work import count_work
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import coarsen_model
-from pbem.forecast.usual import Usual, USUAL
 
 
 @dataclass(frozen=True)
@@ -56,3 +62,47 @@ class Forecast:
             "memory_by_use": self.memory, "rank_memory": self.rank_memory, "seconds": sum(self.seconds.values()),
             "seconds_by_piece": self.seconds, "disk": self.disk, "first_pass_only": self.passes,
         }  # fmt: skip
+
+
+def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> Forecast:
+    """Forecast a run on so many ranks; timed: with seconds, for which the machine's speed is measured."""
+    size = measure_size(model, mesh.nodes)
+    work = count_work(model, mesh)
+    coarse = coarsen_model(model)
+    second = None if coarse is None else count_work(coarse.model, generate_mesh(coarse.model))
+    changes = expect_changes(model, mesh, work.pairs)
+    # The second solution begins from the statuses of the first.
+    settled = Changes(float(size.steps), 0.0)
+    memory = {"programs and libraries": STARTED * ranks, **list_memory(work, ranks, changes.part)}
+    if second is not None:
+        memory["second solution, for the estimate"] = sum(list_memory(second, ranks, 0.0).values())
+    speed = measure_speed(model, mesh) if timed else None
+    seconds: dict[str, float] = {}
+    if speed is not None:
+        seconds = list_overhead(size, speed) | list_seconds(work, size, ranks, speed, changes)
+        if second is not None:
+            seconds["estimate"] = sum(list_seconds(second, size, ranks, speed, settled).values())
+    return Forecast(
+        ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
+        memory=memory, rank_memory=sum(memory.values()) / ranks, seconds=seconds, disk=count_disk(model, mesh),
+        passes=model.analysis.accuracy is not None, speed=speed,
+    )  # fmt: skip
+
+
+def refuse_memory(forecast: Forecast, ranks: int, limits: Sequence[Limit]) -> str | None:
+    """What to say when the ranks of a node need more than it grants; None if it is enough. ranks: of this node.
+
+    limits: of the node, the least first.
+    """
+    needed = forecast.whole_memory * ranks / forecast.ranks
+    if not limits or needed <= limits[0].bytes:
+        return None
+    where = f"{ranks} rank{'s' * (ranks != 1)}"
+    where += f" of {forecast.ranks}" if ranks != forecast.ranks else ""
+    least = limits[0]
+    return (
+        f"not enough memory: the run would take about {needed / 1e9:.3g} GB on {where}, but {least.source} grants "
+        f"{least.bytes / 1e9:.3g} GB.\n  Fewer unknowns than the {forecast.unknowns}, more nodes"
+        + ("" if forecast.operator == "hierarchical" else ', or solver.operator = "hierarchical"')
+        + f" need less; {OVERRIDE}=1 runs it all the same"
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from pbem.contact.laws import find_joint
@@ -24,8 +26,8 @@ def _find_smooth(model: Model) -> list[str]:
     ]
     if not names:
         return []
-    return [f"{name_many(names)}: Coulomb's law without friction, the default; closed faces slide freely. Give `friction`"
-            " or `friction_angle`, or say law = \"frictionless\" if that is meant."]
+    return [f"{name_many(names)}: Coulomb's law without friction, the default; closed faces slide freely. Give "
+            "`friction` or `friction_angle`, or say law = \"frictionless\" if that is meant."]
 
 
 def _find_unloaded(model: Model) -> list[str]:
@@ -63,4 +65,4 @@ def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
 def _split(mesh: Mesh) -> list[np.ndarray]:
     """Places of the pairs of each interface, which are neighbours."""
     ends = np.searchsorted(mesh.pairs.interface, np.arange(len(mesh.interface_names) + 1))
-    return [np.arange(first, last) for first, last in zip(ends[:-1], ends[1:], strict=True)]
+    return [np.arange(first, last) for first, last in pairwise(ends)]

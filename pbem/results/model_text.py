@@ -17,7 +17,7 @@ from pbem.results.tables import count, format_bytes, format_number, section, sho
 
 
 def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -> str:
-    """What `pbem check` prints: regions, curves with their grading, conditions, interfaces, contacts, laws, loads, size,
+    """What `pbem check` prints: bodies, curves with their grading, conditions, interfaces, contacts, laws, loads, size,
     forecast, notes, and what is probably not meant."""
     made = {name for group in model.groups for name in group.members}
     parts = [

@@ -129,11 +129,12 @@ def tabulate(account: Mapping[str, Any]) -> list[str]:
     ranks = account["ranks"]
     first = {name: Share(**share) for name, share in ranks[0]["pieces"].items()}
     whole = account["seconds"]
+    versions = ", ".join(f"{name} {version}" for name, version in account["versions"].items())
     lines = [
-        f"# {account['date']}, {len(ranks)} rank{'s' * (len(ranks) != 1)}, " + ", ".join(f"{n} {v}" for n, v in account["versions"].items()),
+        f"# {account['date']}, {len(ranks)} rank{'s' * (len(ranks) != 1)}, {versions}",
         f"# wall time {whole:.3f} s; peak memory of the ranks, MB: "
         + ", ".join(f"{rank['peak_memory'] / 1e6:.0f}" for rank in ranks),
-        "# of the first rank without the pieces within: seconds, of them by its processor; of the slowest rank: seconds",
+        "# seconds without those of the pieces within: of the first rank, of its processor, of the slowest rank",
         f"{'piece':28s} {'seconds':>10s} {'%':>6s} {'processor':>10s} {'slowest':>10s} {'calls':>9s} {'bytes':>10s}",
     ]
     for name, share in first.items():

@@ -31,6 +31,7 @@ from pbem.results.writer import ResultWriter
 from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
 from pbem.solve.estimate.second_solution import SecondSolution
 from pbem.solve.launch.account import describe_start
+from pbem.solve.launch.memory import check_memory
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
@@ -133,11 +134,12 @@ def _refine_and_solve(
     for number in count(one.number):
         with clock.piece("reading"):
             mesh = generate_mesh(model)
-        check_shares(model, mesh, world.size)
+            check_shares(model, mesh, world.size)
+            remarks = check_memory(world, model, mesh)
         watch.begin(model)
         for line in (*describe_start(world), describe_size(model, mesh)) if number == one.number else ():
             watch.tell(line)
-        for note in (*notes, *mesh.notes, *placement) if number == one.number else ():
+        for note in (*notes, *mesh.notes, *placement, *remarks) if number == one.number else ():
             watch.note(note)
         now = Pass(number, one.first_unknowns or 2 * mesh.nodes)
         decision = _solve(model, mesh, target, options, watch, signals, now)

@@ -5,8 +5,9 @@ usage: .venv/bin/python scripts/study_forecast.py [--seeds 40] [--first 1] [--ou
 Every third case is computed with the dense, the sparse and the hierarchical operator, on 1 to 4 ranks; number of
 cracks or inclusions, elements, steps, friction and loads follow from the seed. A case is forecast by `pbem check
 --json` and then run with --profile. Memory is the sum of the ranks' largest resident memory, disk the size of the
-result file. Time is processor time of all ranks over the cores that they have: on a machine on which others work the
-wall time says nothing. --output keeps what was measured, a line of JSON each, --again forecasts those runs anew.
+result file. Time is the mean processor time of the ranks, which is the wall time where each has a core of its own: on
+a machine on which others work the wall time says nothing. --output keeps what was measured, a line of JSON each,
+--again forecasts those runs anew.
 """
 
 from __future__ import annotations
@@ -115,10 +116,8 @@ def forecast_run(path: Path, ranks: int) -> dict[str, Any] | None:
 
 
 def find_seconds(run: dict[str, Any]) -> float:
-    """Processor time of the ranks over the cores that they have."""
-    ranks = run["profile"]["ranks"]
-    cores = min(len(ranks), len(os.sched_getaffinity(0)))
-    return float(sum(rank["processor_seconds"] for rank in ranks)) / cores
+    """Mean processor time of the ranks."""
+    return float(np.mean([rank["processor_seconds"] for rank in run["profile"]["ranks"]]))
 
 
 def find_memory(run: dict[str, Any]) -> float:

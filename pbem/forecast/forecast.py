@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pbem.bem.operator_choice import choose_operator
 from pbem.forecast.calibration import Speed, measure_speed
 from pbem.forecast.disk import count_disk
 from pbem.forecast.limits import OVERRIDE, Limit
@@ -89,6 +90,32 @@ def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> F
     )  # fmt: skip
 
 
+# Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes.
+MOST_DENSE, MOST_HIERARCHICAL = 120.0, 60e3
+
+
+def exceeds_at_most(model: Model, mesh: Mesh, ranks: int, granted: float) -> bool:
+    """Whether it takes a forecast to know that a rank has enough; granted: bytes for each rank."""
+    unknowns = 2.0 * mesh.nodes
+    hierarchical = choose_operator(model, mesh).name == "hierarchical"
+    most = MOST_HIERARCHICAL * unknowns if hierarchical else MOST_DENSE * unknowns**2
+    return 2 * STARTED + most > granted
+
+
+def note_memory(forecast: Forecast, ranks: int, available: float | None) -> str | None:
+    """What to tell when the ranks of a node need more than can be had there now; None if it is enough."""
+    needed = forecast.whole_memory * ranks / forecast.ranks
+    if available is None or needed <= available:
+        return None
+    return (f"the run will take about {needed / 1e9:.3g} GB on {count(ranks)}, but {available / 1e9:.3g} GB can be had "
+            "now: others use the rest")
+
+
+def count(ranks: int) -> str:
+    """So many ranks."""
+    return f"{ranks} rank{'s' * (ranks != 1)}"
+
+
 def refuse_memory(forecast: Forecast, ranks: int, limits: Sequence[Limit]) -> str | None:
     """What to say when the ranks of a node need more than it grants; None if it is enough. ranks: of this node.
 
@@ -97,7 +124,7 @@ def refuse_memory(forecast: Forecast, ranks: int, limits: Sequence[Limit]) -> st
     needed = forecast.whole_memory * ranks / forecast.ranks
     if not limits or needed <= limits[0].bytes:
         return None
-    where = f"{ranks} rank{'s' * (ranks != 1)}"
+    where = count(ranks)
     where += f" of {forecast.ranks}" if ranks != forecast.ranks else ""
     least = limits[0]
     return (

@@ -27,7 +27,7 @@ NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
 
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
 # step of the first stage, in which loads grow in proportion; of a step of a further stage.
-SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 5.0, 1.0, 3.0
+SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
 # Factorisations where they may be made anew, iterations of GMRES in a system, products beside those.
 FACTORISATIONS, GMRES, PRODUCTS = 2.0, 8.0, 3.0
 # Part of the changeable pairs whose columns are asked for at most, where they are not all computed at once.
@@ -35,7 +35,7 @@ CHANGING = 0.35
 
 # Seconds: of the start; of a vector's entry in an iteration; of an entry in a product, shared and on every rank; of an
 # unknown in the preconditioner; of a call of a library that shares matrices; of an interior point and a node.
-START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.5, 10e-6, 1.4e-6, 0.6e-6, 5e-6, 0.1, 0.15e-6
+START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 1.4e-6, 0.6e-6, 5e-6, 0.1, 0.15e-6
 # Of an unknown in the assembly of the hierarchical operator.
 PLACED = 40e-6
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbem.bundled import find_case
+from pbem.check_command import add_check_options, check
 from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import (
     ConvergenceError,
@@ -63,7 +64,10 @@ PETSc: any option of PETSc's is taken with the prefix pbem_ and wins over the ca
 Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores
 
 exit code: 0 finished; 1 unexpected error; 2 the case, the command line or the launch is wrong, nothing was written;
-3 not converged at the smallest step, the file holds every step reached (see `pbem help convergence`)"""
+3 not converged at the smallest step, the file holds every step reached (see `pbem help convergence`);
+1 also: out of memory, no room on the disk, a custom law that failed, or nobody reads the progress any more;
+128 + n stopped by signal n (130: SIGINT, Ctrl-C; 143: SIGTERM). After 1, 3 and 128 + n --resume goes on after the
+last step that the file holds."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -166,9 +170,7 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
-    check = add("check", _check, "validate a case and show what would be computed")
-    check.add_argument("case", metavar="CASE")
-    check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
+    add_check_options(add("check", _check, "validate a case, show what would be computed, and what that would take"))
     run = add("run", None, "compute a case and write its results", RUN_NOTES)
     run.add_argument("case", metavar="CASE")
     run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
@@ -176,6 +178,7 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    run.add_argument("--profile", metavar="FILE", help="write time, calls and bytes by piece (FILE.json: as JSON)")
     info = add("info", _info, "show what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
     plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")
@@ -216,21 +219,7 @@ def _make(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from pbem.case.build import read_checked_model
-    from pbem.mesh.generate import generate_mesh
-    from pbem.results.describe import describe_model
-    from pbem.results.output import check_picture_path
-
-    model = read_checked_model(find_case(options.case))
-    if options.plot:
-        check_picture_path(options.plot)
-    mesh = generate_mesh(model)
-    _tell(describe_model(model, mesh))
-    if options.plot:
-        from pbem.results.plots import plot_model
-
-        plot_model(model, mesh, options.plot)
-        _tell(f"\npicture: {options.plot}")
+    _tell(check(find_case(options.case), options.ranks, options.json, options.plot))
     return 0
 
 
@@ -275,6 +264,7 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     run = _load_driver()
     from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
     from pbem.progress import make_reporter
+    from pbem.solve.launch.account import keep_account
 
     reporter: Reporter | None = None
     begun = time.perf_counter()
@@ -282,8 +272,9 @@ def _run(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     try:
         with abort_if_unexpected(world, PbemError):
             reporter = make_reporter(options.quiet) if world.rank == 0 else None
-        results = run(case, target, resume=options.resume, force=options.force, petsc=petsc,
-                      operator=options.operator, reporter=reporter)
+        with keep_account(world, reporter, options.profile, (Path(case), target)):
+            results = run(case, target, resume=options.resume, force=options.force, petsc=petsc,
+                          operator=options.operator, reporter=reporter)
     except LaunchError as error:
         _close(reporter)
         code = _say_wrong_launch(error, world.rank, world.size)

@@ -12,6 +12,7 @@ from typing import get_args
 
 from pbem.arrays import Integer, Real
 from pbem.case.build import Source, find_file, make_checked_model
+from pbem.clock import clock
 from pbem.description.case import UNNAMED
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
@@ -21,6 +22,7 @@ from pbem.model.refinement import bisect_elements, impose_fractions
 from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_first, lacks_memory, world
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.estimator import Estimator
+from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
 from pbem.results.passes import KeptPass, keep_pass, read_refinement
 from pbem.results.reader import Results, open_results
@@ -28,8 +30,11 @@ from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
 from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
 from pbem.solve.estimate.second_solution import SecondSolution
+from pbem.solve.launch.account import describe_start
+from pbem.solve.launch.memory import check_memory
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
+from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
 from pbem.solve.problem.step import Reporter, SilentReporter, Step
@@ -71,7 +76,8 @@ def run(
             signals.at_once = world.size == 1
             path = find_file(case)
             name = UNNAMED if path is None else str(path)
-            model = do_on_first(world, PbemError, lambda: _make_model(case, name, operator))
+            with clock.piece("reading"):
+                model = do_on_first(world, PbemError, lambda: _make_model(case, name, operator))
             target = Path(output) if output is not None else Path("case.h5" if path is None else path.stem + ".h5")
             inputs = [*([path] if path else []), *map(Path, model.law_texts)]
             do_on_first(world, PbemError, lambda: check_output_path(
@@ -79,11 +85,12 @@ def run(
             do_on_first(world, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
             watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)
             options = {**model.solver.petsc, **(petsc or {})}
-            with petsc_options(options):
+            with petsc_log(options), petsc_options(options):
                 _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement)
-            results = open_results(target)
-            for note in compare_release(results) if world.rank == 0 else ():
-                watch.note(note)
+            with clock.piece("writing"):
+                results = open_results(target)
+                for note in compare_release(results) if world.rank == 0 else ():
+                    watch.note(note)
             return results
     except StopError as error:
         if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
@@ -125,10 +132,14 @@ def _refine_and_solve(
         model, one = (model, one) if read is None else (impose_fractions(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes,)
     for number in count(one.number):
-        mesh = generate_mesh(model)
-        check_shares(model, mesh, world.size)
+        with clock.piece("reading"):
+            mesh = generate_mesh(model)
+            check_shares(model, mesh, world.size)
+            remarks = check_memory(world, model, mesh)
         watch.begin(model)
-        for note in (*notes, *mesh.notes, *placement) if number == one.number else ():
+        for line in (*describe_start(world), describe_size(model, mesh)) if number == one.number else ():
+            watch.tell(line)
+        for note in (*notes, *mesh.notes, *placement, *remarks) if number == one.number else ():
             watch.note(note)
         now = Pass(number, one.first_unknowns or 2 * mesh.nodes)
         decision = _solve(model, mesh, target, options, watch, signals, now)
@@ -151,13 +162,15 @@ def _solve(
     model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals, one: Pass
 ) -> Decision:
     """March through the load history; the first rank writes. Returns what follows."""
-    interior = InteriorField(model, mesh, world) if model.interior_points else None
+    with clock.piece("evaluation"):
+        interior = InteriorField(model, mesh, world) if model.interior_points else None
     region = None if interior is None else interior.location.region
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
-    output = do_on_first(
-        world, PbemError, lambda: _open(model, mesh, target, options, region, one), share=False
-    ) or _Output()
+    with clock.piece("writing"):
+        output = do_on_first(
+            world, PbemError, lambda: _open(model, mesh, target, options, region, one), share=False
+        ) or _Output()
     try:  # from here on whatever happens has to leave a closed file
         decision = _fill(output.writer, model, mesh, interior, watch, signals, one)
     except BaseException as error:
@@ -201,18 +214,22 @@ def _fill(
         do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
     last: Step | None = broadcast(world, writer.last_step if writer else None)
     signals.at_once = world.size == 1
-    problem = assemble_problem(model, mesh, world)
+    with clock.piece("assembly"):
+        problem = assemble_problem(model, mesh, world)
     signals.at_once = False
     watch.look_after(problem.laws)
     watch.check()
     for note in problem.system.notes:
         watch.note(note)
     if interior is not None:
-        interior.prepare(problem.system)
+        with clock.piece("evaluation"):
+            interior.prepare(problem.system)
     start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
-    estimator = make_estimator(model, mesh, last)
+    with clock.piece("estimate"):
+        estimator = make_estimator(model, mesh, last)
     try:
-        store_steps(march(problem, watch, start), model.output_every, interior, writer, watch, estimator)
+        steps = clock.each("steps", march(problem, watch, start))
+        store_steps(steps, model.output_every, interior, writer, watch, estimator)
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
         raise
@@ -229,14 +246,16 @@ def _conclude(
 
     Raises ConvergenceError ("accuracy") when passes or unknowns run out.
     """
-    decision: Decision = do_on_first(
-        world, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
-    )
+    with clock.piece("estimate"):
+        decision: Decision = do_on_first(
+            world, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
+        )
     for note in decision.notes:
         watch.note(note)
     if decision.failure:
         raise ConvergenceError("accuracy", decision.failure)
-    do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
+    with clock.piece("writing"):
+        do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
     return decision
 
 
@@ -314,14 +333,17 @@ def store_steps(
             stored = interior is not None and step.is_due(every)
             waiting = None if stored else step
             if interior is not None and stored:
-                step = replace(step, interior=interior.evaluate(step))
-            rows = None if estimator is None else estimator.estimate(step)
+                with clock.piece("evaluation"):
+                    step = replace(step, interior=interior.evaluate(step))
+            with clock.piece("estimate"):
+                rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
             missing = "" if estimator is None else estimator.missing
-            notes = do_on_first(
-                world, PbemError,
-                lambda due=step, rows=rows, missing=missing: _append(writer, due, rows, missing),  # type: ignore[misc]
-            )
+            with clock.piece("writing"):
+                notes = do_on_first(
+                    world, PbemError,
+                    lambda due=step, rows=rows, missing=missing: _append(writer, due, rows, missing),  # type: ignore[misc]
+                )
             for note in notes:
                 (listener or SilentReporter()).note(note)
     except ConvergenceError:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
+import time
+from datetime import datetime
 from typing import Any, TextIO
 
 from pbem.contact.laws import OPEN, SLIP, STICK
@@ -29,11 +31,12 @@ class Plan:
 
 
 class LogReporter:
-    """Plain lines, flushed one by one, for batch logs."""
+    """Plain lines, flushed one by one, for batch logs; with stamps each begins with the time of day."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+    def __init__(self, stream: TextIO, stamps: bool = False) -> None:
+        self._stream, self._stamps = stream, stamps
         self._number: int | None = None
+        self._begun: float | None = None
 
     def begin(self, model: Model) -> None:
         self._plan, self._number = Plan(model.stages), None
@@ -41,7 +44,12 @@ class LogReporter:
     def note(self, text: str) -> None:
         self._say(f"note: {text}")
 
+    def tell(self, text: str) -> None:
+        self._say(text)
+
     def start_step(self, stage: int, reached: float, target: float) -> None:
+        if self._begun is None:
+            self._begun = time.perf_counter()
         if self._number is None:
             self._number = math.floor(self._plan.done(stage, reached) + 1e-6)
         number = self._number + 1
@@ -55,7 +63,8 @@ class LogReporter:
     def accept(self, step: Step) -> None:
         self._number = step.number
         count = len(step.iterations)
-        seconds = sum(iteration.seconds for iteration in step.iterations)
+        # With the tries before it, if it was halved, and all that makes a solution a step.
+        seconds, self._begun = time.perf_counter() - (self._begun or 0.0), None
         self._say(f"  converged: {count} iteration{'s' * (count != 1)}, residual {step.residual:.1e}, "
                   f"{describe_modes(step)}, {seconds:.2f} s")
 
@@ -64,7 +73,8 @@ class LogReporter:
         self._say("  the step is halved")
 
     def _say(self, text: str) -> None:
-        print(printable(text), file=self._stream, flush=True)
+        stamp = f"{datetime.now():%H:%M:%S} " if self._stamps else ""
+        print(stamp + printable(text), file=self._stream, flush=True)
 
 
 class BarReporter:
@@ -86,6 +96,9 @@ class BarReporter:
 
     def note(self, text: str) -> None:
         self._write(f"note: {text}")
+
+    def tell(self, text: str) -> None:
+        """Nothing: it is for logs."""
 
     def start_step(self, stage: int, reached: float, target: float) -> None:
         self._name = self._plan.stages[stage].name
@@ -118,14 +131,14 @@ class BarReporter:
 
 def make_reporter(quiet: bool = False, stream: TextIO | None = None) -> Reporter:
     """A bar if the stream is a terminal, otherwise lines; by default a bar on standard error or lines on standard
-    output."""
+    output. Lines have time stamps."""
     if quiet:
         return SilentReporter()
     if stream is None:
         # Standard output tells nothing: Open MPI gives its ranks a terminal there, whatever its own output is.
         stream = sys.stderr
-        return BarReporter(stream) if stream.isatty() else LogReporter(sys.stdout)
-    return BarReporter(stream) if stream.isatty() else LogReporter(stream)
+        return BarReporter(stream) if stream.isatty() else LogReporter(sys.stdout, stamps=True)
+    return BarReporter(stream) if stream.isatty() else LogReporter(stream, stamps=True)
 
 
 def describe_iteration(iteration: Iteration) -> str:

@@ -90,7 +90,8 @@ def measure_pieces(kind: str, count: int, folder: Path, profiled: str | None) ->
     from pbem.mesh.generate import generate_mesh
     from pbem.model.build import build_model
     from pbem.model.rigid_body_modes import find_rigid_body_modes
-    from pbem.results.describe import describe_model, describe_results
+    from pbem.results.describe import describe_results
+    from pbem.results.model_text import describe_model
     from pbem.results.plots import plot_model, plot_results
     from pbem.results.reader import open_results
     from pbem.results.writer import ResultWriter

@@ -39,7 +39,8 @@ from pbem import cli
 from pbem.case.build import read_checked_model
 from pbem.errors import CaseError, ConvergenceError, PbemError, is_control
 from pbem.mesh.generate import generate_mesh
-from pbem.results.describe import describe_model, describe_results
+from pbem.results.describe import describe_results
+from pbem.results.model_text import describe_model
 from pbem.results.reader import Results
 from pbem.solve.problem.step import SilentReporter, Step
 

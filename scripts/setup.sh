@@ -13,6 +13,8 @@ system_packages=(
     python3-numpy python3-scipy python3-matplotlib python3-pytest python3-pytest-xdist
     python3-mpi4py python3-petsc4py libpetsc-real-dev python3-h5py python3-h5py-mpi openmpi-bin libopenblas0-pthread
 )
+# Of these the ones of the distribution stay, whatever else is installed into .venv: wheels bring another MPI and HDF5.
+kept_packages=(numpy h5py mpi4py petsc4py)
 # What the distributions lack or have too old.
 python_packages=("pydantic>=2.5" "tqdm>=4.64" "ruff>=0.4" "mypy>=1.8")
 
@@ -57,7 +59,59 @@ fingerprint() {
 }
 
 is_up_to_date() {
-    [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint)" ] && compgen -G "$root/pbem/bem/_kernels*.so" >/dev/null
+    [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$(fingerprint)" ] && compgen -G "$root/pbem/bem/_kernels*.so" >/dev/null &&
+        [ -f "$venv/pip.conf" ] && [ -z "$(list_strangers)" ] && is_importable 2>/dev/null
+}
+
+# Everything that a run imports; what is wrong is told on standard error.
+is_importable() {
+    (cd / && "$venv/bin/python" -c 'import pydantic, tqdm, scipy, matplotlib, h5py, pbem.bem._kernels, pbem.cli')
+}
+
+# Packages that are found elsewhere than in the distribution: those in .venv hide its own.
+list_strangers() {
+    (
+        cd / && "$venv/bin/python" - /usr/lib/ "${kept_packages[@]}" 2>/dev/null <<'END'
+import importlib.util, sys
+
+for name in sys.argv[2:]:
+    found = importlib.util.find_spec(name)
+    if found is None or not str(found.origin).startswith(sys.argv[1]):
+        print(name)
+END
+    )
+}
+
+remove_strangers() {
+    local name
+    for name in $(list_strangers); do
+        say "removing $name from .venv, where it hides the one of the distribution"
+        "$venv/bin/python" -m pip uninstall -q -y --disable-pip-version-check "$name" || true
+    done
+}
+
+# From now on pip keeps these versions. Debian's h5py goes by another name there: pip is told that h5py is installed.
+pin_packages() {
+    (
+        cd / && "$venv/bin/python" - "$venv" "${kept_packages[@]}" <<'END'
+import importlib, pathlib, shutil, sys, sysconfig
+
+venv, names = pathlib.Path(sys.argv[1]), sys.argv[2:]
+versions = {name: importlib.import_module(name).__version__ for name in names}
+constraints = venv / "constraints.txt"
+constraints.write_text("".join(f"{name}=={version}\n" for name, version in versions.items()))
+(venv / "pip.conf").write_text(f"[install]\nconstraint = {constraints.as_uri()}\n")
+site = pathlib.Path(sysconfig.get_path("purelib"))
+for old in site.glob("h5py-*.dist-info"):
+    shutil.rmtree(old)
+if not any(pathlib.Path("/usr/lib/python3/dist-packages").glob("h5py-*")):
+    told = site / f"h5py-{versions['h5py']}.dist-info"
+    told.mkdir()
+    (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: h5py\nVersion: {versions['h5py']}\n")
+    (told / "INSTALLER").write_text("pbem\n")
+    (told / "RECORD").write_text("".join(f"{told.name}/{name},,\n" for name in ("METADATA", "INSTALLER", "RECORD")))
+END
+    ) || fail "pip could not be told to keep ${kept_packages[*]} as they are"
 }
 
 # An environment that was made by another Python, sees no system packages or has been moved here cannot be mended.
@@ -84,20 +138,12 @@ install_python_packages() {
         --no-deps --no-build-isolation -e .) || fail "pbem or its C extension could not be built"
 }
 
-# The libraries below must be the ones of the distribution: others are built with another MPI.
+# The kept packages must be the ones of the distribution: others are built with another MPI.
 check_origin() {
-    (cd / && "$venv/bin/python" - /usr/lib/ <<'END') || fail "the environment is not usable; see the line above"
-import importlib.util, sys
-
-wrong = []
-for name in ("numpy", "mpi4py", "petsc4py", "h5py"):
-    found = importlib.util.find_spec(name)
-    if found is None or not str(found.origin).startswith(sys.argv[1]):
-        wrong.append(f"{name} at {found and found.origin}")
-if wrong:
-    sys.exit(f"setup: expected in {sys.argv[1]}, but found {', '.join(wrong)}: uninstall it there (pip uninstall)")
-import pbem.bem._kernels
-END
+    local strangers
+    strangers=$(list_strangers)
+    [ -z "$strangers" ] || fail "expected in /usr/lib, but found elsewhere:" $strangers "- remove .venv, then run this again"
+    is_importable || fail "the environment is not usable, see above; remove .venv, then run this again"
 }
 
 main() {
@@ -109,6 +155,8 @@ main() {
     say "building $venv"
     make_venv
     rm -f "$stamp"
+    remove_strangers
+    pin_packages
     install_python_packages
     check_origin
     fingerprint >"$stamp"

@@ -69,6 +69,7 @@ def read_law(
         tangential_stiffness=joint[1],
         file=path,
         parameters=dict(table.parameters) if kind == "custom" else {},
+        frictionless=smooth or 0.0 in (table.friction, table.friction_angle),
     )
     return law, faults
 

@@ -42,6 +42,7 @@ class Law:
     cohesion_lost: cohesion and tensile strength are gone after the first slip or parting.
     friction_dynamic, slip_distance: friction falls linearly from `friction` to friction_dynamic over that slip.
     normal_stiffness, tangential_stiffness: elastic joint in front of the law (stress/length); None is rigid.
+    frictionless: that there is no friction was said, by `law = "frictionless"` or `friction = 0`.
     """
 
     kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state"]
@@ -57,6 +58,7 @@ class Law:
     tangential_stiffness: float | None = None
     file: str | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    frictionless: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)

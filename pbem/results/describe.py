@@ -1,48 +1,23 @@
-"""Short texts about a model before it is computed and about a result file."""
+"""Short texts about a result file; those about a model are in pbem.results.model_text."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-
 import numpy as np
 
-from pbem.bem.operator_choice import choose_operator
 from pbem.contact.laws import OPEN, SLIP, STICK
-from pbem.description.generation import GeneratedGroup
-from pbem.geometry.curve import Curve
-from pbem.mesh.mesh import Mesh
-from pbem.model.model import Condition, Law, Model, Region
 from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
+from pbem.results.tables import count as _count
+from pbem.results.tables import format_number as _number
+from pbem.results.tables import section as _section
+from pbem.results.tables import shorten as _shorten
+from pbem.results.tables import table as _table
 from pbem.results.tip_notes import compare_release, explain_missing_factors
 
-MOST_ROWS = 40
 MOST_TIPS = 10
 MOST_ERRORS = 10
-
-
-def describe_model(model: Model, mesh: Mesh) -> str:
-    """What `pbem check` prints: regions, curves with their grading, conditions, interfaces, size, notes."""
-    made = {name for group in model.groups for name in group.members}
-    parts = [
-        model.title,
-        _section("regions", [_describe_region(region, made) for region in model.regions if region.name not in made]),
-        _section("generated", _table(["group", "curves", "inside", "sizes", "elements", "refined towards", "law"],
-                                     [_group_row(model, group) for group in model.groups])),
-        _section("curves", _table(["curve", "legs", "elements", "length", "refined towards"],
-                                  [_curve_row(curve) for name, curve in model.curves.items() if name not in made])),
-        _section("conditions", _table(["curve", *_direction_titles(model)],
-                                      [[each.curve, *describe_condition(model, each)]
-                                       for each in model.conditions.values()])),
-        _section("interfaces", _table(["interface", "first side", "second side", "pairs", "law"],
-                                      _interface_rows(model, mesh, made))),
-        _section("load", _describe_loads(model)),
-        _section("size", _describe_size(model, mesh)),
-        _section("notes", _shorten([*model.notes, *mesh.notes])),
-    ]
-    return "\n\n".join(part for part in parts if part)
 
 
 def describe_results(results: Results) -> str:
@@ -110,119 +85,6 @@ def describe_errors(results: Results) -> list[str]:
         for name in worst
     ]
     return lines + _table(["last step, interface", "opening", "slip", "traction n", "traction s"], rows)
-
-
-def _describe_region(region: Region, made: Collection[str]) -> str:
-    """made: names of generated curves, which are told with their groups."""
-    material = region.material
-    loops = [
-        ("outer loop: " if loop.outer else "inner loop: ")
-        + ", ".join(side.curve if side.forward else f"{side.curve} (reversed)" for side in loop.sides)
-        for loop in region.loops if loop.sides[0].curve not in made
-    ]
-    written = [name for name in region.cracks if name not in made]
-    cracks = [f"cracks: {', '.join(_shorten(written, 12))}"] if written else []
-    kind = "infinite region" if region.infinite else "region"
-    head = (f"{kind} {region.name}: {material.name}, Young's modulus {material.young:g}, "
-            f"Poisson's ratio {material.poisson:g}, plane {material.plane}")
-    return "\n    ".join([head, *_shorten(loops), *cracks])
-
-
-def _curve_row(curve: Curve) -> list[str]:
-    ends = {(False, False): "none", (True, False): "start", (False, True): "end", (True, True): "both"}
-    refined = [ends[leg.refine_start, leg.refine_end] for leg in curve.legs]
-    power = sorted({f"{leg.power:g}" for leg in curve.legs if leg.refine_start or leg.refine_end})
-    text = refined[0] if len(set(refined)) == 1 else ", ".join(_shorten(refined, 8))
-    return [curve.name, str(len(curve.legs)), str(sum(leg.elements for leg in curve.legs)), f"{curve.length:.4g}",
-            text + (f" (power {'/'.join(power)})" if power else "")]
-
-
-def _group_row(model: Model, group: GeneratedGroup) -> list[str]:
-    """What a group has in common; sizes: lengths of cracks, diameters of inclusions."""
-    members = group.members
-    curves = [model.curves[name] for name in members]
-    lengths = [curve.length if group.kind == "cracks" else curve.length / np.pi for curve in curves]
-    low, high = min(lengths), max(lengths)
-    sizes = f"{'length' if group.kind == 'cracks' else 'diameter'} {low:.4g}"
-    sizes += f" to {high:.4g}" if high > low * (1 + 1e-6) else ""
-    refined = {_curve_row(curve)[-1] for curve in curves}
-    laws = list({id(law): describe_law(law) for law in (model.interfaces[name].law for name in members)}.values())
-    own = "" if len(laws) == 1 else f", {_count(len(laws) - 1, 'other law')}"
-    material = "" if group.kind == "cracks" else f" of {_find_material(model, members[0])}"
-    return [group.name, f"{group.count} {group.kind}{material}, {members[0]} to {members[-1]}", group.region, sizes,
-            str(sum(leg.elements for leg in curves[0].legs)), " or ".join(sorted(refined)), laws[-1] + own]
-
-
-def _find_material(model: Model, region: str) -> str:
-    material = next(each.material for each in model.regions if each.name == region)
-    return f"{material.name} (E {material.young:g}, nu {material.poisson:g})"
-
-
-def _direction_titles(model: Model) -> list[str]:
-    frames = {condition.frame for condition in model.conditions.values()}
-    return ["x", "y"] if frames <= {"global"} else ["x or normal", "y or tangential"]
-
-
-def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
-    """What is prescribed in each direction: one value, or those at the end of every stage where they differ."""
-    names = ("n", "s") if condition.frame == "local" else ("x", "y")
-    values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
-    if condition.known == ("traction", "traction") and not any(map(any, [*values, condition.stiffness])):
-        return "free", "free"
-    texts = []
-    for i, quantity in enumerate(condition.known):
-        given = [f"{value[i]:g}" for value in values]
-        given = given[:1] if len(set(given)) == 1 else _shorten(given, 6)
-        spring = f", spring {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
-        texts.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}{spring}")
-    return texts[0], texts[1]
-
-
-def _interface_rows(model: Model, mesh: Mesh, made: Collection[str]) -> list[list[str]]:
-    counts = np.bincount(mesh.pairs.interface, minlength=len(mesh.interface_names))
-    pairs = dict(zip(mesh.interface_names, counts, strict=True))
-    return [[each.name, each.first, each.second or "(crack)", str(pairs[each.name]), describe_law(each.law)]
-            for each in model.interfaces.values() if each.name not in made]
-
-
-def describe_law(law: Law) -> str:
-    """The kind of the law with every strength that is not zero."""
-    if law.kind != "coulomb":
-        numbers = law.parameters if law.kind != "custom" else {}
-        return ", ".join([law.kind, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())])
-    strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
-    given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
-    return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
-
-
-def _describe_loads(model: Model) -> list[str]:
-    """The stages, with the loads that do not belong to a curve; then the in-situ stresses."""
-    lines = []
-    for stage in model.stages:
-        parts = [f"{stage.name}: {_count(stage.steps, 'step')}"]
-        if stage.duration:
-            parts.append(f"duration {stage.duration:g}")
-        if any(stage.remote):
-            parts.append("remote stress sxx, syy, sxy = {:g}, {:g}, {:g}".format(*stage.remote))
-        if any(stage.gravity):
-            parts.append("gravity {:g}, {:g}".format(*stage.gravity))
-        pressure = {name: value for name, value in stage.pressure.items() if value}
-        parts += _shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
-        lines.append(", ".join(parts))
-    for name, stress in model.initial_stress.items():
-        lines.append("in-situ stress of {}: sxx, syy, sxy = {}, {}, {}".format(name, *stress.describe(model.origin)))
-    return lines
-
-
-def _describe_size(model: Model, mesh: Mesh) -> list[str]:
-    size = (
-        f"{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, {2 * mesh.nodes} unknowns, "
-        f"{mesh.pairs.count} contact pairs, scheme {model.analysis.scheme}"
-    )
-    memory = choose_operator(model, mesh).estimate_memory(model, mesh)
-    parts = [*(f"{name} {_bytes(size)}" for name, size in memory.stored), memory.note]
-    everywhere = f"; besides, on every rank {_bytes(memory.everywhere)}" if memory.everywhere else ""
-    return [size, f"memory over all ranks: {', '.join(parts)}{everywhere}"]
 
 
 def _describe_steps(results: Results) -> str:
@@ -303,50 +165,3 @@ def _list_tips(name: str, tips: Tips) -> list[tuple[str, str, float, float, floa
     return [(name, *each) for each in values if not (np.isnan(each[1]) and np.isnan(each[3]))]
 
 
-def _section(title: str, lines: Iterable[str]) -> str:
-    listed = list(lines)
-    return "\n".join([title, *(f"  {line}" for line in listed)]) if listed else ""
-
-
-def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned lines, numbers to the right; at most MOST_ROWS of them."""
-    if not rows:
-        return []
-    shown = [titles, *rows[:MOST_ROWS]]
-    widths = [max(len(row[i]) for row in shown) for i in range(len(titles))]
-    right = [all(_is_number(row[i]) for row in rows) for i in range(len(titles))]
-    lines = ["  ".join(cell.rjust(width) if flush else cell.ljust(width)
-                       for cell, width, flush in zip(row, widths, right, strict=True)).rstrip() for row in shown]
-    return lines + _left_out(len(rows))
-
-
-def _left_out(count: int) -> list[str]:
-    return [f"... and {count - MOST_ROWS} more"] if count > MOST_ROWS else []
-
-
-def _shorten(texts: Sequence[str], most: int = MOST_ROWS) -> list[str]:
-    return [*texts[:most], *([f"... and {len(texts) - most} more"] if len(texts) > most else [])]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _number(value: float) -> str:
-    return f"{value:.5g}"
-
-
-def _count(count: int, noun: str) -> str:
-    return f"{count} {noun}{'s' * (count != 1)}"
-
-
-def _bytes(size: float) -> str:
-    for unit in ("B", "kB", "MB", "GB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} TB"

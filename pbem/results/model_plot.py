@@ -20,7 +20,7 @@ from pbem.model.model import Condition, Model
 from pbem.model.origin import move_back
 from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Value, evaluate
-from pbem.results.describe import describe_condition
+from pbem.results.model_text import describe_condition
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
 from pbem.results.refinement_plot import draw_levels

@@ -12,11 +12,11 @@ from pathlib import Path
 # The path of the data: a part imports those before it, never those after it.
 # The package itself comes last: it offers what they define.
 ORDER = (
-    "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
-    "make_command", "bundled", "pages", "cli", "__main__", "__init__",
+    "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "solve", "results", "progress",
+    "driver", "make_command", "bundled", "check_command", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
-BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact")
+BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = ("solve", "driver", "cli", "__main__", "parallel")
 

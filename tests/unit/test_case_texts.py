@@ -15,7 +15,7 @@ from pbem.cli import main
 from pbem.errors import CaseError, Fault, ResultFileError, is_control, printable
 from pbem.mesh.generate import generate_mesh
 from pbem.progress import LogReporter
-from pbem.results.describe import describe_model
+from pbem.results.model_text import describe_model
 from pbem.solve.petsc.options import check_options
 from tests.cli.cli_sample import BLOCKS
 

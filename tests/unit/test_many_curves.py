@@ -14,8 +14,9 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import PairTie, find_rigid_body_modes
-from pbem.results.describe import describe_model, describe_results
+from pbem.results.describe import describe_results
 from pbem.results.model_plot import draw_model
+from pbem.results.model_text import describe_model
 from pbem.results.plots import draw_results
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter

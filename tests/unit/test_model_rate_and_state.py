@@ -10,7 +10,7 @@ from pbem.contact.rate_and_state import RateAndState
 from pbem.contact.strength import LAWS
 from pbem.mesh.generate import generate_mesh
 from pbem.model.rigid_body_modes import find_rigid_body_modes
-from pbem.results.describe import describe_law
+from pbem.results.model_text import describe_law
 from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only_fault
 
 LAW = '''law = "rate_and_state"

@@ -11,7 +11,8 @@ from pbem.bem.operator_choice import estimate_dense_memory
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.model.in_situ import LinearStress
 from pbem.model.model import Condition
-from pbem.results.describe import describe_model, describe_results
+from pbem.results.describe import describe_results
+from pbem.results.model_text import describe_model
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
 from tests.unit.results_sample import make_mesh, make_model, make_steps

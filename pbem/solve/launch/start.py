@@ -62,7 +62,7 @@ def claim_work_space() -> None:
 
     Raises MemoryError.
     """
-    if any("openblas" in file.lower() for file in _list_mapped_files()):
+    if any("openblas" in file.lower() for file in list_mapped_files()):
         np.empty(WORK_SPACE, dtype=np.uint8)  # only asked for, and given back
     np.linalg.solve(np.eye(2), np.ones(2))
 
@@ -77,11 +77,12 @@ def read_libraries() -> Libraries:
         petsc=(major, minor),
         petsc4py=(int(own[1]), int(own[2])) if own else (major, minor),
         world=PETSc.COMM_WORLD.getSize(),
-        mpi=find_mpi_libraries(_list_mapped_files()),
+        mpi=find_mpi_libraries(list_mapped_files()),
     )
 
 
-def _list_mapped_files() -> list[str]:
+def list_mapped_files() -> list[str]:
+    """The files that this process has mapped, its libraries among them."""
     try:
         lines = Path("/proc/self/maps").read_text().splitlines()
     except OSError:

@@ -44,6 +44,10 @@ class Watch:
         """Hand on."""
         self._tell("note", text)
 
+    def tell(self, text: str) -> None:
+        """Hand on."""
+        self._tell("tell", text)
+
     def start_step(self, stage: int, reached: float, target: float) -> None:
         """Hand on, and check."""
         self._tell("start_step", stage, reached, target)
@@ -68,7 +72,7 @@ class Watch:
         if self._listener is None:
             return
         try:
-            getattr(self._listener, method)(*arguments)
+            getattr(self._listener, method, _ignore)(*arguments)
         except OSError:  # a pipe or a terminal has been closed
             self._listener = None
             self._signals.ask("reader", "nobody reads the progress any more", 1)
@@ -92,3 +96,7 @@ class Watch:
             if (np.abs(parts - parts[0])[:, :3] > EQUAL * parts[:, 3:].max()).any():
                 raise LawError(f"the law {law.file} answers differently on different ranks; "
                                "expected the same answer for the same arguments")
+
+
+def _ignore(*_: object) -> None:
+    """What a listener does that does not ask for it."""

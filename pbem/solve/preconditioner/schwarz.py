@@ -18,6 +18,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.bem.rows import Sources, evaluate_rows
+from pbem.clock import clock
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap
 from pbem.mesh.mesh import Mesh
@@ -93,10 +94,11 @@ class SchwarzPreconditioner:
         free = (self.free @ matrix).tocsr()
         less = self._less = eliminate_tractions(matrix, free, self._node_crack)
         count, self.singular = 0, 0
-        for inverse in self.inverses:
-            if not inverse.formed or changed[inverse.around].any():
-                self._invert(inverse, by_column, free, less)
-                count += 1
+        with clock.piece("preconditioner"):
+            for inverse in self.inverses:
+                if not inverse.formed or changed[inverse.around].any():
+                    self._invert(inverse, by_column, free, less)
+                    count += 1
         return count
 
     def apply(self, residual: Real, result: Real) -> None:

@@ -147,6 +147,9 @@ class Reporter(Protocol):
     def note(self, text: str) -> None:
         """A choice or a fact that the user should know, one sentence."""
 
+    def tell(self, text: str) -> None:
+        """A line about the run as a whole, for its log."""
+
     def start_step(self, stage: int, reached: float, target: float) -> None:
         """A step of a stage is tried, from one fraction of the stage to another."""
 
@@ -167,6 +170,9 @@ class SilentReporter:
         """Nothing."""
 
     def note(self, text: str) -> None:
+        """Nothing."""
+
+    def tell(self, text: str) -> None:
         """Nothing."""
 
     def start_step(self, stage: int, reached: float, target: float) -> None:

@@ -12,11 +12,11 @@ from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
 from pbem.bem.operator import Block, RowOperator, add_anchor, assemble_displacement_rows, assemble_rows
 from pbem.bem.rigid_motions import find_rigid_motions, free_rotations, need_rotations
+from pbem.clock import clock
 from pbem.contact.anchor import Anchor
-from pbem.contact.constraints import build_constraints
+from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import PairLaws
-from pbem.contact.loads import Load, OuterNodes, evaluate_load, find_needed_columns
-from pbem.contact.modes import Linearisation
+from pbem.contact.loads import OuterNodes, evaluate_load, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import share_nodes
@@ -101,7 +101,8 @@ class DenseSystem:
 
     def apply(self, v: Real) -> Real:
         """See System; also for many v (4 nodes, c) at a time."""
-        return self.operator.apply(v)
+        with clock.piece("product", self.stored):
+            return self.operator.apply(v)
 
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""
@@ -134,15 +135,3 @@ def place_directly(model: Model, mesh: Mesh, points: Complex, location: Location
     everywhere = np.ones(4 * mesh.nodes, dtype=bool)
     rigid = find_rigid_motions(mesh, model.finite_regions, everywhere)
     return InteriorRows(mesh, [region.material for region in model.regions], points, location, rigid)
-
-
-def find_unknowns_of_regions(mesh: Mesh, outer: OuterNodes, leader: Integer, load: Load) -> list[Integer]:
-    """Unknowns, in rising order, on which each region's displacements and tractions can depend in any mode."""
-    # A law that depends on everything has the entries of all modes at once.
-    everything = np.tile(1 + 0.1 * np.arange(8.0).reshape(4, 2), (mesh.pairs.count, 1, 1))
-    law = Linearisation(everything, np.zeros((mesh.pairs.count, 4)), leader)
-    matrix = build_constraints(mesh, outer, np.zeros(mesh.pairs.count), law, load, 1.0).matrix
-    region_of_row = np.tile(np.repeat(mesh.node_region, 2), 2)
-    return [
-        np.unique(matrix[np.flatnonzero(region_of_row == region)].indices) for region in range(len(mesh.region_names))
-    ]

@@ -19,6 +19,7 @@ from pbem.bem.hierarchical import (
 )
 from pbem.bem.location import Location
 from pbem.bem.pointwise import PointRows, TreeRows, place_points
+from pbem.clock import clock
 from pbem.contact.anchor import Anchor
 from pbem.contact.laws import PairLaws
 from pbem.contact.loads import OuterNodes, find_needed_columns
@@ -96,7 +97,8 @@ class HierarchicalSystem:
 
     def apply(self, v: Real) -> Real:
         """See System."""
-        return self.operator.apply(v)
+        with clock.piece("product", self.stored):
+            return self.operator.apply(v)
 
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.clock import clock
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
@@ -157,7 +158,7 @@ class KrylovTangent(TangentOperator):
 
     def _run_gmres(self) -> None:
         """Improve the left vector for the right one; whether it is good enough is measured by the callers."""
-        with pass_over_divergence():
+        with clock.piece("GMRES", 8.0 * self._right.getLocalSize()), pass_over_divergence():
             self._solver.solve(self._right, self._left)
 
     def _widen(self) -> bool:

@@ -19,6 +19,7 @@ from scipy import sparse
 
 from pbem.arrays import Integer, Real
 from pbem.bem.operator import Block, RowOperator
+from pbem.clock import clock
 from pbem.parallel import gather_parts
 from pbem.solve.petsc.linear import LinearSolver, choose_method
 from pbem.solve.problem.problem import Problem
@@ -118,12 +119,14 @@ class Reference:
         kept = self.kept
         chosen = [columns[kept[columns]] for columns in self.block_unknowns]
         wanted = [np.flatnonzero(kept[self.own][block.rows]) for block in self.operator.blocks]
-        if self.solver.method == "lu":
-            self._fill_dense(constraints, wanted)
-        else:
-            self._fill_sparse(constraints, chosen, wanted)
-        self.free_blocks = self._invert_free_blocks(constraints)
-        self.solver.factorise()
+        with clock.piece("matrix"):
+            if self.solver.method == "lu":
+                self._fill_dense(constraints, wanted)
+            else:
+                self._fill_sparse(constraints, chosen, wanted)
+            self.free_blocks = self._invert_free_blocks(constraints)
+        with clock.piece("factors", 8.0 * len(self.kept_rows) * int(kept.sum())):
+            self.solver.factorise()
 
     def _fill_dense(self, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
         """Columns of all rows at a time, as they may have to change ranks."""
@@ -178,11 +181,13 @@ class Reference:
 
         most: iterations. Raises ConvergenceError ("linear solver").
         """
-        return self._complete(rhs[:, None], self.solver.solve(rhs[self.kept_rows], most)[:, None])[:, 0]
+        with clock.piece("GMRES", rhs.nbytes):
+            return self._complete(rhs[:, None], self.solver.solve(rhs[self.kept_rows], most)[:, None])[:, 0]
 
     def solve_columns(self, rhs: Real) -> Real:
         """This rank's rows (rows, k) of the solutions for many right-hand sides, by the factors alone."""
-        return self._complete(rhs, self.solver.solve_columns(rhs[self.kept_rows]))
+        with clock.piece("columns", rhs.nbytes):
+            return self._complete(rhs, self.solver.solve_columns(rhs[self.kept_rows]))
 
     def _complete(self, rhs: Real, kept: Real) -> Real:
         """Add the eliminated unknowns (rows, k) to the solution for the others (theory, 60)."""

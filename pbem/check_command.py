@@ -1,0 +1,57 @@
+"""`pbem check`: is a case right, what would be computed, and what would that take?"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from pathlib import Path
+
+from pbem.errors import LaunchError
+
+
+def add_check_options(parser: argparse.ArgumentParser) -> None:
+    """The options of the command."""
+    parser.add_argument("case", metavar="CASE")
+    parser.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
+    parser.add_argument("--ranks", type=_read_ranks, default=1, metavar="N", help="forecast a run on N ranks")
+    parser.add_argument("--json", action="store_true", help="the same for programs: one JSON object")
+
+
+def _read_ranks(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text) <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"found {text!r}; expected a whole number from 1 on")
+    return int(text)
+
+
+def check(case: Path, ranks: int, as_json: bool, plot: str | None) -> str:
+    """What is printed of a case.
+
+    Raises CaseError with all its faults, LaunchError where there is not the memory for it or too little of it to share.
+    """
+    from pbem.case.build import read_checked_model
+    from pbem.forecast.forecast import make_forecast, refuse_memory
+    from pbem.forecast.limits import is_allowed, read_limits
+    from pbem.mesh.generate import generate_mesh
+    from pbem.results.model_summary import summarise_model
+    from pbem.results.model_text import describe_model
+    from pbem.results.output import check_picture_path
+
+    model = read_checked_model(case)
+    if plot:
+        check_picture_path(plot)
+    mesh = generate_mesh(model)
+    forecast = make_forecast(model, mesh, ranks)
+    refusal = refuse_memory(forecast, ranks, read_limits(os.environ))
+    if refusal and not is_allowed(os.environ):
+        raise LaunchError(f"{case}: {refusal}")
+    if as_json:
+        text = json.dumps(summarise_model(model, mesh, forecast), indent=1)
+    else:
+        text = describe_model(model, mesh, forecast)
+    if plot:
+        from pbem.results.plots import plot_model
+
+        plot_model(model, mesh, plot)
+        text += "" if as_json else f"\n\npicture: {plot}"
+    return text

@@ -1,0 +1,76 @@
+"""How fast this machine is, found in about two seconds: a kernel, a factorisation, a product, and Python itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import lapack
+
+from pbem.bem.operator import assemble_rows
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+
+# Sizes of the samples: each takes some ten milliseconds, so that on a machine with other work some of them are not
+# interrupted, and the fastest of them counts.
+KERNEL_ENTRIES, FACTOR_SIZE, PRODUCT_SIZE, LOOPS = 2e5, 1200, 1500, 40_000
+REPEATS, PATIENCE = 8, 0.4
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Seconds: of an entry of the operator, of an operation of a factorisation, of a byte that a product reads, and of
+    Python's own work, relative to the machine of the measurements in pbem.forecast.forecast."""
+
+    entry: float
+    operation: float
+    byte: float
+    python: float
+
+
+# Seconds of the loop of _loop where the constants of the forecast were measured.
+LOOP_SECONDS = 1.46e-3
+
+
+def measure_speed(model: Model, mesh: Mesh) -> Speed:
+    """Time small samples of what a run does; the kernels are timed on the model's own elements."""
+    region = int(np.bincount(mesh.node_region).argmax())
+    nodes = np.flatnonzero(mesh.node_region == region)
+    needed = np.ones(4 * mesh.nodes, dtype=bool)
+    materials = [each.material for each in model.regions]
+    rows = int(np.clip(KERNEL_ENTRIES / (8 * len(nodes)), 1, len(nodes)))
+    first = int(nodes[(len(nodes) - rows) // 2])
+    last = min(first + rows, mesh.nodes)
+    made = assemble_rows(mesh, materials, first, last, needed, model.size)
+    entries = sum(block.matrix.size for block in made.blocks)
+    matrix = np.asfortranarray(np.random.default_rng(1).standard_normal((FACTOR_SIZE, FACTOR_SIZE)))
+    large, vector = np.ones((PRODUCT_SIZE, PRODUCT_SIZE)), np.ones(PRODUCT_SIZE)
+    return Speed(
+        _time(lambda: assemble_rows(mesh, materials, first, last, needed, model.size)) / max(entries, 1),
+        _time(lambda: lapack.dgetrf(matrix)) / (2 / 3 * FACTOR_SIZE**3),
+        _time(lambda: large @ vector) / large.nbytes,
+        _time(_loop) / LOOP_SECONDS,
+    )
+
+
+def _loop() -> int:
+    total = 0
+    for number in range(LOOPS):
+        total += number & 7
+    return total
+
+
+def _time(action: Callable[[], object]) -> float:
+    """Seconds of the fastest of some calls, without those in which the processor did something else."""
+    best, begun = np.inf, time.perf_counter()
+    for _ in range(REPEATS):
+        begin, worked = time.perf_counter(), time.process_time()
+        action()
+        end = time.perf_counter()
+        # With threads the processors' time is the longer one.
+        best = min(best, end - begin, time.process_time() - worked)
+        if end - begun > PATIENCE:
+            break
+    return float(best)

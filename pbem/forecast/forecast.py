@@ -1,0 +1,135 @@
+"""The forecast of a run's memory, time and disk, and what is said when there is not the memory for it.
+
+What is stored and computed is counted (pbem.forecast.work), how fast is measured (pbem.forecast.calibration); how often
+Newton's method and GMRES iterate cannot be known, and is taken as usual. scripts/study_forecast.py compares forecasts
+with runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pbem.bem.operator_choice import choose_operator
+from pbem.forecast.calibration import Speed, measure_speed
+from pbem.forecast.disk import count_disk
+from pbem.forecast.limits import OVERRIDE, Limit
+from pbem.forecast.usual import (
+    STARTED,
+    Changes,
+    expect_changes,
+    list_memory,
+    list_overhead,
+    list_seconds,
+    measure_size,
+)
+from pbem.forecast.work import count_work
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import coarsen_model
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Of a run on some ranks.
+
+    memory: bytes of all ranks together, by what they are for; rank_memory: of the rank that has most. seconds: of wall
+    time on a core for each rank, by piece; disk: bytes of the result file. passes: whether `analysis.accuracy` asks for
+    further solutions on finer meshes, which are not forecast. speed: None where it was not measured, and there are no
+    seconds.
+    """
+
+    ranks: int
+    unknowns: int
+    operator: str
+    memory: dict[str, float]
+    rank_memory: float
+    seconds: dict[str, float]
+    disk: float
+    passes: bool
+    speed: Speed | None = None
+
+    @property
+    def whole_memory(self) -> float:
+        """Bytes of all ranks."""
+        return sum(self.memory.values())
+
+    def to_plain(self) -> dict[str, Any]:
+        """For programs."""
+        return {
+            "ranks": self.ranks, "unknowns": self.unknowns, "operator": self.operator, "memory": self.whole_memory,
+            "memory_by_use": self.memory, "rank_memory": self.rank_memory, "seconds": sum(self.seconds.values()),
+            "seconds_by_piece": self.seconds, "disk": self.disk, "first_pass_only": self.passes,
+        }  # fmt: skip
+
+
+def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> Forecast:
+    """Forecast a run on so many ranks; timed: with seconds, for which the machine's speed is measured."""
+    size = measure_size(model, mesh.nodes)
+    work = count_work(model, mesh)
+    coarse = coarsen_model(model)
+    second = None if coarse is None else count_work(coarse.model, generate_mesh(coarse.model))
+    changes = expect_changes(model, mesh, work.pairs)
+    # The second solution begins from the statuses of the first.
+    settled = Changes(float(size.steps), 0.0)
+    memory = {"programs and libraries": STARTED * ranks, **list_memory(work, ranks, changes.part)}
+    if second is not None:
+        memory["second solution, for the estimate"] = sum(list_memory(second, ranks, 0.0).values())
+    speed = measure_speed(model, mesh) if timed else None
+    seconds: dict[str, float] = {}
+    if speed is not None:
+        seconds = list_overhead(size, speed) | list_seconds(work, size, ranks, speed, changes)
+        if second is not None:
+            seconds["estimate"] = sum(list_seconds(second, size, ranks, speed, settled).values())
+    return Forecast(
+        ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
+        memory=memory, rank_memory=sum(memory.values()) / ranks, seconds=seconds, disk=count_disk(model, mesh),
+        passes=model.analysis.accuracy is not None, speed=speed,
+    )  # fmt: skip
+
+
+# Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes.
+MOST_DENSE, MOST_HIERARCHICAL = 120.0, 60e3
+
+
+def exceeds_at_most(model: Model, mesh: Mesh, ranks: int, granted: float) -> bool:
+    """Whether it takes a forecast to know that a rank has enough; granted: bytes for each rank."""
+    unknowns = 2.0 * mesh.nodes
+    hierarchical = choose_operator(model, mesh).name == "hierarchical"
+    most = MOST_HIERARCHICAL * unknowns if hierarchical else MOST_DENSE * unknowns**2
+    return 2 * STARTED + most > granted
+
+
+def note_memory(forecast: Forecast, ranks: int, available: float | None) -> str | None:
+    """What to tell when the ranks of a node need more than can be had there now; None if it is enough."""
+    needed = forecast.whole_memory * ranks / forecast.ranks
+    if available is None or needed <= available:
+        return None
+    return (f"the run will take about {needed / 1e9:.3g} GB on {count(ranks)}, but {available / 1e9:.3g} GB can be had "
+            "now: others use the rest")
+
+
+def count(ranks: int) -> str:
+    """So many ranks."""
+    return f"{ranks} rank{'s' * (ranks != 1)}"
+
+
+def refuse_memory(forecast: Forecast, ranks: int, limits: Sequence[Limit]) -> str | None:
+    """What to say when the ranks of a node need more than it grants; None if it is enough. ranks: of this node.
+
+    limits: of the node, the least first.
+    """
+    needed = forecast.whole_memory * ranks / forecast.ranks
+    if not limits or needed <= limits[0].bytes:
+        return None
+    where = count(ranks)
+    where += f" of {forecast.ranks}" if ranks != forecast.ranks else ""
+    least = limits[0]
+    return (
+        f"not enough memory: the run would take about {needed / 1e9:.3g} GB on {where}, but {least.source} grants "
+        f"{least.bytes / 1e9:.3g} GB.\n  Fewer unknowns than the {forecast.unknowns}, more nodes"
+        + ("" if forecast.operator == "hierarchical" else ', or solver.operator = "hierarchical"')
+        + f" need less; {OVERRIDE}=1 runs it all the same"
+    )

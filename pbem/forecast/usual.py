@@ -1,0 +1,153 @@
+"""What cannot be counted: constants that were measured, and how often Newton's method and GMRES iterate as a rule.
+
+Seconds are of the machine on which pbem.forecast.calibration.LOOP_SECONDS was measured; the rates of kernels,
+factorisations and products are those of the machine at hand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.arrays import Real
+from pbem.contact.laws import find_joint
+from pbem.forecast.calibration import Speed
+from pbem.forecast.disk import count_stored_steps
+from pbem.forecast.work import Work
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+
+# Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps.
+STARTED, EVERYWHERE = 150e6, 2300.0
+# Columns that are formed and solved for at a time (see pbem.solve.tangent), and how many copies of them there are.
+AT_ONCE, COPIES, SHARED = 512, 4.0, 0.5
+# Of the hierarchical operator near blocks, and groups' inverses, to what is counted; of MUMPS' factors likewise.
+NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
+
+# Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
+# step of the first stage, in which loads grow in proportion; of a step of a further stage.
+SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
+# Factorisations where they may be made anew, iterations of GMRES in a system, products beside those.
+FACTORISATIONS, GMRES, PRODUCTS = 2.0, 8.0, 3.0
+# Part of the changeable pairs whose columns are asked for at most, where they are not all computed at once.
+CHANGING = 0.35
+
+# Seconds: of the start; of a vector's entry in an iteration; of an entry in a product, shared and on every rank; of an
+# unknown in the preconditioner; of a call of a library that shares matrices; of an interior point and a node.
+START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 1.4e-6, 0.6e-6, 5e-6, 0.1, 0.15e-6
+# Of an unknown in the assembly of the hierarchical operator.
+PLACED = 40e-6
+# To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
+ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, SPARSE, COLUMN = 0.65, 2.0, 110.0, 0.5, 1.0, 3.5, 0.5
+
+
+@dataclass(frozen=True)
+class Size:
+    """Of a model: its curves, regions, nodes, load steps, those that are stored, stages, and interior points."""
+
+    curves: int
+    regions: int
+    nodes: int
+    steps: int
+    stored: int
+    stages: int
+    points: int
+
+
+def measure_size(model: Model, nodes: int) -> Size:
+    """The numbers that follow from the model, and its nodes."""
+    steps = sum(stage.steps for stage in model.stages)
+    return Size(len(model.curves), len(model.regions), nodes, steps, count_stored_steps(model), len(model.stages),
+                len(model.interior_points))
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Newton iterations of all steps, and the part of the changeable pairs whose status is going to change, as a rule.
+    """
+
+    iterations: float
+    part: float
+
+
+def expect_changes(model: Model, mesh: Mesh, pairs: int) -> Changes:
+    """What the stress far away asks of each pair, as if it were alone; without such a stress what is usual.
+
+    pairs: that can change their status.
+    """
+    first, further = model.stages[0], sum(stage.steps for stage in model.stages[1:])
+    remote = np.array([stage.remote for stage in model.stages])
+    number, part = UNKNOWN, 1.0
+    if remote.any() and not model.conditions and pairs:
+        part, opened = _judge_pairs(model, mesh, remote[np.abs(remote).sum(axis=1).argmax()])
+        number = OPENING if opened else SLIPPING if part else 1.0
+    if not pairs or not part:
+        return Changes(float(first.steps + further), 0.0)
+    return Changes(number + ALIKE * (first.steps - 1) + FURTHER * further, part)
+
+
+def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
+    """The part of all pairs that slip or open, but began otherwise, and whether some open. stress: sxx, syy, sxy."""
+    laws = [find_joint(model, name).law for name in mesh.interface_names]
+    of = mesh.pairs.interface
+    friction, bound, tension = (
+        np.array([getattr(law, name) for law in laws])[of] for name in ("friction", "cohesion", "tensile_strength")
+    )
+    fixed = np.array([law.kind in ("bonded", "open") for law in laws])[of]
+    n = mesh.pairs.normal
+    pull = (stress[0] * n.real + stress[2] * n.imag) + 1j * (stress[2] * n.real + stress[1] * n.imag)
+    t_n, t_s = (pull * n.conj()).real, np.abs((pull * n.conj()).imag)
+    opens = ~fixed & (t_n > tension)
+    slips = ~fixed & ~opens & (t_s > bound - friction * t_n) & ((friction > 0) | (bound > 0))
+    return float((opens | slips).sum()) / max(int((~fixed).sum()), 1), bool(opens.any())
+
+
+def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
+    """Bytes over all ranks by use, without the processes themselves; part: of the pairs, see Changes."""
+    if work.hierarchical:
+        return {"operator": 8 * NEAR_MEMORY * work.entries, "preconditioner": 8 * INVERSES * work.factored,
+                "mesh and vectors": EVERYWHERE * ranks * work.unknowns}
+    changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
+    factors = SPARSE_FACTORS * work.factored if work.sparse else 0.0
+    return {
+        "operator": 8 * (work.entries + work.besides),
+        "tangent operator": 8 * (work.formed + factors),
+        "columns of pairs": 8 * work.unknowns * (work.columns + changing),
+        "columns at a time": 8 * AT_ONCE * COPIES * work.unknowns * ranks**SHARED,
+        "mesh and vectors": EVERYWHERE * ranks * work.unknowns,
+    }  # fmt: skip
+
+
+def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Changes) -> dict[str, float]:
+    """Seconds of one problem by piece."""
+    python, share = speed.python, 1.0 / ranks
+    iterations = changes.iterations
+    vectors = python * VECTOR * iterations * work.unknowns
+    if work.hierarchical:
+        products = iterations * (GMRES + PRODUCTS)
+        return {
+            "assembly": (NEAR * speed.entry * work.entries + PLACED * python * work.unknowns) * share,
+            "steps": vectors + python * work.unknowns * (
+                products * (PRODUCT * share + PRODUCT_ALONE) + iterations * INVERSE * share),
+        }  # fmt: skip
+    factors = 1.0 if work.columns or not changes.part else FACTORISATIONS
+    columns = work.columns or 2.0 * min(changes.part, CHANGING) * work.pairs
+    rate = speed.operation * (SPARSE if work.sparse else FACTOR if ranks == 1 else FACTOR_SHARED) * share
+    return {
+        "assembly": ENTRY * speed.entry * (work.entries + work.besides) * share,
+        "steps": vectors + factors * (FORMED * speed.byte * 8 * work.formed * share + rate * work.operations
+                                      + (CALL * python if ranks > 1 or work.sparse else 0.0))
+        + COLUMN * speed.operation * 2 * work.factored * columns * share,
+    }  # fmt: skip
+
+
+def list_overhead(size: Size, speed: Speed) -> dict[str, float]:
+    """Seconds of what is done beside the solutions, by the first rank or by all alike."""
+    python = speed.python
+    return {
+        "start": python * START,
+        "reading": python * (1e-3 * size.curves + 15e-3 * (size.regions - 1) + 25e-6 * size.nodes),
+        "evaluation": python * size.stored * size.points * POINT * size.nodes,
+        "writing": python * (0.1 + 0.04 * size.stored + (60e-6 + 15e-6 * size.stored) * size.nodes),
+    }

@@ -1,0 +1,68 @@
+"""What of a model is right, but probably not meant."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from pbem.contact.laws import find_joint
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.mortar_pairs import FEWEST
+from pbem.model.model import Contact, Model
+from pbem.results.law_text import name_many
+
+
+def list_doubts(model: Model, mesh: Mesh) -> list[str]:
+    """A sentence for each: friction that was forgotten, no load at all, contact on fewer elements than resolve it."""
+    return [*_find_smooth(model), *_find_unloaded(model), *_find_sparse(model, mesh)]
+
+
+def _find_smooth(model: Model) -> list[str]:
+    names = [
+        name for name in [*model.interfaces, *model.contacts]
+        if (law := find_joint(model, name).law).kind == "coulomb"
+        and not (law.friction or law.cohesion or law.frictionless)
+    ]
+    if not names:
+        return []
+    return [f"{name_many(names)}: Coulomb's law without friction, the default; closed faces slide freely. Give "
+            "`friction` or `friction_angle`, or say law = \"frictionless\" if that is meant."]
+
+
+def _find_unloaded(model: Model) -> list[str]:
+    loads = [
+        [*(value for values in stage.boundary.values() for value in values), *stage.pressure.values(), *stage.remote]
+        for stage in model.stages
+    ]
+    heavy = any(any(stage.gravity) for stage in model.stages) and any(
+        region.material.density for region in model.regions
+    )
+    stressed = any(any(stress) for stress in model.initial_stress.values())
+    if heavy or stressed or any(map(any, loads)):
+        return []
+    return ["nothing loads the model: no prescribed displacement, traction, pressure, remote stress, weight or in-situ "
+            "stress other than zero. All results will be zero."]
+
+
+def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
+    """Contacts are told of by the mesh (see pbem.mesh.mortar_pairs)."""
+    element = mesh.pairs.slave // (mesh.order + 1)
+    found: dict[int, list[str]] = {}
+    sizes = [np.unique(element[part]).size for part in _split(mesh)]
+    for name, count in zip(mesh.interface_names, sizes, strict=True):
+        joint = find_joint(model, name)
+        if isinstance(joint, Contact) or joint.law.kind in ("bonded", "open"):
+            continue
+        if 0 < count < FEWEST:
+            found.setdefault(count, []).append(name)
+    return [
+        f"{name_many(names)}: contact on {count} element{'s' * (count != 1)}, which do not resolve its pressure; "
+        f"{FEWEST} or more are needed." for count, names in sorted(found.items())
+    ]
+
+
+def _split(mesh: Mesh) -> list[np.ndarray]:
+    """Places of the pairs of each interface, which are neighbours."""
+    ends = np.searchsorted(mesh.pairs.interface, np.arange(len(mesh.interface_names) + 1))
+    return [np.arange(first, last) for first, last in pairwise(ends)]

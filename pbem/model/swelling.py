@@ -13,6 +13,7 @@ from pbem.description.schema import EigenstrainTable, MaterialTable, StageTable
 from pbem.description.varying import ExpressionTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.expression import ExpressionError
+from pbem.geometry.junction import format_point
 from pbem.model.linear import fit_linear
 from pbem.model.roles import unknown_name
 
@@ -51,6 +52,15 @@ class Swelling:
             tuple(a + part * (b - a) for a, b in zip(self.strain, other.strain, strict=True)),  # type: ignore[arg-type]
             self.growth + part * (other.growth - self.growth), center,
         )
+
+    def describe(self, origin: complex) -> str:
+        """In words; origin: of the model, in the user's coordinates."""
+        text = "exx, eyy, exy = {:g}, {:g}, {:g}".format(*self.strain)
+        if not self.growth:
+            return text
+        slopes = (("x", self.growth.real), ("y", self.growth.imag))
+        grown = "".join(f", {slope:+g} per {axis}" for axis, slope in slopes if slope)
+        return f"{text} at {format_point(self.center + origin)}{grown}"
 
     def move(self, shift: complex) -> Swelling:
         """The same about another origin: the places of the model have become less by the shift."""

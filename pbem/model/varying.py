@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +65,13 @@ class Places:
 def evaluate(value: Value, places: Places, time: float = 0.0) -> Real:
     """The value at places (k,)."""
     return value.evaluate(places, time) if isinstance(value, Varying) else np.full(places.point.shape, float(value))
+
+
+def to_plain(value: Value | None) -> Any:
+    """As it is written in a case."""
+    if not isinstance(value, Varying):
+        return value
+    return {"expression": value.expression} if value.expression else {"table": [list(row) for row in value.table]}
 
 
 def negate(value: Value) -> Value:

@@ -38,7 +38,8 @@ def _find_unloaded(model: Model) -> list[str]:
     heavy = any(any(stage.gravity) for stage in model.stages) and any(
         region.material.density for region in model.regions
     )
-    stressed = any(any(stress) for stress in model.initial_stress.values())
+    stressed = not all(stress.is_zero for stress in model.initial_stress.values())
+    stressed |= any(not each.is_zero for stage in model.stages for each in stage.swelling.values())
     if heavy or stressed or any(map(any, loads)):
         return []
     return ["nothing loads the model: no prescribed displacement, traction, pressure, remote stress, weight or in-situ "

@@ -9,6 +9,7 @@ from typing import Any
 
 from pbem.contact.laws import find_joint
 from pbem.model.model import Contact, Law, Model
+from pbem.model.varying import Value, to_plain
 from pbem.results.tables import count, shorten
 
 # A piece of a trace that was cut is called TRACE.NUMBER.
@@ -29,7 +30,7 @@ class LawOfMany:
     """
 
     law: Law
-    pressure: tuple[float, ...]
+    pressure: tuple[Value, ...]
     kind: str
     names: tuple[str, ...]
 
@@ -73,7 +74,7 @@ def _make_row(each: LawOfMany) -> list[str]:
     joint = ", ".join("rigid" if value is None else f"{value:g}" for value in stiffness) if any(stiffness) else "rigid"
     parts = [law.kind, *([law.file] if law.file else []),
              *(f"{name} {value:g}" for name, value in law.parameters.items())]
-    gap = f'"{law.gap}"' if isinstance(law.gap, str) else f"{law.gap:g}"
+    gap = f"{law.gap:g}"
     pressure = [f"{value:g}" for value in each.pressure]
     told = ", ".join(pressure[:1] if len(set(pressure)) == 1 else shorten(pressure, MOST_NAMES))
     told += " in closed parts too" if any(each.pressure) and law.pressurised == "all" else ""
@@ -120,8 +121,8 @@ def summarise_laws(model: Model) -> list[dict[str, Any]]:
     """The laws as plain values: the names that have each, and all its numbers."""
     result = []
     for each in collect_equal_laws(model):
-        law: dict[str, Any] = {name: getattr(each.law, name) for name in _FIELDS}
+        law: dict[str, Any] = {name: to_plain(getattr(each.law, name)) for name in _FIELDS}
         parameters: Mapping[str, float] = each.law.parameters
         result.append({"of": list(each.names), "on": each.kind, **law, "parameters": dict(parameters),
-                       "pressure": list(each.pressure)})
+                       "pressure": [*map(to_plain, each.pressure)]})
     return result

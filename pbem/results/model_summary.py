@@ -10,6 +10,7 @@ from pbem.bem.operator_choice import choose_operator
 from pbem.forecast.forecast import Forecast
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Model, Region
+from pbem.model.varying import to_plain
 from pbem.results.doubts import list_doubts
 from pbem.results.law_text import summarise_laws
 from pbem.results.model_text import find_least_distance
@@ -47,14 +48,17 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
         "laws": summarise_laws(model),
         "stages": [
             {"name": stage.name, "steps": stage.steps, "duration": stage.duration,
-             "boundary": {name: list(values) for name, values in stage.boundary.items()},
-             "pressure": {name: value for name, value in stage.pressure.items() if value},
+             "boundary": {name: [*map(to_plain, values)] for name, values in stage.boundary.items()},
+             "pressure": {name: to_plain(value) for name, value in stage.pressure.items() if value},
              "remote": dict(zip(("sxx", "syy", "sxy"), stage.remote, strict=True)),
-             "gravity": dict(zip(("gx", "gy"), stage.gravity, strict=True))}
+             "gravity": dict(zip(("gx", "gy"), stage.gravity, strict=True)),
+             "swelling": {name: each.describe(model.origin) for name, each in stage.swelling.items()}}
             for stage in model.stages
         ],
         "initial_stress": {
-            name: dict(zip(("sxx", "syy", "sxy"), stress, strict=True)) for name, stress in model.initial_stress.items()
+            name: dict(zip(("sxx", "syy", "sxy"),
+                           stress.value if stress.is_uniform else stress.describe(model.origin), strict=True))
+            for name, stress in model.initial_stress.items()
         },
         "size": {
             "elements": mesh.elements, "order": mesh.order, "nodes": mesh.nodes, "unknowns": 2 * mesh.nodes,
@@ -82,7 +86,7 @@ def _list_condition(model: Model, condition: Condition) -> dict[str, Any]:
     return {
         names[i]: {
             "known": condition.known[i], "stiffness": condition.stiffness[i],
-            "values": [stage.boundary.get(condition.curve, (0.0, 0.0))[i] for stage in model.stages],
+            "values": [to_plain(stage.boundary.get(condition.curve, (0.0, 0.0))[i]) for stage in model.stages],
         }
         for i in range(2)
     }

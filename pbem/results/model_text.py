@@ -141,12 +141,7 @@ def describe_law(law: Law) -> str:
         return ", ".join([law.kind, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())])
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
-    return ", ".join([*given, *([f"gap {_describe_gap(law.gap)}"] if law.gap else [])])
-
-
-def _describe_gap(gap: float | str) -> str:
-    """A number, or the expression in quotes."""
-    return f'"{gap}"' if isinstance(gap, str) else f"{gap:.4g}"
+    return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
 
 
 def _describe_loads(model: Model) -> list[str]:
@@ -164,8 +159,11 @@ def _describe_loads(model: Model) -> list[str]:
         parts += shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
         lines.append(", ".join(parts))
         lines += [f"    {text}" for text in shorten(_describe_boundary(model, stage), 12)]
+        swelling = [f"{name}: strain without stress {each.describe(model.origin)}"
+                    for name, each in stage.swelling.items() if not each.is_zero]
+        lines += [f"    {text}" for text in shorten(swelling, 12)]
     for name, stress in model.initial_stress.items():
-        lines.append("in-situ stress of {}: sxx, syy, sxy = {:g}, {:g}, {:g}".format(name, *stress))
+        lines.append("in-situ stress of {}: sxx, syy, sxy = {}, {}, {}".format(name, *stress.describe(model.origin)))
     return lines
 
 

@@ -19,9 +19,10 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
 # Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps.
-STARTED, EVERYWHERE = 150e6, 2300.0
-# Columns that are formed and solved for at a time (see pbem.solve.tangent), and how many copies of them there are.
-AT_ONCE, COPIES, SHARED = 512, 4.0, 0.5
+STARTED, EVERYWHERE = 145e6, 2300.0
+# Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
+# pair changes, and where some do; and how their number grows with that of the ranks.
+AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
 # Of the hierarchical operator near blocks, and groups' inverses, to what is counted; of MUMPS' factors likewise.
 NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
 
@@ -110,11 +111,12 @@ def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
                 "mesh and vectors": EVERYWHERE * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
     factors = SPARSE_FACTORS * work.factored if work.sparse else 0.0
+    copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
     return {
         "operator": 8 * (work.entries + work.besides),
         "tangent operator": 8 * (work.formed + factors),
         "columns of pairs": 8 * work.unknowns * (work.columns + changing),
-        "columns at a time": 8 * AT_ONCE * COPIES * work.unknowns * ranks**SHARED,
+        "columns at a time": 8 * min(AT_ONCE, work.unknowns / 2) * copies * work.unknowns * ranks**SHARED,
         "mesh and vectors": EVERYWHERE * ranks * work.unknowns,
     }  # fmt: skip
 

@@ -50,7 +50,7 @@ def collect_equal_laws(model: Model) -> list[LawOfMany]:
 # All that tells one law from another, but for the parameters.
 _FIELDS = (
     "kind", "friction", "cohesion", "tensile_strength", "gap", "pressurised", "cohesion_lost", "friction_dynamic",
-    "slip_distance", "normal_stiffness", "tangential_stiffness", "file",
+    "slip_distance", "normal_stiffness", "tangential_stiffness", "file", "frictionless",
 )  # fmt: skip
 
 
@@ -71,7 +71,8 @@ def _make_row(each: LawOfMany) -> list[str]:
         weakening.append("strength lost at first failure")
     stiffness = (law.normal_stiffness, law.tangential_stiffness)
     joint = ", ".join("rigid" if value is None else f"{value:g}" for value in stiffness) if any(stiffness) else "rigid"
-    parts = [law.kind, *([law.file] if law.file else []),
+    smooth = known and law.frictionless and not law.cohesion
+    parts = ["frictionless" if smooth else law.kind, *([law.file] if law.file else []),
              *(f"{name} {value:g}" for name, value in law.parameters.items())]
     gap = f'"{law.gap}"' if isinstance(law.gap, str) else f"{law.gap:g}"
     pressure = [f"{value:g}" for value in each.pressure]

@@ -29,8 +29,9 @@ NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
 # step of the first stage, in which loads grow in proportion; of a step of a further stage.
 SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
-# Factorisations where they may be made anew, iterations of GMRES in a system, products beside those.
-FACTORISATIONS, GMRES, PRODUCTS = 2.0, 8.0, 3.0
+# Factorisations where they may be made anew; iterations of GMRES in a system, where nothing changes, and products beside
+# those.
+FACTORISATIONS, FACTORISATIONS_UNKNOWN, GMRES, GMRES_SETTLED, PRODUCTS = 2.0, 1.4, 8.0, 3.0, 3.0
 # Part of the changeable pairs whose columns are asked for at most, where they are not all computed at once.
 CHANGING = 0.35
 
@@ -65,11 +66,12 @@ def measure_size(model: Model, nodes: int) -> Size:
 
 @dataclass(frozen=True)
 class Changes:
-    """Newton iterations of all steps, and the part of the changeable pairs whose status is going to change, as a rule.
-    """
+    """Newton iterations of all steps, the part of the changeable pairs whose status is going to change, and how often
+    the tangent operator is factorised, where its factors may be made anew; as a rule."""
 
     iterations: float
     part: float
+    factorisations: float = 1.0
 
 
 def expect_changes(model: Model, mesh: Mesh, pairs: int) -> Changes:
@@ -79,13 +81,13 @@ def expect_changes(model: Model, mesh: Mesh, pairs: int) -> Changes:
     """
     first, further = model.stages[0], sum(stage.steps for stage in model.stages[1:])
     remote = np.array([stage.remote for stage in model.stages])
-    number, part = UNKNOWN, 1.0
+    number, part, factors = UNKNOWN, 1.0, FACTORISATIONS_UNKNOWN
     if remote.any() and not model.conditions and pairs:
         part, opened = _judge_pairs(model, mesh, remote[np.abs(remote).sum(axis=1).argmax()])
-        number = OPENING if opened else SLIPPING if part else 1.0
+        number, factors = OPENING if opened else SLIPPING if part else 1.0, FACTORISATIONS
     if not pairs or not part:
         return Changes(float(first.steps + further), 0.0)
-    return Changes(number + ALIKE * (first.steps - 1) + FURTHER * further, part)
+    return Changes(number + ALIKE * (first.steps - 1) + FURTHER * further, part, factors)
 
 
 def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
@@ -127,13 +129,13 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
     iterations = changes.iterations
     vectors = python * VECTOR * iterations * work.unknowns
     if work.hierarchical:
-        products = iterations * (GMRES + PRODUCTS)
+        products = iterations * ((GMRES if changes.part else GMRES_SETTLED) + PRODUCTS)
         return {
             "assembly": (NEAR * speed.entry * work.entries + PLACED * python * work.unknowns) * share,
             "steps": vectors + python * work.unknowns * (
                 products * (PRODUCT * share + PRODUCT_ALONE) + iterations * INVERSE * share),
         }  # fmt: skip
-    factors = 1.0 if work.columns or not changes.part else FACTORISATIONS
+    factors = 1.0 if work.columns else changes.factorisations
     columns = work.columns or 2.0 * min(changes.part, CHANGING) * work.pairs
     rate = speed.operation * (SPARSE if work.sparse else FACTOR if ranks == 1 else FACTOR_SHARED) * share
     return {

@@ -29,8 +29,8 @@ NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
 # step of the first stage, in which loads grow in proportion; of a step of a further stage.
 SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
-# Factorisations where they may be made anew; iterations of GMRES in a system, where nothing changes, and products beside
-# those.
+# Factorisations where they may be made anew, and where nobody knows; iterations of GMRES in a system, and where nothing
+# changes; products beside those.
 FACTORISATIONS, FACTORISATIONS_UNKNOWN, GMRES, GMRES_SETTLED, PRODUCTS = 2.0, 1.4, 8.0, 3.0, 3.0
 # Part of the changeable pairs whose columns are asked for at most, where they are not all computed at once.
 CHANGING = 0.35

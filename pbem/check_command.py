@@ -27,7 +27,7 @@ def _read_ranks(text: str) -> int:
 def check(case: Path, ranks: int, as_json: bool, plot: str | None) -> str:
     """What is printed of a case.
 
-    Raises CaseError with all its faults, LaunchError where there is not the memory for it or too little of it to share.
+    Raises CaseError with all its faults, LaunchError where there is not the memory for it.
     """
     from pbem.case.build import read_checked_model
     from pbem.forecast.forecast import make_forecast, refuse_memory

@@ -70,22 +70,27 @@ def run(
     """
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
+    path = find_file(case)
+    name = UNNAMED if path is None else str(path)
     try:
-        with abort_if_unexpected(world, PbemError), StopSignals() as signals:
-            placement = check_start(world)
+        with (
+            abort_if_unexpected(world, PbemError), StopSignals() as signals, petsc_log(name, petsc or {}) as log
+        ):  # fmt: skip
+            with clock.piece("start"):
+                placement = check_start(world)
             signals.at_once = world.size == 1
-            path = find_file(case)
-            name = UNNAMED if path is None else str(path)
             with clock.piece("reading"):
                 model = do_on_first(world, PbemError, lambda: _make_model(case, name, operator))
             target = Path(output) if output is not None else Path("case.h5" if path is None else path.stem + ".h5")
             inputs = [*([path] if path else []), *map(Path, model.law_texts)]
-            do_on_first(world, PbemError, lambda: check_output_path(
-                target, resume=resume, force=force, source=model.source, inputs=inputs))
-            do_on_first(world, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
+            with clock.piece("reading"):
+                do_on_first(world, PbemError, lambda: check_output_path(
+                    target, resume=resume, force=force, source=model.source, inputs=inputs))
+                do_on_first(world, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
             watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)
             options = {**model.solver.petsc, **(petsc or {})}
-            with petsc_log(options), petsc_options(options):
+            log.obey(name, options)
+            with petsc_options(options):
                 _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement)
             with clock.piece("writing"):
                 results = open_results(target)
@@ -180,9 +185,10 @@ def _solve(
         if told is error:
             raise
         raise told from error
-    if output.former:
-        output.former.drop()
-    world.Barrier()
+    with clock.piece("writing"):
+        if output.former:
+            output.former.drop()
+        world.Barrier()
     return decision
 
 

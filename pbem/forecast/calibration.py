@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from pbem.model.model import Model
 # Sizes of the samples: each takes some ten milliseconds, so that on a machine with other work some of them are not
 # interrupted, and the fastest of them counts.
 KERNEL_ENTRIES, FACTOR_SIZE, PRODUCT_SIZE, LOOPS = 2e5, 1200, 1500, 40_000
-REPEATS, PATIENCE = 8, 0.4
+LEAST_ROUNDS, MOST_ROUNDS, PATIENCE = 3, 12, 1.2
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,12 @@ def measure_speed(model: Model, mesh: Mesh) -> Speed:
     entries = sum(block.matrix.size for block in made.blocks)
     matrix = np.asfortranarray(np.random.default_rng(1).standard_normal((FACTOR_SIZE, FACTOR_SIZE)))
     large, vector = np.ones((PRODUCT_SIZE, PRODUCT_SIZE)), np.ones(PRODUCT_SIZE)
+    entry, factor, product, loop = _time([
+        lambda: assemble_rows(mesh, materials, first, last, needed, model.size), lambda: lapack.dgetrf(matrix),
+        lambda: large @ vector, _loop,
+    ])  # fmt: skip
     return Speed(
-        _time(lambda: assemble_rows(mesh, materials, first, last, needed, model.size)) / max(entries, 1),
-        _time(lambda: lapack.dgetrf(matrix)) / (2 / 3 * FACTOR_SIZE**3),
-        _time(lambda: large @ vector) / large.nbytes,
-        _time(_loop) / LOOP_SECONDS,
+        entry / max(entries, 1), factor / (2 / 3 * FACTOR_SIZE**3), product / large.nbytes, loop / LOOP_SECONDS
     )
 
 
@@ -62,15 +63,15 @@ def _loop() -> int:
     return total
 
 
-def _time(action: Callable[[], object]) -> float:
-    """Seconds of the fastest of some calls, without those in which the processor did something else."""
-    best, begun = np.inf, time.perf_counter()
-    for _ in range(REPEATS):
-        begin, worked = time.perf_counter(), time.process_time()
-        action()
-        end = time.perf_counter()
-        # With threads the processors' time is the longer one.
-        best = min(best, end - begin, time.process_time() - worked)
-        if end - begun > PATIENCE:
-            break
-    return float(best)
+def _time(actions: Sequence[Callable[[], object]]) -> list[float]:
+    """Seconds of the fastest call of each, of rounds of all of them, without time in which the processor did something
+    else."""
+    best, begun, rounds = [np.inf] * len(actions), time.perf_counter(), 0
+    while rounds < LEAST_ROUNDS or (rounds < MOST_ROUNDS and time.perf_counter() - begun < PATIENCE):
+        for number, action in enumerate(actions):
+            begin, worked = time.perf_counter(), time.process_time()
+            action()
+            # With threads the processors' time is the longer one.
+            best[number] = min(best[number], time.perf_counter() - begin, time.process_time() - worked)
+        rounds += 1
+    return [float(seconds) for seconds in best]

@@ -19,17 +19,19 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
 # Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps.
-STARTED, EVERYWHERE = 150e6, 2300.0
-# Columns that are formed and solved for at a time (see pbem.solve.tangent), and how many copies of them there are.
-AT_ONCE, COPIES, SHARED = 512, 4.0, 0.5
+STARTED, EVERYWHERE = 145e6, 2300.0
+# Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
+# pair changes, and where some do; and how their number grows with that of the ranks.
+AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
 # Of the hierarchical operator near blocks, and groups' inverses, to what is counted; of MUMPS' factors likewise.
 NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
 
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
 # step of the first stage, in which loads grow in proportion; of a step of a further stage.
 SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
-# Factorisations where they may be made anew, iterations of GMRES in a system, products beside those.
-FACTORISATIONS, GMRES, PRODUCTS = 2.0, 8.0, 3.0
+# Factorisations where they may be made anew, and where nobody knows; iterations of GMRES in a system, and where nothing
+# changes; products beside those.
+FACTORISATIONS, FACTORISATIONS_UNKNOWN, GMRES, GMRES_SETTLED, PRODUCTS = 2.0, 1.4, 8.0, 3.0, 3.0
 # Part of the changeable pairs whose columns are asked for at most, where they are not all computed at once.
 CHANGING = 0.35
 
@@ -64,11 +66,12 @@ def measure_size(model: Model, nodes: int) -> Size:
 
 @dataclass(frozen=True)
 class Changes:
-    """Newton iterations of all steps, and the part of the changeable pairs whose status is going to change, as a rule.
-    """
+    """Newton iterations of all steps, the part of the changeable pairs whose status is going to change, and how often
+    the tangent operator is factorised, where its factors may be made anew; as a rule."""
 
     iterations: float
     part: float
+    factorisations: float = 1.0
 
 
 def expect_changes(model: Model, mesh: Mesh, pairs: int) -> Changes:
@@ -78,13 +81,13 @@ def expect_changes(model: Model, mesh: Mesh, pairs: int) -> Changes:
     """
     first, further = model.stages[0], sum(stage.steps for stage in model.stages[1:])
     remote = np.array([stage.remote for stage in model.stages])
-    number, part = UNKNOWN, 1.0
+    number, part, factors = UNKNOWN, 1.0, FACTORISATIONS_UNKNOWN
     if remote.any() and not model.conditions and pairs:
         part, opened = _judge_pairs(model, mesh, remote[np.abs(remote).sum(axis=1).argmax()])
-        number = OPENING if opened else SLIPPING if part else 1.0
+        number, factors = OPENING if opened else SLIPPING if part else 1.0, FACTORISATIONS
     if not pairs or not part:
         return Changes(float(first.steps + further), 0.0)
-    return Changes(number + ALIKE * (first.steps - 1) + FURTHER * further, part)
+    return Changes(number + ALIKE * (first.steps - 1) + FURTHER * further, part, factors)
 
 
 def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
@@ -110,11 +113,12 @@ def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
                 "mesh and vectors": EVERYWHERE * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
     factors = SPARSE_FACTORS * work.factored if work.sparse else 0.0
+    copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
     return {
         "operator": 8 * (work.entries + work.besides),
         "tangent operator": 8 * (work.formed + factors),
         "columns of pairs": 8 * work.unknowns * (work.columns + changing),
-        "columns at a time": 8 * AT_ONCE * COPIES * work.unknowns * ranks**SHARED,
+        "columns at a time": 8 * min(AT_ONCE, work.unknowns / 2) * copies * work.unknowns * ranks**SHARED,
         "mesh and vectors": EVERYWHERE * ranks * work.unknowns,
     }  # fmt: skip
 
@@ -125,13 +129,13 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
     iterations = changes.iterations
     vectors = python * VECTOR * iterations * work.unknowns
     if work.hierarchical:
-        products = iterations * (GMRES + PRODUCTS)
+        products = iterations * ((GMRES if changes.part else GMRES_SETTLED) + PRODUCTS)
         return {
             "assembly": (NEAR * speed.entry * work.entries + PLACED * python * work.unknowns) * share,
             "steps": vectors + python * work.unknowns * (
                 products * (PRODUCT * share + PRODUCT_ALONE) + iterations * INVERSE * share),
         }  # fmt: skip
-    factors = 1.0 if work.columns or not changes.part else FACTORISATIONS
+    factors = 1.0 if work.columns else changes.factorisations
     columns = work.columns or 2.0 * min(changes.part, CHANGING) * work.pairs
     rate = speed.operation * (SPARSE if work.sparse else FACTOR if ranks == 1 else FACTOR_SHARED) * share
     return {

@@ -10,7 +10,7 @@ from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.mortar_pairs import FEWEST
 from pbem.model.model import Contact, Model
-from pbem.results.law_text import name_many
+from pbem.results.law_text import find_trace, name_many
 
 
 def list_doubts(model: Model, mesh: Mesh) -> list[str]:
@@ -49,12 +49,14 @@ def _find_unloaded(model: Model) -> list[str]:
 def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
     """Contacts are told of by the mesh (see pbem.mesh.mortar_pairs)."""
     element = mesh.pairs.slave // (mesh.order + 1)
-    found: dict[int, list[str]] = {}
-    sizes = [np.unique(element[part]).size for part in _split(mesh)]
-    for name, count in zip(mesh.interface_names, sizes, strict=True):
+    sizes: dict[str, int] = {}
+    for name, part in zip(mesh.interface_names, _split(mesh), strict=True):
         joint = find_joint(model, name)
-        if isinstance(joint, Contact) or joint.law.kind in ("bonded", "open"):
-            continue
+        if not isinstance(joint, Contact) and joint.law.kind not in ("bonded", "open"):
+            # The pieces of a trace that was cut go on in each other.
+            sizes[find_trace(name)] = sizes.get(find_trace(name), 0) + np.unique(element[part]).size
+    found: dict[int, list[str]] = {}
+    for name, count in sizes.items():
         if 0 < count < FEWEST:
             found.setdefault(count, []).append(name)
     return [

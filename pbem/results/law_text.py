@@ -51,7 +51,7 @@ def collect_equal_laws(model: Model) -> list[LawOfMany]:
 # All that tells one law from another, but for the parameters.
 _FIELDS = (
     "kind", "friction", "cohesion", "tensile_strength", "gap", "pressurised", "cohesion_lost", "friction_dynamic",
-    "slip_distance", "normal_stiffness", "tangential_stiffness", "file",
+    "slip_distance", "normal_stiffness", "tangential_stiffness", "file", "frictionless",
 )  # fmt: skip
 
 
@@ -72,7 +72,8 @@ def _make_row(each: LawOfMany) -> list[str]:
         weakening.append("strength lost at first failure")
     stiffness = (law.normal_stiffness, law.tangential_stiffness)
     joint = ", ".join("rigid" if value is None else f"{value:g}" for value in stiffness) if any(stiffness) else "rigid"
-    parts = [law.kind, *([law.file] if law.file else []),
+    smooth = known and law.frictionless and not law.cohesion
+    parts = ["frictionless" if smooth else law.kind, *([law.file] if law.file else []),
              *(f"{name} {value:g}" for name, value in law.parameters.items())]
     gap = f"{law.gap:g}"
     pressure = [f"{value:g}" for value in each.pressure]
@@ -87,10 +88,10 @@ def _make_row(each: LawOfMany) -> list[str]:
 
 def name_many(names: Sequence[str], kind: str = "curve") -> str:
     """Names in few words: pieces by their trace, names with numbers in a row by first and last, of many the number."""
-    traces: dict[str, int] = {}
+    traces: dict[str, list[str]] = {}
     for name in names:
-        piece = PIECE.match(name)
-        traces[piece["trace"] if piece else name] = traces.get(piece["trace"] if piece else name, 0) + 1
+        traces.setdefault(find_trace(name), []).append(name)
+    traces = {pieces[0] if len(pieces) == 1 else trace: pieces for trace, pieces in traces.items()}
     runs = _join_runs(traces)
     text = ", ".join(runs[:MOST_NAMES]) + (", ..." if len(runs) > MOST_NAMES else "")
     pieces = len(names) - len(traces)
@@ -98,6 +99,12 @@ def name_many(names: Sequence[str], kind: str = "curve") -> str:
         return text
     many = count(len(traces), kind)
     return f"{text} ({many}{f' in {len(names)} pieces' if pieces else ''})"
+
+
+def find_trace(name: str) -> str:
+    """The name of the trace that a piece belongs to; of others their own."""
+    piece = PIECE.match(name)
+    return piece["trace"] if piece else name
 
 
 def _join_runs(names: Iterable[str]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import numpy as np
 import pytest
@@ -46,11 +47,14 @@ def march(reporter: Reporter) -> None:
 def test_a_log_has_a_line_for_every_step_and_iteration() -> None:
     stream = io.StringIO()
     march(make_reporter(stream=stream))
-    lines = stream.getvalue().splitlines()
+    stamped = stream.getvalue().splitlines()
+    assert all(re.match(r"\d\d:\d\d:\d\d ", line) for line in stamped)
+    lines = [line[9:] for line in stamped]
     assert lines[0] == "note: joint is refined."
     assert lines[1] == "step 1 of 6, stage press, factor 0 to 0.5"
     assert lines[2] == "  iteration  1  residual 1.0e-03, 5 changed, stick/slip/open 1/1/1  0.50 s"
-    assert lines[3] == "  converged: 1 iteration, residual 2.0e-12, stick/slip/open 1/1/1, 0.50 s"
+    # The seconds are those since the step was begun, not those that its iterations say.
+    assert lines[3] == "  converged: 1 iteration, residual 2.0e-12, stick/slip/open 1/1/1, 0.00 s"
     assert lines[7:11] == [
         "step 3 of 6, stage shear, factor 0 to 0.25",
         "  not converged (mode cycle): joint near (1, 1).",

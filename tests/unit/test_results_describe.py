@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pbem.bem.operator_choice import estimate_dense_memory
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.model.in_situ import LinearStress
 from pbem.model.model import Condition
@@ -52,15 +51,6 @@ def test_loads_that_belong_to_no_curve_are_described() -> None:
             "fluid pressure 0.25 in crack") in text
     assert "in-situ stress of soft: sxx, syy, sxy = 1, 2, 3" in text
     assert find_row(text, "conditions", "bottom") == "bottom tx = 0 ty = 0, spring 70"
-
-
-def test_memory_is_that_of_the_dense_blocks() -> None:
-    operator, tangent = estimate_dense_memory(MODEL, MESH)
-    lower = int((MESH.node_region == 0).sum())
-    upper = MESH.nodes - lower
-    cracks, shared = 18, 36
-    assert operator == 8 * (2 * lower * (4 * lower - 2 * cracks) + 2 * upper * 4 * upper)
-    assert tangent == 12 * (2 * lower * 2 * (lower + shared) + 2 * upper * 2 * (upper + shared))
 
 
 def test_hundreds_of_cracks_do_not_fill_the_screen(tmp_path: Path) -> None:

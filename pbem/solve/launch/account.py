@@ -45,9 +45,10 @@ def describe_start(comm: MPI.Intracomm) -> list[str]:
     where = ", ".join(f"{host} ({count})" if len(counts) > 1 else host for host, count in counts.items())
     versions = list_versions()
     said = ", ".join(f"{name} {version}" for name, version in versions.items() if name != "MPI")
+    threads = os.environ.get("OMP_NUM_THREADS", "any number of")
     return [
         f"run of {datetime.now().astimezone():%Y-%m-%d %H:%M:%S %z} on {where}, "
-        f"{comm.size} rank{'s' * (comm.size != 1)}, {os.environ.get('OMP_NUM_THREADS', 'any')} threads each",
+        f"{comm.size} rank{'s' * (comm.size != 1)}, {threads} thread{'s' * (threads != '1')} each",
         f"with {said}, {versions['MPI']}",
     ]
 

@@ -6,14 +6,33 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from pbem.clock import WITHIN, clock
-from pbem.errors import LaunchError
-from pbem.solve.petsc.session import PETSc
-
-OPTION = "log_view"
+from pbem.errors import CaseError, ConvergenceError, Fault, StopError
+from pbem.solve.petsc.session import LOG_OPTION, PREFIX, PETSc, begin_log
 
 
 class PetscLog:
-    """A stage for every outer piece, an event for every piece; PETSc adds up those within, the clock does not."""
+    """A stage for every outer piece, an event for every piece. file: where it goes, "" is standard output.
+
+    In PETSc's account an event has the time of those within it, in the clock's it has not.
+    """
+
+    def __init__(self) -> None:
+        self.file: str | None = None
+
+    def obey(self, source: str, options: Mapping[str, str]) -> None:
+        """Begin if the options ask for it; source: the case, for what is said. All ranks together.
+
+        Raises CaseError for a value that is neither empty nor ":FILE".
+        """
+        value = options.get(LOG_OPTION)
+        if value is None or self.file is not None:
+            return
+        kind, _, file = value.partition(":")
+        if kind not in ("", "ascii") or ":" in file:
+            raise CaseError(source, (Fault(f"-{PREFIX}{LOG_OPTION}", f'"{value}"', "no value, or :FILE"),))
+        self.file = file
+        begin_log()
+        clock.listener = self
 
     def enter(self, path: tuple[str, ...]) -> None:
         """See pbem.clock.Listener."""
@@ -27,32 +46,30 @@ class PetscLog:
         if len(path) == 1:
             PETSc.Log.Stage(f"pbem {path[0]}").pop()
 
+    def show(self) -> None:
+        """Write the account, if it was asked for. All ranks together."""
+        clock.listener = None
+        if self.file is None:
+            return
+        viewer = PETSc.Viewer().createASCII(self.file or "stdout", "w", comm=PETSc.COMM_WORLD)
+        PETSc.Log.view(viewer)
+        viewer.destroy()
+
 
 def _find_event(path: tuple[str, ...]) -> PETSc.Log.Event:
     return PETSc.Log.Event(f"pbem {WITHIN.join(path)}")
 
 
 @contextmanager
-def petsc_log(options: Mapping[str, str]) -> Iterator[None]:
-    """Log the block and show it at its end if the option asks for it: on standard output, or in the file ":FILE".
-
-    Collective. Raises LaunchError for a value that is none of these.
-    """
-    value = options.get(OPTION)
-    if value is None:
-        yield
-        return
-    kind, _, file = value.partition(":")
-    if kind not in ("", "ascii", "1", "true") or ":" in file:
-        raise LaunchError(f"-pbem_{OPTION} {value}: expected no value, or :FILE")
-    PETSc.Log.begin()
-    clock.listener = PetscLog()
+def petsc_log(source: str, options: Mapping[str, str]) -> Iterator[PetscLog]:
+    """The account of the block, which is shown at its end if the options ask for it; the case's may ask later."""
+    log = PetscLog()
+    log.obey(source, options)
     try:
-        yield
+        yield log
+    except (ConvergenceError, StopError):  # all ranks alike
+        log.show()
+        raise
     finally:
         clock.listener = None
-    # Not after an exception: one rank alone would wait here for the others.
-    viewer = PETSc.Viewer().createASCII(file, "w", comm=PETSc.COMM_WORLD) if file else PETSc.Viewer.STDOUT()
-    PETSc.Log.view(viewer)
-    if file:
-        viewer.destroy()
+    log.show()

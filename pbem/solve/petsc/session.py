@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
@@ -12,6 +13,21 @@ petsc4py.init(["pbem", "-no_signal_handler"])
 from petsc4py import PETSc  # noqa: E402
 
 PREFIX = "pbem_"
+# Of PETSc's own account of time; what no piece of a run has is in a stage of this name.
+LOG_OPTION, REST = "log_view", "pbem start and other"
+_logs: list[PETSc.Log.Stage] = []
+
+
+def begin_log() -> None:
+    """Let PETSc keep its account from now on, if it does not yet."""
+    if not _logs:
+        PETSc.Log.begin()
+        _logs.append(PETSc.Log.Stage(REST))
+        _logs[0].push()
+
+
+if any(argument.startswith(f"-{PREFIX}{LOG_OPTION}") for argument in sys.argv):
+    begin_log()  # before anything else is loaded, which takes its time
 
 NOT_CONVERGED = 91
 

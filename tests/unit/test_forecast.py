@@ -1,0 +1,123 @@
+"""What is counted of a run's work is what is stored; forecasts follow from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbem.case.build import parse_model
+from pbem.contact.dependence import find_unknowns_of_regions
+from pbem.contact.laws import collect_laws
+from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.forecast.disk import count_disk, count_stored_steps
+from pbem.forecast.forecast import make_forecast
+from pbem.forecast.usual import expect_changes
+from pbem.forecast.work import _eliminate, _make_blocks, count_work
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.parallel import world
+from pbem.solve.system.assembly import assemble_problem
+from tests.unit.case_sample import BLOCKS
+
+TILTED = """
+[materials.rock]
+young = 1000.0
+poisson = 0.25
+[curves]
+flat = {{ points = [[-1, 0], [1, 0]], elements = 6 }}
+steep = {{ points = [[4, -1], [4, 1]], elements = 6 }}
+slanted = {{ points = [[8, -1], [10, 1]], elements = 6 }}
+[regions.plane]
+material = "rock"
+infinite = true
+cracks = ["flat", "steep", "slanted"]
+[interfaces.flat]
+friction = 0.5
+[interfaces.steep]
+friction = 0.5
+[interfaces.slanted]
+friction = 0.5
+[remote]
+sxx = {sxx}
+syy = {syy}
+[analysis]
+steps = 3
+"""
+
+
+def read(text: str) -> tuple[Model, Mesh]:
+    _, model = parse_model(text)
+    return model, generate_mesh(model)
+
+
+def test_entries_of_the_dense_operator_are_those_that_are_stored() -> None:
+    for model, mesh in (read(TILTED.format(sxx=0, syy=-1)), read(BLOCKS)):
+        model = replace(model, solver=replace(model.solver, operator="dense"))
+        system = assemble_problem(model, mesh, world).system
+        work = count_work(model, mesh)
+        assert system.stored == 8 * work.entries
+        assert sum(block.matrix.size for block in system.crack_rows) == work.besides  # type: ignore[attr-defined]
+
+
+def test_entries_of_the_hierarchical_operator_are_about_those_that_are_stored() -> None:
+    model, mesh = read(TILTED.format(sxx=0, syy=-1).replace("elements = 6", "elements = 60"))
+    model = replace(model, solver=replace(model.solver, operator="hierarchical"))
+    system = assemble_problem(model, mesh, world).system
+    sources = sum(leaf.matrix.nbytes for leaf in system.operator.sources.leaves)  # type: ignore[attr-defined]
+    assert system.stored + sources == pytest.approx(8 * count_work(model, mesh).entries, rel=0.1)
+
+
+def test_blocks_are_eliminated_as_their_unknowns_would_be() -> None:
+    model, mesh = read(BLOCKS)
+    outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
+    of_region = find_unknowns_of_regions(mesh, outer, laws.leader, evaluate_load(model, mesh, outer, 0, 1.0))
+    own = np.repeat(mesh.node_region, 2)
+    sizes, cliques = _make_blocks(own, of_region)
+    assert sum(sizes.values()) == 2 * mesh.nodes
+    # The same unknown by unknown, each block a single one: the matrix and what is filled.
+    pattern = np.zeros((len(own), len(own)), dtype=bool)
+    for region, columns in enumerate(of_region):
+        both = np.union1d(columns, np.flatnonzero(own == region))
+        pattern[np.ix_(both, both)] = True
+    left, factored = np.ones(len(own), dtype=bool), 0
+    while left.any():
+        degree = np.where(left, pattern[:, left].sum(axis=1), len(own) + 1)
+        at = int(degree.argmin())
+        near = pattern[at] & left
+        factored += 2 * int(near.sum()) - 1
+        pattern[np.ix_(near, near)] = True
+        left[at] = False
+    assert _eliminate(sizes, cliques)[0] == pytest.approx(factored, rel=1e-12)
+
+
+def test_two_bodies_that_touch_nowhere_are_two_blocks() -> None:
+    factored, operations = _eliminate({0: 3.0, 1: 4.0}, [{0}, {1}])
+    assert (factored, operations) == (9 + 16, pytest.approx(2 / 3 * (27 + 64)))
+
+
+@pytest.mark.parametrize(("sxx", "syy", "part", "first"), [
+    (-1.0, -1.0, 0.0, 1.0),  # nothing slips
+    (0.0, -1.0, 1 / 3, 4.0),  # the slanted one does: shear 0.5 against 0.25
+    (-3.0, 1.0, 2 / 3, 7.0),  # the flat one opens
+])  # fmt: skip
+def test_changes_follow_from_the_stress_far_away(sxx: float, syy: float, part: float, first: float) -> None:
+    model, mesh = read(TILTED.format(sxx=sxx, syy=syy))
+    changes = expect_changes(model, mesh, 54)
+    assert (changes.part, changes.iterations) == (pytest.approx(part), pytest.approx(first + 2))
+
+
+def test_more_ranks_have_more_memory_together_and_less_each() -> None:
+    model, mesh = read(TILTED.format(sxx=0, syy=-1).replace("elements = 6", "elements = 100"))
+    one, four = (make_forecast(model, mesh, ranks, timed=False) for ranks in (1, 4))
+    assert one.whole_memory < four.whole_memory and one.rank_memory > four.rank_memory
+    assert one.seconds == {} and one.disk == four.disk == count_disk(model, mesh)
+
+
+def test_stored_steps_are_counted() -> None:
+    model, _ = read(BLOCKS)
+    stages = tuple(replace(model.stages[0], steps=steps) for steps in (3, 4))
+    for every, stored in ((1, 7), (2, 5), (10, 2)):
+        assert count_stored_steps(replace(model, stages=stages, output_every=every)) == stored

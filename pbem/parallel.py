@@ -25,7 +25,18 @@ PETSC_ERR_MEM, PETSC_ERR_LIB = 55, 76
 MUMPS_LACKS_MEMORY = re.compile(r"\bMUMPS\b.*INFOG\(1\) ?= ?-(5|7|13|19|22|29)\b")
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
-world: MPI.Intracomm = MPI.COMM_WORLD
+Comm = MPI.Intracomm
+
+world: Comm = MPI.COMM_WORLD
+
+
+def check_communicator(comm: Comm | None) -> Comm:
+    """The communicator, by default that of all ranks. Raises TypeError if it is none that ranks can compute with."""
+    if comm is None:
+        return world
+    if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
+        raise TypeError(f"comm is {type(comm).__name__} {comm!r}; expected an intra-communicator of mpi4py")
+    return comm
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pbem.model.model import Model
 
 def dump_configuration(model: Model) -> str:
     """JSON text of the model without the texts that it was read from; complex points as [x, y]."""
-    texts = ("source", "notes", "law_texts")
+    texts = ("source", "notes", "law_texts", "overrides")
     return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 

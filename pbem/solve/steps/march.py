@@ -47,17 +47,19 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     return Start(number, stage, factor, memory)
 
 
-def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
+def march(
+    problem: Problem, reporter: Reporter, start: Start | None = None, kept: TangentOperator | None = None
+) -> Iterator[Step]:
     """Yield the converged steps of all stages in turn.
 
     A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction.
     Where small steps from rest are all alike (see is_proportional_at_last) the least is tried after TRIED_FROM_REST: if
     that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
     always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
-    the steps before it were yielded.
+    the steps before it were yielded. kept: a tangent operator that is used and not destroyed.
     """
     begin = start or start_from_rest(problem)
-    tangent = problem.make_tangent()
+    tangent = kept or problem.make_tangent()
     number, memory, noted, told, depth = begin.number, begin.memory, 0.0, 0.0, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
@@ -79,9 +81,11 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
-        tangent.destroy()
+        if kept is None:
+            tangent.destroy()
         raise
-    tangent.destroy()
+    if kept is None:
+        tangent.destroy()
 
 
 def _advance(

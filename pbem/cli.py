@@ -19,7 +19,7 @@ from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import PbemError, printable
 from pbem.make_command import add_make_commands, make, read_finite
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
-from pbem.run_command import RUN_NOTES, add_run_options, run_case
+from pbem.run_command import RUN_NOTES, add_run_options, add_set_option, run_case
 from pbem.terminal import INTERRUPTED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
 from pbem.version import __version__
 
@@ -142,6 +142,7 @@ def make_parser() -> argparse.ArgumentParser:
     check = add("check", _check, "validate a case and show what would be computed")
     check.add_argument("case", metavar="CASE")
     check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
+    add_set_option(check)
     add_run_options(add("run", None, "compute a case and write its results", RUN_NOTES))
     info = add("info", _info, "show what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
@@ -184,11 +185,12 @@ def _make(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     from pbem.case.build import read_checked_model
+    from pbem.case.overrides import read_options
     from pbem.mesh.generate import generate_mesh
     from pbem.results.describe import describe_model
     from pbem.results.output import check_picture_path
 
-    model = read_checked_model(find_case(options.case))
+    model = read_checked_model(find_case(options.case), read_options(options.set))
     if options.plot:
         check_picture_path(options.plot)
     mesh = generate_mesh(model)

@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -28,6 +29,7 @@ STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 Comm = MPI.Intracomm
 
 world: Comm = MPI.COMM_WORLD
+alone: Comm = MPI.COMM_SELF
 
 
 def check_communicator(comm: Comm | None) -> Comm:
@@ -174,6 +176,16 @@ def gather_by_node(comm: MPI.Intracomm, value: T) -> list[list[T]]:
     for key, each in comm.allgather((first, value)):
         nodes.setdefault(key, []).append(each)
     return list(nodes.values())
+
+
+def read_available_memory() -> float:
+    """Bytes of memory of this node that are free for programs; without bound where the system does not tell."""
+    with suppress(OSError, ValueError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            name, _, value = line.partition(":")
+            if name == "MemAvailable":
+                return 1024.0 * float(value.split()[0])
+    return float("inf")
 
 
 def describe_library() -> str:

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbem.bundled import find_case
+from pbem.case.changed import label_option
+from pbem.case.overrides import read_options
 from pbem.environment import find_launch
 from pbem.errors import ConvergenceError, LaunchError, LawError, PbemError, StopError, StorageError
 from pbem.terminal import INTERRUPTED, NOT_CONVERGED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
@@ -41,13 +43,24 @@ def add_run_options(run: argparse.ArgumentParser) -> None:
     run.add_argument("--resume", action="store_true", help="go on after the last step that the result file holds")
     run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
+    add_set_option(run)
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
+
+
+def add_set_option(command: argparse.ArgumentParser) -> None:
+    """Add `--set`, which any command that reads a case can have."""
+    command.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE",
+        help="in place of what the case says, e.g. interfaces.seat.friction=0.3; may be given several times "
+        "(see `pbem help commands`)",
+    )
 
 
 def run_case(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     """Compute the case of a command line; returns the exit code. All ranks call this together."""
     case = find_case(options.case)
     target = Path(options.output or case.stem + ".h5")
+    changes = read_options(options.set)
 
     run = _load_driver()
     from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
@@ -60,7 +73,7 @@ def run_case(options: argparse.Namespace, petsc: dict[str, str]) -> int:
         with abort_if_unexpected(world, PbemError):
             reporter = make_reporter(options.quiet) if world.rank == 0 else None
         results = run(case, target, resume=options.resume, force=options.force, petsc=petsc,
-                      operator=options.operator, reporter=reporter)
+                      operator=options.operator, reporter=reporter, set=changes, label=label_option)
     except LaunchError as error:
         _close(reporter)
         code = _say_wrong_launch(error, world.rank, world.size)

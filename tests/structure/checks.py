@@ -12,13 +12,13 @@ from pathlib import Path
 # The path of the data: a part imports those before it, never those after it.
 # The package itself comes last: it offers what they define.
 ORDER = (
-    "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
-    "bundled", "terminal", "make_command", "run_command", "pages", "cli", "__main__", "__init__",
+    "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver", "sweeps",
+    "bundled", "terminal", "make_command", "run_command", "sweep_command", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact")
 # ... but mechanics knows nothing of processes, and results are read without them.
-MAY_BE_PARALLEL = ("solve", "driver", "run_command", "cli", "__main__", "parallel")
+MAY_BE_PARALLEL = ("solve", "driver", "sweeps", "run_command", "sweep_command", "cli", "__main__", "parallel")
 
 # Each of these comes in by one door only.
 DOORS = {

@@ -1,4 +1,4 @@
-"""The command line: make, check, run, info, plot, help. Only `run` needs MPI and PETSc."""
+"""The command line: make, check, run, sweep, info, plot, help. Only `run` and `sweep` need MPI and PETSc."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ from pbem.errors import PbemError, printable
 from pbem.make_command import add_make_commands, make, read_finite
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
 from pbem.run_command import RUN_NOTES, add_run_options, add_set_option, run_case
+from pbem.sweep_command import SWEEP_NOTES, add_sweep_options, run_sweep
 from pbem.terminal import INTERRUPTED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
 from pbem.version import __version__
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.
 
-COMMANDS = ("make", "check", "run", "info", "plot", "help")
+COMMANDS = ("make", "check", "run", "sweep", "info", "plot", "help")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
 FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
 
@@ -36,6 +37,7 @@ Boundary elements for frictional contact in two-dimensional elasticity.
   pbem make cracks           write a case of random cracks; also inclusions
   pbem check CASE            is the case right, and what will be computed?
   pbem run CASE              compute; `pbem CASE` does the same
+  pbem sweep CASE            compute it with several values of some keys: a table
   pbem info FILE.h5          what a result file holds
   pbem plot FILE.h5          draw a result file
   pbem help TOPIC            a page of the documentation; without TOPIC: the list of them
@@ -98,12 +100,14 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
         with contextlib.redirect_stderr(sys.stderr if rank == 0 else sys.stdout):
             options = parser.parse_args(arguments)
             options.arguments = arguments
-            if petsc and options.command != "run":
-                parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run`")
+            if petsc and options.command not in ("run", "sweep"):
+                parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run` and `pbem sweep`")
     except SystemExit as end:
         return int(end.code or 0)
     if options.command == "run":
         return run_case(options, petsc)
+    if options.command == "sweep":
+        return run_sweep(options, petsc)
     # The other commands are not parallel: under a launcher the first rank does them alone.
     return options.action(options) if rank == 0 else 0
 
@@ -144,6 +148,7 @@ def make_parser() -> argparse.ArgumentParser:
     check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
     add_set_option(check)
     add_run_options(add("run", None, "compute a case and write its results", RUN_NOTES))
+    add_sweep_options(add("sweep", None, "compute a case with all combinations of some values", SWEEP_NOTES))
     info = add("info", _info, "show what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
     plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")

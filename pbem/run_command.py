@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbem.bundled import find_case
-from pbem.case.changed import label_option
-from pbem.case.overrides import read_options
 from pbem.environment import find_launch
 from pbem.errors import ConvergenceError, LaunchError, LawError, PbemError, StopError, StorageError
 from pbem.terminal import INTERRUPTED, NOT_CONVERGED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
@@ -58,11 +56,14 @@ def add_set_option(command: argparse.ArgumentParser) -> None:
 
 def run_case(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     """Compute the case of a command line; returns the exit code. All ranks call this together."""
+    from pbem.case.changed import label_option
+    from pbem.case.overrides import read_options
+
     case = find_case(options.case)
     target = Path(options.output or case.stem + ".h5")
     changes = read_options(options.set)
 
-    run = _load_driver()
+    run = load_driver()
     from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
     from pbem.progress import make_reporter
 
@@ -76,7 +77,7 @@ def run_case(options: argparse.Namespace, petsc: dict[str, str]) -> int:
                       operator=options.operator, reporter=reporter, set=changes, label=label_option)
     except LaunchError as error:
         _close(reporter)
-        code = _say_wrong_launch(error, world.rank, world.size)
+        code = say_wrong_launch(error, world.rank, world.size)
     except (Exception, KeyboardInterrupt) as error:
         _close(reporter)
         if isinstance(error, PbemError | KeyboardInterrupt):
@@ -118,7 +119,7 @@ def _describe_rest(target: Path) -> str:
     return f"if {target} was begun, it holds every step before, and --resume goes on after them"
 
 
-def _load_driver() -> Callable[..., Results]:
+def load_driver() -> Callable[..., Results]:
     """Import what computes; raises LaunchError on all ranks alike if MPI, PETSc or another library cannot be loaded."""
     advice = "; `pbem help install` says how mpi4py, petsc4py and PETSc have to be built"
     try:
@@ -136,7 +137,7 @@ def _load_driver() -> Callable[..., Results]:
     return run
 
 
-def _say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
+def say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:
     """Say once why the processes do not fit together, also when MPI does not join them; returns the exit code."""
     if ranks == 1:
         # The launcher has numbered the copies; where it has not told how many there are, the first cannot know.

@@ -39,6 +39,8 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
                          "(default: reactions, largest slips and openings, stress-intensity factors)")
     command.add_argument("--keep", metavar="DIR", help="keep the result files of all cases in this folder")
     command.add_argument("--force", action="store_true", help="begin a table that is there anew")
+    command.add_argument("--no-neighbours", action="store_true",
+                         help="begin the search for the statuses of each case anew, not with those of another case")
     command.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     command.add_argument("--quiet", action="store_true", help="no progress, no summary")
 
@@ -65,7 +67,8 @@ def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     try:
         table = sweep(
             case, values, options.quantity, out=target, keep=options.keep, petsc=petsc, operator=options.operator,
-            force=options.force, listener=listen, label=label_option, option="--quantity ",
+            force=options.force, neighbours=not options.no_neighbours, listener=listen, label=label_option,
+            option="--quantity ",
         )
     except LaunchError as error:
         return say_wrong_launch(error, world.rank, world.size)

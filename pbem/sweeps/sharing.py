@@ -14,6 +14,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import Comm, alone, read_available_memory
 from pbem.sweeps.table import Row
+from pbem.sweeps.values import write_cell
 
 # Cases of fewer unknowns gain nothing from several ranks.
 SMALL = 4000
@@ -37,9 +38,20 @@ def changes_operator(key: str) -> bool:
 
 
 def sort_cases(cases: Sequence[dict[str, Any]], several: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """The cases with the same operator one after the other."""
-    slow = [key for key in several if changes_operator(key)]
-    return sorted(cases, key=lambda case: [several[key].index(case[key]) for key in slow])
+    """The cases with the same operator one after the other, and each beside one that differs by one value only."""
+    keys = sorted(several, key=lambda key: not changes_operator(key))
+    written = {key: {write_cell(each): place for place, each in enumerate(several[key])} for key in keys}
+
+    def place(case: dict[str, Any]) -> list[int]:
+        """To and fro: every other time a key goes through its values it does so backwards."""
+        found, turned = [], 0
+        for key in keys:
+            at = written[key][write_cell(case[key])]
+            found.append(len(several[key]) - 1 - at if turned % 2 else at)
+            turned += at
+        return found
+
+    return sorted(cases, key=place)
 
 
 @dataclass(frozen=True)

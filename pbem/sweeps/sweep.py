@@ -60,6 +60,7 @@ class Setting:
     operator: Operator | None
     petsc: Mapping[str, str]
     keep: Path | None
+    neighbours: bool
     label: Label
     checked: dict[tuple[str, ...], Model] = field(default_factory=dict)
 
@@ -75,6 +76,7 @@ def sweep(
     petsc: Mapping[str, str] | None = None,
     operator: Operator | None = None,
     force: bool = False,
+    neighbours: bool = True,
     comm: Comm | None = None,
     listener: Listener | None = None,
     label: Label = label_key,
@@ -87,7 +89,9 @@ def sweep(
     largest slips and openings, stress-intensity factors. out: a file for the table (CSV); one that is there is gone on
     with: its rows are not computed again. keep: a folder for the result files of the cases; without, none are written,
     and errors are not estimated. set: values that are the same in all. petsc, operator: as of `pbem.run`. force: begin
-    a table that is there anew. comm: ranks that share the cases, or each case, as is faster; all of them call this and
+    a table that is there anew. neighbours: begin the search for the statuses of a case with those of the one before
+    it, where laws do not remember; a case with more than one equilibrium, which high friction can have, may so end in
+    another one than alone. comm: ranks that share the cases, or each case, as is faster; all of them call this and
     get the table. listener: told of each case, on the first rank. label, option: how messages name values, quantities.
 
     A case that does not converge is a row with the status "failed" and the reason, a combination of values that makes
@@ -100,7 +104,7 @@ def sweep(
     comm = check_communicator(comm)
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
-    setting = Setting(case, set or {}, operator, petsc or {}, None if keep is None else Path(keep), label)
+    setting = Setting(case, set or {}, operator, petsc or {}, None if keep is None else Path(keep), neighbours, label)
     try:
         with abort_if_unexpected(comm, PbemError):
             check_start(comm)
@@ -306,8 +310,8 @@ def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems,
         watch.look_after(problem.laws)
         watch.check()
         try:
-            for _ in march(problem, watch, None, kept.take_tangent(problem)):
-                pass
+            tangent, guess = kept.take_tangent(problem), kept.guess_modes(problem) if setting.neighbours else None
+            kept.remember_modes(problem, list(march(problem, watch, None, tangent, guess)))
         except ConvergenceError:
             watch.check()  # a law that failed has answered with no strength
             raise

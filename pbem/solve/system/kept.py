@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from pbem.contact.anchor import anchor_motions
-from pbem.contact.laws import PairLaws, collect_laws
+from pbem.contact.laws import ModeState, PairLaws, collect_laws, find_linear
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.solve.petsc.session import PETSc
 from pbem.solve.problem.problem import Problem, System
+from pbem.solve.problem.step import Step
 from pbem.solve.problem.tangent import TangentOperator
+from pbem.solve.steps.march import Guess
 from pbem.solve.system.assembly import join_problem
 from pbem.solve.system.choice import choose_system
 
@@ -28,12 +30,16 @@ MOST_KEPT = 2
 
 @dataclass
 class _Kept:
-    """The last problem of an operator, and its tangent operator once that is made. key, tangent_key: of `digest`."""
+    """The last problem of an operator, and its tangent operator once that is made. key, tangent_key: of `digest`.
+
+    statuses: modes of the last history that was finished, by stage and fraction.
+    """
 
     key: bytes
     problem: Problem
     tangent: TangentOperator | None = None
     tangent_key: bytes = b""
+    statuses: dict[tuple[int, float], ModeState] = field(default_factory=dict)
 
     def drop_tangent(self) -> None:
         """Free its storage; by all ranks together."""
@@ -83,7 +89,7 @@ class KeptProblems:
 
     def take_tangent(self, problem: Problem) -> TangentOperator:
         """The tangent operator for a problem of `assemble`, with the factors of the last one where they serve."""
-        found = next(each for each in self._kept if each.problem is problem)
+        found = self._find(problem)
         solver = problem.model.solver
         key = digest((
             varying_parts(problem.laws), solver.newton_tolerance, solver.newton_max_iterations,
@@ -91,10 +97,34 @@ class KeptProblems:
         ))  # fmt: skip
         if found.tangent is None or found.tangent_key != key:
             found.drop_tangent()
+            if found.tangent_key != key:
+                found.statuses = {}
             found.tangent, found.tangent_key = problem.make_tangent(), key
         else:
             found.tangent.take_over(problem)
         return found.tangent
+
+    def guess_modes(self, problem: Problem) -> Guess | None:
+        """The modes of the history that was finished last, where those of a state are known by its tractions alone.
+
+        Not where laws remember or change with the slip: the way to a state is then part of it.
+        """
+        found = self._find(problem)
+        laws = problem.laws
+        if not found.statuses or laws.brittle.any() or not find_linear(laws).all():
+            return None
+        modes = found.statuses
+        return lambda stage, factor: modes.get((stage, factor))
+
+    def remember_modes(self, problem: Problem, steps: Sequence[Step]) -> None:
+        """A history is finished."""
+        self._find(problem).statuses = {
+            (step.stage, step.factor):
+            ModeState(step.contact.mode, np.where(step.contact.traction_s < 0, -1.0, 1.0)) for step in steps
+        }
+
+    def _find(self, problem: Problem) -> _Kept:
+        return next(each for each in self._kept if each.problem is problem)
 
     def forget_factors(self) -> None:
         """After a run that did not converge the next one begins with factors of its own."""

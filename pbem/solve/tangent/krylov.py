@@ -264,7 +264,7 @@ class KrylovTangent(TangentOperator):
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
         self.problem = problem
-        self.solution = self.law = self.expected = self._sweeps = None
+        self.expected = self._sweeps = None
 
     def destroy(self) -> None:
         for item in (self._solver, self._matrix, self._right, self._left):

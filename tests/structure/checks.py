@@ -12,8 +12,9 @@ from pathlib import Path
 # The path of the data: a part imports those before it, never those after it.
 # The package itself comes last: it offers what they define.
 ORDER = (
-    "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver", "sweeps",
-    "bundled", "terminal", "make_command", "run_command", "sweep_command", "pages", "cli", "__main__", "__init__",
+    "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
+    "sweeps", "bundled", "terminal", "make_command", "run_command", "sweep_command", "pages", "cli", "__main__",
+    "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact")

@@ -47,7 +47,8 @@ def test_a_value_that_is_set_is_computed_with_and_kept(folder: Path) -> None:
 
 
 def test_check_takes_values_too(folder: Path, capsys: Capture) -> None:
-    assert main(["check", "blocks.toml", "--set", "interfaces.joint.friction=0.31", "--set", "stages.shear.steps=9"]) == 0
+    values = ["--set", "interfaces.joint.friction=0.31", "--set", "stages.shear.steps=9"]
+    assert main(["check", "blocks.toml", *values]) == 0
     said = capsys.readouterr().out
     assert "friction 0.31" in said and "9 steps" in said
 

@@ -11,9 +11,9 @@ cases: what `pbem check` does, in this process. results: damaged files are read,
 processes of their own, since HDF5 may crash. values: keys and values of `--set`, of `Case.replace` and of sweeps, and
 quantities; what is accepted is written and read back. commands: the command line, but for runs. runs: small cases are
 computed, each in a process of its own; those that finish have no values that are not numbers, and their forces balance
-or a note says that they do not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind
-of failure (exception and place in the program) with the number of the mutant, which --only makes again; exit code 1 if
-there are any. Anything that takes more than a minute of processor time is a failure, and so are control
+or a note says that they do not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints
+each new kind of failure (exception and place in the program) with the number of the mutant, which --only makes again;
+exit code 1 if there are any. Anything that takes more than a minute of processor time is a failure, and so are control
 characters in what is said.
 """
 

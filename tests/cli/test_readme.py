@@ -66,7 +66,7 @@ def test_the_first_case_is_the_one_that_comes_with_the_program() -> None:
 
 
 def test_the_first_case_gives_the_forces_that_are_told(folder: Path) -> None:
-    lines = run_python(find_snippet("first.toml"), folder)
+    lines = run_python(find_snippet("first.toml", "seat.slip"), folder)
     along, down = (abs(float(number)) for number in lines[2].strip("[]").split())
     assert f"carries {along:.3f} along and {down:.3f} down" in README
     assert float(lines[1]) > 0.9, "the part that slips"

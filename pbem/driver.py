@@ -126,7 +126,11 @@ class _Target:
 def _make_model(
     case: Source, name: str, operator: Operator | None, changes: Mapping[str, Any] | None, label: Label
 ) -> Model:
-    model = make_checked_model(case, changes, label)
+    return impose_operator(make_checked_model(case, changes, label), name, operator)
+
+
+def impose_operator(model: Model, name: str, operator: Operator | None) -> Model:
+    """The model with this operator in place of its own, if there is one. Raises CaseError if it cannot be."""
     if operator is None:
         return model
     if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):

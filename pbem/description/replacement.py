@@ -87,6 +87,8 @@ def set_keys(
 
     list_curves: gives the names of all curves, those that are generated among them; asked if it matters.
     """
+    if not isinstance(changes, Mapping):
+        return Replaced(dict(tables), (Fault("what is set", show(changes), "a dictionary: values by keys"),), {})
     search = _Search(copy.deepcopy(dict(tables)), list_curves)
     told: list[tuple[_Target, Any]] = []
     origins: dict[KeyPath, str] = {}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pbem.case.overrides import read_overrides, write_overrides
-from pbem.errors import ResultFileError
+from pbem.errors import CaseError, ResultFileError
 from pbem.results.lazy import open_quietly, refuse_damage
 from pbem.results.trial import check_contents
 
@@ -24,7 +24,7 @@ def choose_overrides(target: Path, given: Mapping[str, Any] | None) -> Mapping[s
             stored = read_overrides(str(file.attrs.get("overrides", "")))
     except (OSError, KeyError, ValueError, ResultFileError):
         return given or {}
-    if given and read_overrides(write_overrides(given)) != stored:
+    if given and _read_back(given) != stored:
         had = write_overrides(stored).replace("\n", ", ")
         raise ResultFileError(
             str(target),
@@ -32,3 +32,11 @@ def choose_overrides(target: Path, given: Mapping[str, Any] | None) -> Mapping[s
             "others: set the same, or none, or run without resuming",
         )
     return stored
+
+
+def _read_back(given: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The values as a file would keep them; None if it cannot."""
+    try:
+        return read_overrides(write_overrides(given))
+    except (AttributeError, TypeError, CaseError):
+        return None

@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
@@ -18,7 +18,7 @@ from pbem.case.changed import Label, label_key
 from pbem.case.overrides import write_overrides
 from pbem.case.writer import write_tables
 from pbem.description import case as description
-from pbem.driver import run
+from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.model import Model, Operator
@@ -37,6 +37,8 @@ from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, Table, TableFile
 from pbem.sweeps.values import check_combinations, check_values, combine, write_cell
 
+# Models that were made to try the values and are kept until they are computed.
+MOST_CHECKED = 32
 # Told of every case: how many there are and were before, its values and its row.
 Listener = Callable[[int, int, Mapping[str, Any], Row], None]
 
@@ -53,7 +55,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Setting:
-    """What holds for all cases of a sweep. label: how messages name what was set."""
+    """What holds for all cases of a sweep. label: how messages name what was set. checked: models that are there."""
 
     case: Source
     fixed: Mapping[str, Any]
@@ -63,6 +65,12 @@ class Setting:
     neighbours: bool
     label: Label
     checked: dict[tuple[str, ...], Model] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """What messages call the case."""
+        path = find_file(self.case)
+        return description.UNNAMED if path is None else str(path)
 
 
 def sweep(
@@ -137,9 +145,7 @@ def _make_model(setting: Setting, values: Mapping[str, Any]) -> Model:
     model = setting.checked.pop(_cells(values), None)
     if model is None:
         model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
-    if setting.operator is not None:
-        model = replace(model, solver=replace(model.solver, operator=setting.operator))
-    return model
+    return impose_operator(model, setting.name, setting.operator)
 
 
 def _make_plan(
@@ -150,7 +156,7 @@ def _make_plan(
     """
     cases = list(combine(several))
     first = _check_values_alone(setting, several, cases[0])
-    check_options("the case", first.solver.petsc, setting.petsc)
+    check_options(setting.name, first.solver.petsc, setting.petsc)
     mesh = generate_mesh(first)
     names = list_quantity_names(first, mesh)
     wanted = tuple(choose_quantities(first, names) if quantities is None else quantities)
@@ -189,11 +195,11 @@ def _check_values_alone(
             source = error.source
             continue
         found = found or model
-        setting.checked[_cells(values)] = model
+        if len(setting.checked) < MOST_CHECKED:
+            setting.checked[_cells(values)] = model
     if faults or found is None:
         raise CaseError(source, tuple(faults))
-    return found if setting.operator is None else replace(
-        found, solver=replace(found.solver, operator=setting.operator))
+    return impose_operator(found, setting.name, setting.operator)
 
 
 def _mark(setting: Setting, model: Model) -> str:
@@ -311,7 +317,9 @@ def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems,
         watch.check()
         try:
             tangent, guess = kept.take_tangent(problem), kept.guess_modes(problem) if setting.neighbours else None
-            kept.remember_modes(problem, list(march(problem, watch, None, tangent, guess)))
+            kept.remember_modes(problem, {
+                (step.stage, step.factor): step.contact for step in march(problem, watch, None, tangent, guess)
+            })
         except ConvergenceError:
             watch.check()  # a law that failed has answered with no strength
             raise

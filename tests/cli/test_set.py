@@ -10,6 +10,7 @@ import pytest
 
 import pbem
 from pbem.cli import main
+from pbem.results.describe import describe_results
 from pbem.results.reader import open_results
 from tests.cli.cli_sample import BLOCKS
 from tests.parallel.test_resume import CASE, expect_equal
@@ -40,6 +41,7 @@ def test_a_value_that_is_set_is_computed_with_and_kept(folder: Path) -> None:
     assert found.overrides == 'interfaces.joint.friction = 0.3\ninterfaces.joint.law = "coulomb"'
     with h5py.File("blocks.h5") as file:
         assert file.attrs["overrides"] == found.overrides
+    assert 'values set:   interfaces.joint.friction = 0.3, interfaces.joint.law = "coulomb"' in describe_results(found)
     again = pbem.run("blocks.toml", "again.h5", set={"interfaces.joint.friction": 0.3})
     np.testing.assert_array_equal(again.displacement, expected.displacement)
     again = pbem.run(pbem.Case.read("other.toml"), "again.h5", force=True, set={"interfaces.joint.friction": 0.2})

@@ -142,6 +142,10 @@ def test_what_is_wrong_is_said_with_the_key(blocks: pbem.Case, changes: dict[Any
     assert said in refuse(blocks, changes)[0]
 
 
+def test_what_is_no_dictionary_is_refused(blocks: pbem.Case) -> None:
+    assert "expected a dictionary" in refuse(blocks, ["interfaces.joint.friction"])[0]  # type: ignore[arg-type]
+
+
 def test_all_faults_come_together(blocks: pbem.Case) -> None:
     said = refuse(blocks, {"curves.tpo.elements": 3, "interfaces.joint.friction": -1, "curves.*.elements": 0})
     assert len(said) == 2 + len(blocks.curves)

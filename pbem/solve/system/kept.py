@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from pbem.model.model import Model
 from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.solve.petsc.session import PETSc
 from pbem.solve.problem.problem import Problem, System
-from pbem.solve.problem.step import Step
+from pbem.solve.problem.step import ContactState
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.march import Guess
 from pbem.solve.system.assembly import join_problem
@@ -116,11 +116,10 @@ class KeptProblems:
         modes = found.statuses
         return lambda stage, factor: modes.get((stage, factor))
 
-    def remember_modes(self, problem: Problem, steps: Sequence[Step]) -> None:
-        """A history is finished."""
+    def remember_modes(self, problem: Problem, states: Mapping[tuple[int, float], ContactState]) -> None:
+        """A history is finished; its states by stage and fraction."""
         self._find(problem).statuses = {
-            (step.stage, step.factor):
-            ModeState(step.contact.mode, np.where(step.contact.traction_s < 0, -1.0, 1.0)) for step in steps
+            place: ModeState(state.mode, np.where(state.traction_s < 0, -1.0, 1.0)) for place, state in states.items()
         }
 
     def _find(self, problem: Problem) -> _Kept:

@@ -55,11 +55,20 @@ def find_change(stored: str, model: Model) -> str:
     for each in (before, now):
         for name in MAY_CHANGE:
             each.pop(name, None)
+        if model.analysis.accuracy is not None:
+            _drop_fractions(each)  # of a mesh that may have been refined; the places of its nodes are compared
     had, has = before.get("stages"), now.get("stages")
     if not isinstance(had, list) or len(had) > len(has):
         return f"stages: {len(had) if isinstance(had, list) else 'none'} before, {len(has)} now"
     now["stages"] = has[: len(had)]
     return _find_difference(before, now, "")
+
+
+def _drop_fractions(configuration: dict[str, Any]) -> None:
+    curves = configuration.get("curves")
+    for curve in curves.values() if isinstance(curves, dict) else ():
+        for leg in curve.get("legs", ()) if isinstance(curve, dict) else ():
+            leg.pop("fractions", None)
 
 
 def _find_difference(before: Any, now: Any, place: str) -> str:

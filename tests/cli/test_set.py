@@ -108,6 +108,15 @@ def test_a_finished_history_is_carried_on_with_further_stages(folder: Path) -> N
     assert found.case == whole.case
 
 
+def test_a_mesh_that_is_as_accurate_as_was_asked_for_is_gone_on_with(folder: Path) -> None:
+    (folder / "blocks.toml").write_text(PART)
+    setting = ["--set", "analysis.accuracy=0.1"]
+    assert run(*setting) == 0
+    (folder / "blocks.toml").write_text(CASE)
+    assert run("--resume") == 0 and run("-o", "whole.h5", *setting) == 0
+    expect_equal(open_results("blocks.h5"), open_results("whole.h5"))
+
+
 @pytest.mark.parametrize(("old", "new", "said"), [
     ("ux = 0.0085", "ux = 0.008", "stages[2].boundary.top[1] was 0.0085 and is 0.008"),
     ("steps = 3", "steps = 4", "stages[2].steps was 3 and is 4"),

@@ -13,6 +13,7 @@ as (theory, 12): that is formula 12 of the page that `pbem help theory` prints.
 
     results = pbem.run("case.toml")              # solve a case; see pbem.driver.run
     case = pbem.Case(materials={...}, ...)       # or a case made by calls, to be solved; see pbem.case.case.Case
+    table = pbem.sweep(case, {"interfaces.seat.friction": [0.1, 0.2]})    # many cases; see pbem.sweeps.sweep.sweep
     results = pbem.open_results("case.h5")       # read a result file; see pbem.results.reader.open_results
 """
 
@@ -35,14 +36,16 @@ if TYPE_CHECKING:
     from pbem.case.case import Case
     from pbem.driver import run
     from pbem.results.reader import open_results
+    from pbem.sweeps.sweep import sweep
 
 __all__ = [
     "Case", "CaseError", "ConvergenceError", "LaunchError", "LawError", "PbemError", "ResultFileError", "StopError",
-    "StorageError", "__version__", "open_results", "run",
+    "StorageError", "__version__", "open_results", "run", "sweep",
 ]
 
 # Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5.
-_AT_FIRST_USE = {"Case": "pbem.case.case", "run": "pbem.driver", "open_results": "pbem.results.reader"}
+_AT_FIRST_USE = {"Case": "pbem.case.case", "run": "pbem.driver", "open_results": "pbem.results.reader",
+                 "sweep": "pbem.sweeps.sweep"}
 
 
 def __getattr__(name: str) -> Any:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from pbem.errors import LaunchError
 
@@ -24,8 +26,8 @@ def _read_ranks(text: str) -> int:
     return int(text)
 
 
-def check(case: Path, ranks: int, as_json: bool, plot: str | None) -> str:
-    """What is printed of a case.
+def check(case: Path, changes: Mapping[str, Any], ranks: int, as_json: bool, plot: str | None) -> str:
+    """What is printed of a case with changes by their keys.
 
     Raises CaseError with all its faults, LaunchError where there is not the memory for it.
     """
@@ -37,7 +39,7 @@ def check(case: Path, ranks: int, as_json: bool, plot: str | None) -> str:
     from pbem.results.model_text import describe_model
     from pbem.results.output import check_picture_path
 
-    model = read_checked_model(case)
+    model = read_checked_model(case, changes)
     if plot:
         check_picture_path(plot)
     mesh = generate_mesh(model)

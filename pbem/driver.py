@@ -1,4 +1,4 @@
-"""A run from the case to the finished results, on the ranks of the present MPI world."""
+"""A run from the case to the finished results, on the ranks of an MPI communicator."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from pbem.arrays import Integer, Real
 from pbem.case.build import Source, find_file, make_checked_model
+from pbem.case.changed import Label, label_key
 from pbem.clock import clock
 from pbem.description.case import UNNAMED
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
@@ -19,11 +20,21 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
 from pbem.model.refinement import bisect_elements, impose_fractions
-from pbem.parallel import StopSignals, abort_if_unexpected, broadcast, do_on_first, lacks_memory, world
+from pbem.parallel import (
+    Comm,
+    StopSignals,
+    abort_if_unexpected,
+    broadcast,
+    check_communicator,
+    do_on_first,
+    lacks_memory,
+    world,
+)
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
+from pbem.results.overrides import choose_overrides
 from pbem.results.passes import KeptPass, keep_pass, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.tip_notes import compare_release
@@ -41,6 +52,7 @@ from pbem.solve.problem.step import Reporter, SilentReporter, Step
 from pbem.solve.steps.march import march, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
+from pbem.solve.system.kept import KeptProblems
 
 
 def run(
@@ -52,6 +64,10 @@ def run(
     petsc: Mapping[str, str] | None = None,
     operator: Operator | None = None,
     reporter: Reporter | None = None,
+    set: Mapping[str, Any] | None = None,
+    comm: Comm | None = None,
+    label: Label = label_key,
+    kept: KeptProblems | None = None,
 ) -> Results:
     """Solve a case, and return its results.
 
@@ -60,41 +76,48 @@ def run(
     last step that the file holds. force: replace results that are there; without either, they are left alone. petsc:
     PETSc options without prefix, which win over the case's [petsc] table. operator: "auto", "dense" or "hierarchical",
     in place of the case's solver.operator; the configuration in the result file tells it. reporter: told of the
-    progress, on the first rank only. Every rank of an MPI run calls this and gets the results.
+    progress, on the first rank only. set: values by keys, as of `Case.replace`, that the result file keeps beside the
+    case; those of a file that is gone on with hold unless others are given, which is refused. comm: the MPI
+    communicator whose ranks compute it together, by default all: each of them calls this and gets the results. With
+    MPI.COMM_SELF each rank computes a case of its own, to a file of its own. label: how messages name what was set.
+    kept: operators and factors of earlier runs, for a case with the same.
 
     Raises LaunchError (ranks, libraries or threads that do not fit together), CaseError (all faults of the case),
     ResultFileError (the output cannot be written, is there already, or is another case's), ConvergenceError (the file
     then holds every step reached), StorageError (the disk has no room for a step; the file holds those before it),
     LawError (a custom law failed), StopError (told to stop by a signal; KeyboardInterrupt by SIGINT). Any other
-    exception on one rank ends all ranks. ValueError: there is no such operator.
+    exception on one rank ends all ranks, but for one that computes alone. ValueError: there is no such operator.
+    TypeError: comm is no communicator.
     """
+    comm = check_communicator(comm)
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
     path = find_file(case)
     name = UNNAMED if path is None else str(path)
     try:
         with (
-            abort_if_unexpected(world, PbemError), StopSignals() as signals, petsc_log(name, petsc or {}) as log
+            abort_if_unexpected(comm, PbemError), StopSignals() as signals, petsc_log(name, petsc or {}) as log
         ):  # fmt: skip
             with clock.piece("start"):
-                placement = check_start(world)
-            signals.at_once = world.size == 1
-            with clock.piece("reading"):
-                model = do_on_first(world, PbemError, lambda: _make_model(case, name, operator))
+                placement = check_start(comm)
+            signals.at_once = comm.size == 1
             target = Path(output) if output is not None else Path("case.h5" if path is None else path.stem + ".h5")
+            with clock.piece("reading"):
+                model = do_on_first(comm, PbemError, lambda: _make_model(
+                    case, name, operator, choose_overrides(target, set) if resume else set, label))
             inputs = [*([path] if path else []), *map(Path, model.law_texts)]
             with clock.piece("reading"):
-                do_on_first(world, PbemError, lambda: check_output_path(
-                    target, resume=resume, force=force, source=model.source, inputs=inputs))
-                do_on_first(world, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
-            watch = Watch(world, reporter if reporter is not None and world.rank == 0 else SilentReporter(), signals)
+                do_on_first(comm, PbemError, lambda: check_output_path(
+                    target, resume=resume, force=force, source=model.source, overrides=model.overrides, inputs=inputs))
+                do_on_first(comm, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
+            watch = Watch(comm, reporter if reporter is not None and comm.rank == 0 else SilentReporter(), signals)
             options = {**model.solver.petsc, **(petsc or {})}
             log.obey(name, options)
             with petsc_options(options):
-                _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement)
+                _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement, kept)
             with clock.piece("writing"):
                 results = open_results(target)
-                for note in compare_release(results) if world.rank == 0 else ():
+                for note in compare_release(results) if comm.rank == 0 else ():
                     watch.note(note)
             return results
     except StopError as error:
@@ -112,8 +135,14 @@ class _Target:
     force: bool
 
 
-def _make_model(case: Source, name: str, operator: Operator | None) -> Model:
-    model = make_checked_model(case)
+def _make_model(
+    case: Source, name: str, operator: Operator | None, changes: Mapping[str, Any] | None, label: Label
+) -> Model:
+    return impose_operator(make_checked_model(case, changes, label), name, operator)
+
+
+def impose_operator(model: Model, name: str, operator: Operator | None) -> Model:
+    """The model with this operator in place of its own, if there is one. Raises CaseError if it cannot be."""
     if operator is None:
         return model
     if operator == "hierarchical" and model.solver.linear in ("lu", "mumps"):
@@ -124,7 +153,7 @@ def _make_model(case: Source, name: str, operator: Operator | None) -> Model:
 
 def _refine_and_solve(
     model: Model, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
-    placement: Sequence[str],
+    placement: Sequence[str], kept: KeptProblems | None,
 ) -> None:
     """Solve, and where `analysis.accuracy` asks for it refine and solve again, from rest, until it is met.
 
@@ -133,21 +162,21 @@ def _refine_and_solve(
     """
     one = Pass(1, 0)
     if target.resume and model.analysis.accuracy is not None:
-        read = do_on_first(world, PbemError, lambda: read_refinement(target.path))
+        read = do_on_first(watch.comm, PbemError, lambda: read_refinement(target.path))
         model, one = (model, one) if read is None else (impose_fractions(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes,)
     for number in count(one.number):
         with clock.piece("reading"):
             mesh = generate_mesh(model)
-            check_shares(model, mesh, world.size)
-            remarks = check_memory(world, model, mesh)
+            check_shares(model, mesh, watch.comm.size)
+            remarks = check_memory(watch.comm, model, mesh)
         watch.begin(model)
-        for line in (*describe_start(world), describe_size(model, mesh)) if number == one.number else ():
+        for line in (*describe_start(watch.comm), describe_size(model, mesh)) if number == one.number else ():
             watch.tell(line)
         for note in (*notes, *mesh.notes, *placement, *remarks) if number == one.number else ():
             watch.note(note)
         now = Pass(number, one.first_unknowns or 2 * mesh.nodes)
-        decision = _solve(model, mesh, target, options, watch, signals, now)
+        decision = _solve(model, mesh, target, options, watch, signals, now, kept)
         if decision.marked is None:
             return
         # The next pass takes the place of this one in the file.
@@ -164,20 +193,22 @@ class _Output:
 
 
 def _solve(
-    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals, one: Pass
+    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
+    one: Pass, kept: KeptProblems | None,
 ) -> Decision:
     """March through the load history; the first rank writes. Returns what follows."""
     with clock.piece("evaluation"):
-        interior = InteriorField(model, mesh, world) if model.interior_points else None
+        interior = InteriorField(model, mesh, watch.comm) if model.interior_points else None
     region = None if interior is None else interior.location.region
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     with clock.piece("writing"):
         output = do_on_first(
-            world, PbemError, lambda: _open(model, mesh, target, options, region, one), share=False
+            watch.comm, PbemError,
+            lambda: _open(model, mesh, target, options, region, one, watch.comm.size), share=False,
         ) or _Output()
     try:  # from here on whatever happens has to leave a closed file
-        decision = _fill(output.writer, model, mesh, interior, watch, signals, one)
+        decision = _fill(output.writer, model, mesh, interior, watch, signals, one, kept)
     except BaseException as error:
         told = _blame_pass(error, one, 2 * mesh.nodes) if one.number > 1 and not target.resume else error
         if output.writer:
@@ -188,20 +219,21 @@ def _solve(
     with clock.piece("writing"):
         if output.former:
             output.former.drop()
-        world.Barrier()
+        watch.comm.Barrier()
     return decision
 
 
 def _open(
-    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], region: Integer | None, one: Pass
+    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], region: Integer | None, one: Pass,
+    ranks: int,
 ) -> _Output:
     """The result file to go on with, or a new one beside which the former pass is kept."""
     flat = [f"{name}={value}" for name, value in options.items()]
     if target.resume:
-        return _Output(ResultWriter.resume(target.path, model, mesh, world.size, petsc_version(), flat, region))
+        return _Output(ResultWriter.resume(target.path, model, mesh, ranks, petsc_version(), flat, region))
     former = keep_pass(target.path) if one.number > 1 else None
     try:
-        writer = ResultWriter(target.path, model, mesh, world.size, petsc_version(), flat, region, force=target.force)
+        writer = ResultWriter(target.path, model, mesh, ranks, petsc_version(), flat, region, force=target.force)
     except BaseException:
         if former:
             former.drop()
@@ -213,15 +245,16 @@ def _open(
 
 def _fill(
     writer: ResultWriter | None, model: Model, mesh: Mesh, interior: InteriorField | None, watch: Watch,
-    signals: StopSignals, one: Pass,
+    signals: StopSignals, one: Pass, kept: KeptProblems | None,
 ) -> Decision:
     """Assemble, march, store the steps as they come, and judge their errors."""
+    comm = watch.comm
     if model.analysis.accuracy is not None:
-        do_on_first(world, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
-    last: Step | None = broadcast(world, writer.last_step if writer else None)
-    signals.at_once = world.size == 1
+        do_on_first(comm, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
+    last: Step | None = broadcast(comm, writer.last_step if writer else None)
+    signals.at_once = comm.size == 1
     with clock.piece("assembly"):
-        problem = assemble_problem(model, mesh, world)
+        problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
     signals.at_once = False
     watch.look_after(problem.laws)
     watch.check()
@@ -232,10 +265,11 @@ def _fill(
             interior.prepare(problem.system)
     start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
     with clock.piece("estimate"):
-        estimator = make_estimator(model, mesh, last)
+        estimator = make_estimator(model, mesh, last, comm, kept)
+    tangent = kept.take_tangent(problem) if kept else None
     try:
-        steps = clock.each("steps", march(problem, watch, start))
-        store_steps(steps, model.output_every, interior, writer, watch, estimator)
+        steps = clock.each("steps", march(problem, watch, start, tangent))
+        store_steps(steps, model.output_every, interior, writer, watch, estimator, comm)
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
         raise
@@ -254,14 +288,14 @@ def _conclude(
     """
     with clock.piece("estimate"):
         decision: Decision = do_on_first(
-            world, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
+            watch.comm, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
         )
     for note in decision.notes:
         watch.note(note)
     if decision.failure:
         raise ConvergenceError("accuracy", decision.failure)
     with clock.piece("writing"):
-        do_on_first(world, PbemError, lambda: _end_pass(_check(writer), decision))
+        do_on_first(watch.comm, PbemError, lambda: _end_pass(_check(writer), decision))
     return decision
 
 
@@ -313,24 +347,27 @@ def _append(
     return notes
 
 
-def make_estimator(model: Model, mesh: Mesh, start: Step | None = None) -> Estimator:
+def make_estimator(
+    model: Model, mesh: Mesh, start: Step | None = None, comm: Comm = world, kept: KeptProblems | None = None
+) -> Estimator:
     """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
     beside, second, missing = None, None, ""
     try:
         beside = put_beside(model, mesh)
         if beside is not None:  # it has fewer nodes, perhaps fewer than there are ranks
-            check_shares(beside.model, beside.mesh, world.size)
-        second = None if beside is None else SecondSolution(beside, world, start)
+            check_shares(beside.model, beside.mesh, comm.size)
+        second = None if beside is None else SecondSolution(beside, comm, start, kept)
         missing = NOTHING_COARSER if beside is None else ""
     except PbemError as error:
         missing = f"the second solution cannot be computed ({error})"
-    return Estimator(model, mesh, beside, second, missing, world.rank == 0)
+    return Estimator(model, mesh, beside, second, missing, comm.rank == 0)
 
 
 def store_steps(
     steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
     listener: Reporter | None = None,
     estimator: Estimator | None = None,
+    comm: Comm = world,
 ) -> None:
     """Write the steps as they come, those that are stored with the field at the interior points."""
     waiting: Step | None = None
@@ -347,7 +384,7 @@ def store_steps(
             missing = "" if estimator is None else estimator.missing
             with clock.piece("writing"):
                 notes = do_on_first(
-                    world, PbemError,
+                    comm, PbemError,
                     lambda due=step, rows=rows, missing=missing: _append(writer, due, rows, missing),  # type: ignore[misc]
                 )
             for note in notes:

@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -25,7 +26,19 @@ PETSC_ERR_MEM, PETSC_ERR_LIB = 55, 76
 MUMPS_LACKS_MEMORY = re.compile(r"\bMUMPS\b.*INFOG\(1\) ?= ?-(5|7|13|19|22|29)\b")
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
-world: MPI.Intracomm = MPI.COMM_WORLD
+Comm = MPI.Intracomm
+
+world: Comm = MPI.COMM_WORLD
+alone: Comm = MPI.COMM_SELF
+
+
+def check_communicator(comm: Comm | None) -> Comm:
+    """The communicator, by default that of all ranks. Raises TypeError if it is none that ranks can compute with."""
+    if comm is None:
+        return world
+    if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
+        raise TypeError(f"comm is {type(comm).__name__} {comm!r}; expected an intra-communicator of mpi4py")
+    return comm
 
 
 @contextmanager
@@ -163,6 +176,16 @@ def gather_by_node(comm: MPI.Intracomm, value: T) -> list[list[T]]:
     for key, each in comm.allgather((first, value)):
         nodes.setdefault(key, []).append(each)
     return list(nodes.values())
+
+
+def read_available_memory() -> float:
+    """Bytes of memory of this node that are free for programs; without bound where the system does not tell."""
+    with suppress(OSError, ValueError):
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            name, _, value = line.partition(":")
+            if name == "MemAvailable":
+                return 1024.0 * float(value.split()[0])
+    return float("inf")
 
 
 def describe_library() -> str:

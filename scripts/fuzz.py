@@ -3,15 +3,17 @@
 
     .venv/bin/python scripts/fuzz.py cases --count 20000 [--seed 1]
     .venv/bin/python scripts/fuzz.py results --count 1000
+    .venv/bin/python scripts/fuzz.py values --count 1000
     .venv/bin/python scripts/fuzz.py commands --count 2000
     .venv/bin/python scripts/fuzz.py runs --count 3000
 
 cases: what `pbem check` does, in this process. results: damaged files are read, described, drawn and resumed in
-processes of their own, since HDF5 may crash. commands: the command line, but for runs. runs: small cases are computed,
-each in a process of its own; those that finish have no values that are not numbers, and their forces balance or a note
-says that they do not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind
-of failure (exception and place in the program) with the number of the mutant, which --only makes again; exit code 1 if
-there are any. Anything that takes more than a minute of processor time is a failure, and so are control
+processes of their own, since HDF5 may crash. values: keys and values of `--set`, of `Case.replace` and of sweeps, and
+quantities; what is accepted is written and read back. commands: the command line, but for runs. runs: small cases are
+computed, each in a process of its own; those that finish have no values that are not numbers, and their forces balance
+or a note says that they do not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints
+each new kind of failure (exception and place in the program) with the number of the mutant, which --only makes again;
+exit code 1 if there are any. Anything that takes more than a minute of processor time is a failure, and so are control
 characters in what is said.
 """
 
@@ -36,13 +38,19 @@ from pathlib import Path
 import numpy as np
 
 from pbem import cli
-from pbem.case.build import read_checked_model
+from pbem.case.build import make_checked_model, read_checked_model
+from pbem.case.case import Case
+from pbem.case.changed import label_option
+from pbem.case.overrides import read_options, read_overrides, write_overrides
 from pbem.errors import CaseError, ConvergenceError, PbemError, is_control
 from pbem.mesh.generate import generate_mesh
 from pbem.results.describe import describe_results
 from pbem.results.model_text import describe_model
 from pbem.results.reader import Results
 from pbem.solve.problem.step import SilentReporter, Step
+from pbem.sweeps.outcome import list_quantity_names
+from pbem.sweeps.quantities import read_quantities
+from pbem.sweeps.values import check_combinations, check_values, read_values
 
 ROOT = Path(__file__).resolve().parent.parent
 PATIENCE = 60
@@ -303,6 +311,94 @@ def fuzz_cases(seed: int, numbers: range, failures: Failures) -> int:
             except Exception as error:
                 failures.add(number, error)
     return accepted
+
+
+KEY_PARTS = [*re.findall(r"\S+", """
+    interfaces curves boundary stages regions materials analysis output contacts generate remote petsc solver units
+    title initial_stress crack wavy seat top bottom m body press more joint 0 1 7 -1 * c* [ [!a]* ? friction elements
+    size points young steps ux pressure gap expression box interior every order name law frction spring kn between
+    friction_angle cracks = . '' '*' "" "t12.1"
+"""), "\x1b[2J", " ", "a b", "9" * 30, "a" * 300, "\udc80"]  # fmt: skip
+OBJECTS: list[object] = [
+    None, 0, -1, 0.3, 2, True, float("nan"), float("inf"), 10**400, "x", "", "coulomb", "a\x00b", [], {}, [1, 2],
+    [[0, 0], [1, 1]], (1, "a"), {1: 2}, {"a": {"b": 1}}, np.float64(0.5), np.array([1.0]), np.array("x"), object(),
+    b"bytes", {1, 2}, Path("x"), range(3), 1j, Exception, "\udc80", 1e-320, {"expression": "x"}, [[[[[[[[1]]]]]]]],
+]
+QUANTITY_PARTS = [*re.findall(r"\S+", """
+    reactions contact tips energy steps top bottom crack wavy seat x y moment slip opening traction_n status largest
+    max mean open KI J start 0 elastic load_factor * c* ' "a.b" reaction joint_1 joint
+"""), ""]  # fmt: skip
+KNOWN_KEYS = ["interfaces.crack.cohesion", "interfaces.wavy.friction", "curves.*.elements", "stages.press.steps",
+              "stages.0.boundary.top.uy", "materials.m.young", "analysis.order", "curves.crack.points.0.1",
+              "contacts.seat.friction", "output.every", "curves.top.points", "interfaces.*", "materials.*.poisson"]
+
+
+def make_key(chance: random.Random, parts: Sequence[str]) -> str:
+    """Parts joined by dots, now and then wrongly."""
+    text = ".".join(chance.choice(parts) for _ in range(chance.choice([1, 2, 3, 3, 3, 4, 5, 20])))
+    return text + chance.choice(["", "", "", "", ".", " ", "x"])
+
+
+def make_value(chance: random.Random) -> str:
+    """A value of a file, or something like it."""
+    text = chance.choice([*NUMBERS, *TEXTS, *OTHERS, "coulomb", "law.py", "a b", "", "0.1:0.9:3", "1:2:x", "1,2", "[1,",
+                          "1\n2", "1979-05-27T07:32:00"])
+    if chance.random() < 0.2:
+        at = chance.randrange(len(text) + 1)
+        text = text[:at] + chance.choice(["=", ",", '"', "'", "]", "{", "\\", "\0", "#", "\n"]) + text[at:]
+    return text
+
+
+def try_values(chance: random.Random, case: Case, path: Path) -> bool:
+    """Set values by one of the ways; whether they were accepted. Raises anything but a CaseError with places."""
+    keys = [chance.choice(KNOWN_KEYS) if chance.random() < 0.5 else make_key(chance, KEY_PARTS) for _ in range(2)]
+    keys = keys[: chance.choice([1, 1, 2])]
+    if chance.random() < 0.1:
+        keys[0] = chance.choice(OBJECTS)  # type: ignore[call-overload]
+    way = chance.randrange(4)
+    try:
+        if way == 0:
+            texts = [f"{key}{chance.choice(['=', '=', '=', ''])}{make_value(chance)}" for key in keys]
+            changes = read_options(texts)
+            model = make_checked_model(path, changes, label_option)
+            assert read_overrides(model.overrides).keys() == changes.keys()
+            assert write_overrides(read_overrides(model.overrides)) == model.overrides
+        elif way == 1:
+            new = case.replace({key: chance.choice(OBJECTS) for key in keys if getattr(key, "__hash__", None)})
+            new.write(path.with_name("new.toml"))
+            assert Case.read(path.with_name("new.toml")) == new or "nan" in new.text
+            assert repr(new) and new._repr_html_()
+        elif way == 2:
+            several = read_values(f"{key}={make_value(chance)},{make_value(chance)}" for key in keys)
+            check_combinations(check_values(several))
+        else:
+            model = make_checked_model(case)
+            names = list_quantity_names(model, generate_mesh(model))
+            read_quantities([make_key(chance, QUANTITY_PARTS), "steps.number"], names, "-q ")
+    except CaseError as error:
+        assert str(error).count("\n  ") >= 1 and ": found " in str(error), f"a fault without its place: {error}"
+        wrong = [each for each in str(error) if is_control(each) and each != "\n"]
+        assert not wrong, f"control characters {wrong}"
+        return False
+    return True
+
+
+def fuzz_values(seed: int, numbers: range, failures: Failures) -> int:
+    """Set so many mutants of values; returns how many were accepted."""
+    accepted = 0
+    with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        path = Path(name) / "case.toml"
+        path.write_text(SMALL, encoding="utf-8")
+        case = Case.read(path)
+        for number in numbers:
+            try:
+                with alarm(PATIENCE):
+                    accepted += try_values(random.Random(f"{seed}/{number}"), case, path)
+            except Exception as error:
+                failures.add(number, error)
+    return accepted
+
 
 
 def damage(chance: random.Random, whole: bytes, other: bytes) -> bytes:
@@ -730,7 +826,7 @@ def is_too_large(path: Path) -> bool:
 
 
 KINDS: dict[str, Callable[[int, range, Failures], int]] = {
-    "cases": fuzz_cases, "results": fuzz_results, "commands": fuzz_commands, "runs": fuzz_runs,
+    "cases": fuzz_cases, "values": fuzz_values, "results": fuzz_results, "commands": fuzz_commands, "runs": fuzz_runs,
 }
 
 

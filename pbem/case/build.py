@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from pbem.case.case import Case
-from pbem.case.reader import add_lines, parse_draft, read_case_text
+from pbem.case.changed import ChangedDraft, Label, change_draft, label_key, label_option
+from pbem.case.overrides import read_overrides, write_overrides
+from pbem.case.reader import FileDraft, add_lines, parse_draft, read_case_text
 from pbem.case.writer import write_tables
 from pbem.contact.custom import read_law_texts
 from pbem.contact.strength import check_custom_laws, list_laws
 from pbem.description import case as description
+from pbem.description.case import Draft
 from pbem.errors import CaseError
 from pbem.model.build import build_model, examine, shorten
 from pbem.model.model import Model
@@ -27,26 +30,45 @@ def read_model(path: str | Path) -> tuple[Case, Model]:
     return parse_model(read_case_text(path), str(path))
 
 
-def parse_model(text: str, source: str = "case") -> tuple[Case, Model]:
-    """`parse_case` and `build_model` in one: raises CaseError with the faults of both together."""
+def parse_model(text: str, source: str = "case", overrides: str = "") -> tuple[Case, Model]:
+    """`parse_case` and `build_model` in one: raises CaseError with the faults of both together.
+
+    overrides: what a result file keeps of the values that were set (`pbem.case.overrides`); the case has them.
+    """
+    return _build_text(text, source, read_overrides(overrides), label_key)
+
+
+def _build_text(text: str, source: str, changes: Mapping[str, Any], label: Label) -> tuple[Case, Model]:
     draft = parse_draft(text, source)
-    model, faults = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
-    faults = [*draft.faults, *add_lines(faults, draft.lines)]
+    model = _build(draft, source, changes, label)
+    return Case.take(model[0], text), replace(model[1], source=text)
+
+
+def _build(
+    draft: Draft, source: str, changes: Mapping[str, Any], label: Label
+) -> tuple[description.Case, Model]:
+    """The case and the model of a draft with values set. Raises CaseError with the faults of all together."""
+    if changes and draft.case is not None:
+        draft = change_draft(draft, changes, label)
+    model, found = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
+    if isinstance(draft, ChangedDraft):
+        found = draft.name_places(found)
+    elif isinstance(draft, FileDraft):
+        found = add_lines(found, draft.lines)
+    faults = [*draft.faults, *found]
     if draft.case is None or model is None or faults:
         raise CaseError(source, shorten(faults))
-    return Case.take(draft.case, text), replace(model, source=text)
+    return draft.case, replace(model, overrides=write_overrides(changes))
 
 
-def describe_model(tables: Mapping[str, Any]) -> Model:
+def describe_model(tables: Mapping[str, Any], changes: Mapping[str, Any] | None = None) -> Model:
     """The model of tables given by calls: raises CaseError with the faults of keys and of topology together.
 
     Its text, which the results store, is that of a file with these tables.
     """
     draft = description.draft_tables(tables)
-    model, faults = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
-    faults = [*draft.faults, *faults]
-    if draft.case is None or model is None or faults:
-        raise CaseError(description.UNNAMED, shorten(faults))
+    _, model = _build(draft, description.UNNAMED, changes or {}, label_key)
+    assert draft.case is not None
     return replace(model, source=write_tables(draft.case.given))
 
 
@@ -57,27 +79,30 @@ def find_file(source: Source) -> Path | None:
     return None if isinstance(source, Mapping) else Path(source)
 
 
-def make_checked_model(source: Source) -> Model:
+def make_checked_model(source: Source, changes: Mapping[str, Any] | None = None, label: Label = label_key) -> Model:
     """The model of a case, of its tables, or of a file, with the texts of its custom laws, which are tried.
 
-    Raises CaseError with its faults; those of laws come last.
+    changes: values set by keys, see `pbem.case.case.Case.replace`; the results keep them beside the case. label: how
+    messages name them. Raises CaseError with its faults; those of laws come last.
     """
     if isinstance(source, description.Case):
-        name, model = source.source, replace(build_model(source), source=_find_text(source))
+        name = source.source
+        model = _build(Draft(source, ()), name, changes, label)[1] if changes else build_model(source)
+        model = replace(model, source=_find_text(source))
     elif isinstance(source, Mapping):
-        name, model = description.UNNAMED, describe_model(source)
+        name, model = description.UNNAMED, describe_model(source, changes)
     else:
-        return read_checked_model(Path(source))
+        name = str(source)
+        model = _build_text(read_case_text(source), name, changes or {}, label)[1]
     return _take_laws(model, name)
 
 
-def read_checked_model(path: Path) -> Model:
+def read_checked_model(path: Path, changes: Mapping[str, Any] | None = None) -> Model:
     """Read a case and build its model, with the texts of its custom laws, which are tried.
 
-    Raises CaseError with its faults; those of laws come last.
+    changes: values set on the command line. Raises CaseError with its faults; those of laws come last.
     """
-    _, model = read_model(path)
-    return _take_laws(model, str(path))
+    return make_checked_model(path, changes, label_option)
 
 
 def _find_text(case: description.Case) -> str:

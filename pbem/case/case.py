@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+from pbem.case.changed import change_draft, label_key
 from pbem.case.reader import parse_draft, read_case_text
 from pbem.case.writer import write_tables
 from pbem.description import case as description
@@ -45,6 +47,24 @@ class Case(description.Case):
         """The same case with the text that it was read from."""
         same = cls.__new__(cls)
         same._take({**vars(case), "_text": text})
+        return same
+
+    def replace(self, changes: Mapping[str, Any]) -> Self:
+        """A new case with values set by the paths of their keys; everything is checked again.
+
+            case.replace({"interfaces.seat.friction": 0.3, "curves.*.elements": 16, "stages.shear.steps": 40})
+
+        Paths are written as TOML's dotted keys: a name with dots stands in quotes. *, ? and [abc] in a name mean what
+        they mean in the shell, but for names in single quotes; a pattern stands for what is there, and cracks without
+        a law of their own. Entries of lists are numbered from 0; stages and generate also go by name. None takes a key
+        away. Setting one of friction and friction_angle, or of elements and size, takes the other away; any other
+        conflict is a fault, as in a file. Raises CaseError with every fault: unknown keys and names with the nearest.
+        """
+        draft = change_draft(description.Draft(self, ()), changes, label_key)
+        if draft.faults or draft.case is None:
+            raise CaseError(self.source, draft.faults)
+        same = type(self).__new__(type(self))
+        same._take(vars(draft.case))
         return same
 
     def write(self, path: str | os.PathLike[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from datetime import date, time
 from typing import Any
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -37,7 +38,7 @@ def _is_list_of_tables(value: Any) -> bool:
 
 
 def _write_key(key: str, value: Any) -> str:
-    return f"{_quote(key)} = {_write_value(value)}"
+    return f"{_quote(key)} = {write_value(value)}"
 
 
 def _quote(key: str) -> str:
@@ -49,7 +50,8 @@ def _write_text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _write_value(value: Any) -> str:
+def write_value(value: Any) -> str:
+    """A value in TOML's notation, on one line."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):
@@ -58,4 +60,6 @@ def _write_value(value: Any) -> str:
         return _write_text(value)
     if _is_table(value):
         return "{ " + ", ".join(_write_key(*item) for item in value.items()) + " }" if value else "{}"
-    return "[" + ", ".join(map(_write_value, value)) + "]"
+    if isinstance(value, date | time):
+        return value.isoformat()
+    return "[" + ", ".join(map(write_value, value)) + "]"

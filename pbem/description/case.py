@@ -33,6 +33,7 @@ from pbem.description.schema import (
     StressTable,
     UnitsTable,
 )
+from pbem.description.summary import print_case, print_case_as_html
 from pbem.description.translation import find_schema_findings
 from pbem.description.varying import ExpressionTable
 from pbem.errors import CaseError, Fault, KeyPath
@@ -106,9 +107,12 @@ class Case:
         return isinstance(other, Case) and self.given == other.given
 
     def __repr__(self) -> str:
-        parts = ("materials", "curves", "regions", "interfaces", "contacts", "stages")
-        counts = [f"{len(getattr(self, part))} {part}" for part in parts if getattr(self, part)]
-        return f"<Case {self.title!r}: {', '.join(counts)}>"
+        """A few lines: the names of what there is."""
+        return print_case(self)
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return print_case_as_html(self)
 
     def trace(self, fault: Fault) -> Fault:
         """The fault at what was given: of a curve, region or law that was generated, at the key it was made from."""

@@ -177,7 +177,7 @@ class Model:
     origin: point of the user's coordinates about which those of the model are, 0 unless the model is far from there.
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
-    were when the case was read.
+    were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
@@ -204,6 +204,7 @@ class Model:
     groups: tuple[GeneratedGroup, ...] = ()
     ties: tuple[Tie, ...] = ()
     law_texts: Mapping[str, str] = field(default_factory=dict)
+    overrides: str = ""
     origin: complex = 0j
 
     @cached_property

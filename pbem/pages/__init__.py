@@ -21,6 +21,8 @@ TOPICS = {
     "laws": "friction laws, and how to write one",
     "signs": "signs and directions",
     "results": "the result file, and how to read it in Python",
+    "python": "cases, runs and values that are set, in Python",
+    "sweeps": "a case with many values: a table, one row each",
     "convergence": "how contact is solved, why a run stops, and what to do",
     "accuracy": "meshes, estimated errors, and measured accuracy",
     "large-models": "thousands of cracks or inclusions: methods, time and memory",

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from pbem.model.model import Model
+from pbem.wording import show
 
 
 def dump_configuration(model: Model) -> str:
     """JSON text of the model without the texts that it was read from; complex points as [x, y]."""
-    texts = ("source", "notes", "law_texts")
+    texts = ("source", "notes", "law_texts", "overrides")
     return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 
@@ -33,3 +34,61 @@ def to_plain(value: Any) -> Any:
     if value is None or isinstance(value, str | bool | int | float):
         return value
     return str(value)
+
+
+# What a run can go on with though it is told otherwise: the past is the same.
+MAY_CHANGE = ("title", "units_length", "units_stress")
+
+
+def find_change(stored: str, model: Model) -> str:
+    """What is not as in the configuration that a file keeps, in a few words; "" if stages were added at most.
+
+    The last stage may be the first of several now; what its steps were is told by their fractions.
+    """
+    try:
+        before = json.loads(stored)
+    except ValueError:
+        return "it does not say how it was computed"
+    now = json.loads(dump_configuration(model))
+    if not isinstance(before, dict):
+        return "it does not say how it was computed"
+    for each in (before, now):
+        for name in MAY_CHANGE:
+            each.pop(name, None)
+        if model.analysis.accuracy is not None:
+            _drop_fractions(each)  # of a mesh that may have been refined; the places of its nodes are compared
+    had, has = before.get("stages"), now.get("stages")
+    if not isinstance(had, list) or len(had) > len(has):
+        return f"stages: {len(had) if isinstance(had, list) else 'none'} before, {len(has)} now"
+    now["stages"] = has[: len(had)]
+    return _find_difference(before, now, "")
+
+
+def _drop_fractions(configuration: dict[str, Any]) -> None:
+    curves = configuration.get("curves")
+    for curve in curves.values() if isinstance(curves, dict) else ():
+        for leg in curve.get("legs", ()) if isinstance(curve, dict) else ():
+            leg.pop("fractions", None)
+
+
+def _find_difference(before: Any, now: Any, place: str) -> str:
+    """Where two plain values differ first, and how; "" if they do not."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for key in (*before, *(key for key in now if key not in before)):
+            if key not in before or key not in now:
+                return f"{_join(place, key)} {'is new' if key in now else 'is no more'}"
+            found = _find_difference(before[key], now[key], _join(place, key))
+            if found:
+                return found
+        return ""
+    if isinstance(before, list) and isinstance(now, list):
+        if len(before) != len(now):
+            return f"{place}: {len(before)} entries before, {len(now)} now"
+        pairs = enumerate(zip(before, now, strict=True))
+        return next((found for k, pair in pairs if (found := _find_difference(*pair, f"{place}[{k + 1}]"))), "")
+    same = before == now or (before != before and now != now)  # not a number
+    return "" if same else f"{place} was {show(before)} and is {show(now)}"
+
+
+def _join(place: str, key: str) -> str:
+    return f"{place}.{key}" if place else key

@@ -36,6 +36,8 @@ def describe_results(results: Results) -> str:
         ("steps stored", _describe_steps(results)),
         ("iterations", _describe_iterations(results)),
     ]
+    if results.overrides:
+        lines.insert(1, ("values set", ", ".join(results.overrides.splitlines())))
     parts = ["\n".join(f"{key + ':':14s}{value}" for key, value in lines)]
     if k:
         parts.append(_section("contact at the last step", _table(

@@ -60,6 +60,7 @@ def write_attributes(
     """Write what the whole file is about; the status becomes "running", and an earlier failure is forgotten."""
     attributes: dict[str, Any] = {
         "title": model.title, "pbem_version": __version__, "petsc_version": petsc_version, "case": model.source,
+        "overrides": model.overrides,
         "units_length": model.units_length, "units_stress": model.units_stress, "status": "running",
         "ranks": np.int32(ranks), "configuration": dump_configuration(model),
         "petsc_options": " ".join(petsc_options), "custom_laws": json.dumps(dict(model.law_texts)),

@@ -17,12 +17,13 @@ PICTURE_FORMATS = (".png", ".pdf", ".svg")
 
 def check_output_path(
     path: str | os.PathLike[str], *, resume: bool = False, force: bool = False, source: str | None = None,
-    inputs: Iterable[str | os.PathLike[str]] = (),
+    overrides: str = "", inputs: Iterable[str | os.PathLike[str]] = (),
 ) -> Path:
     """The path of a result file to be written, if its folder exists and it can be written there.
 
     resume: a file that is there is to be gone on with; force: it may be replaced, if it is a result file. source: text
-    of the case, to say whether a file that is there belongs to it. inputs: files that are read, and never replaced.
+    of the case, and overrides: values set beside it, to say whether a file that is there belongs to it. inputs: files
+    that are read, and never replaced.
 
     Raises ResultFileError otherwise. Nothing is left behind, and a file that is there already is left as it is.
     """
@@ -35,7 +36,7 @@ def check_output_path(
     if resume and not target.exists():
         raise ResultFileError(str(path), "there is no such file to resume; run without resuming")
     if target.exists() and not resume:
-        _refuse_to_replace(target, force, source)
+        _refuse_to_replace(target, force, source, overrides)
     try:
         if target.exists():
             target.open("ab").close()
@@ -69,14 +70,15 @@ def _check_folder(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _refuse_to_replace(target: Path, force: bool, source: str | None) -> None:
+def _refuse_to_replace(target: Path, force: bool, source: str | None, overrides: str) -> None:
     """Raise ResultFileError unless the file that is there may be replaced: it is a result file, and force is set."""
     try:
         with refuse_damage(target):
             check_contents(target)
         with open_quietly(target) as file:
             known = "pbem_version" in file.attrs
-            other = known and source is not None and file.attrs.get("case") != source
+            told = (file.attrs.get("case"), file.attrs.get("overrides", ""))
+            other = known and source is not None and told != (source, overrides)
     except ResultFileError:  # cut off or damaged
         with target.open("rb") as file:
             known, other = file.read(len(SIGNATURE)) == SIGNATURE, False
@@ -87,7 +89,7 @@ def _refuse_to_replace(target: Path, force: bool, source: str | None) -> None:
         go_on = "" if other else "--resume goes on with them, "
         raise ResultFileError(
             str(target), f"holds {what}; {go_on}--force replaces them, -o names another file"
-            + (" (--resume is for results of the same case)" if other else "")
+            + (" (--resume is for results of the same case, or of its first stages)" if other else "")
         )
 
 

@@ -49,7 +49,8 @@ class Results:
     energies; balance: of the forces on every region, and linearity: how large strains and slips are, None in files of
     earlier versions; interior: points inside, None if the case has none; convergence: one row per Newton iteration with
     the fields step, iteration, residual, changed, stick, slip, open, seconds.
-    failure: why the run ended early (status "failed" or "stopped"), empty if it did not, or was killed.
+    overrides: values that were set beside the case, a line KEY = VALUE each. failure: why the run ended early (status
+    "failed" or "stopped"), empty if it did not, or was killed.
     """
 
     path: Path
@@ -58,6 +59,7 @@ class Results:
     failure: str
     units: Units
     case: str
+    overrides: str
     configuration: str
     pbem_version: str
     petsc_version: str
@@ -160,7 +162,8 @@ def _read(path: Path, file: h5py.File) -> Results:
         path=path,
         **{name: str(attributes[name]) for name in ("title", "case", "pbem_version", "petsc_version")},
         status=_read_status(path, attributes), failure=str(attributes.get("failure", "")),
-        configuration=str(attributes.get("configuration", "")), ranks=int(attributes["ranks"]),
+        configuration=str(attributes.get("configuration", "")), overrides=str(attributes.get("overrides", "")),
+        ranks=int(attributes["ranks"]),
         units=Units(str(attributes["units_length"]), str(attributes["units_stress"])),
         nodes=Nodes(
             position=freeze(nodes["position"][...]), normal=freeze(nodes["normal"][...]),

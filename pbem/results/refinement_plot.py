@@ -27,7 +27,7 @@ def read_refined(results: Results) -> tuple[Model, Mesh, Integer]:
     """
     if results.fractions is None:
         raise ResultFileError(str(results.path), "was not refined: analysis.accuracy is not in its case")
-    first = parse_model(results.case, str(results.path))[1]
+    first = parse_model(results.case, str(results.path), results.overrides)[1]
     model = impose_fractions(first, results.fractions)
     mesh = generate_mesh(model)
     levels = np.zeros(mesh.elements, dtype=np.int64)

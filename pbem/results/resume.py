@@ -11,6 +11,7 @@ import numpy as np
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.results.configuration import find_change
 from pbem.results.energy import Energy
 from pbem.results.layout import (
     ENERGIES,
@@ -31,12 +32,15 @@ SAME_PLACE = 1e-12
 
 
 def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> None:
-    """Raise ResultFileError unless the file holds this case on this mesh."""
+    """Raise ResultFileError unless the file holds this case on this mesh, or its first stages."""
     if "case" not in file.attrs:
         raise ResultFileError(path, "is not a result file of pbem")
-    if file.attrs["case"] != model.source:
-        raise ResultFileError(path, "holds the results of another case, or the case file was changed since; "
-                                    "run without resuming, or name another output file")
+    if (file.attrs["case"], file.attrs.get("overrides", "")) != (model.source, model.overrides):
+        change = find_change(str(file.attrs.get("configuration", "")), model)
+        if change:
+            raise ResultFileError(path, f"holds the results of another case, or the case file was changed since: "
+                                        f"{change}; only stages can be added to a history that is gone on with; run "
+                                        "without resuming, or name another output file")
     before = json.loads(str(file.attrs.get("custom_laws", "{}")))
     for name, text in model.law_texts.items():
         if before.get(name) != text and text not in before.values():
@@ -54,6 +58,11 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
     if stored.shape != position.shape or np.abs(stored - position).max() > same:
         raise ResultFileError(path, "holds another mesh of this case (it was written by another version of pbem); "
                                     "run without resuming")
+
+
+def name_stages(file: h5py.File, model: Model) -> None:
+    """Let the file know the stages, to which some may have been added."""
+    file["steps/stage"].attrs["names"] = np.array([stage.name for stage in model.stages], dtype=h5py.string_dtype())
 
 
 def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:

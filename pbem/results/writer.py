@@ -38,7 +38,7 @@ from pbem.results.layout import (
 from pbem.results.lazy import refuse_damage
 from pbem.results.linearity import append_linearity
 from pbem.results.output import check_output_path
-from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
+from pbem.results.resume import check_same_case, name_stages, read_last_energy, read_last_step, truncate
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
@@ -113,6 +113,7 @@ class ResultWriter:
                 reached = None if last_step is None else read_last_energy(file)
                 truncate(file, 0 if last_step is None else last_step.number)
                 write_attributes(file, model, ranks, petsc_version, petsc_options)
+                name_stages(file, model)
             writer = cls.__new__(cls)
             writer._start(target, storage, model, mesh, last_step, reached)
             storage.commit()

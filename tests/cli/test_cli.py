@@ -18,11 +18,12 @@ import pytest
 import pbem
 from pbem import bundled
 from pbem.bundled import find_case, list_bundled_cases
-from pbem.cli import OPERATORS, main, split_petsc_options
+from pbem.cli import main, split_petsc_options
 from pbem.description.schema import SolverTable
 from pbem.errors import CaseError, ConvergenceError
 from pbem.model.model import Operator
 from pbem.results.reader import open_results
+from pbem.run_command import OPERATORS
 from tests.cli.cli_sample import BLOCKS
 
 Capture = pytest.CaptureFixture[str]

@@ -48,9 +48,9 @@ def run_python(text: str, folder: Path) -> list[str]:
 def test_all_snippets_are_found() -> None:
     # Else the tests below could pass because they look at nothing.
     assert set(FILES) == {"first.toml", "limited_friction.py"}
-    assert (len(SNIPPETS), len(FRAGMENTS)) == (3, 1)
+    assert (len(SNIPPETS), len(FRAGMENTS)) == (5, 1)
     whole = "".join(TEXTS)
-    assert whole.count("```python") == 5 and whole.count("```toml") == 2
+    assert whole.count("```python") == 7 and whole.count("```toml") == 2
     assert len(COMMANDS) == sum(text.count("\n") for language, text in BLOCKS if language == "sh") > 10
 
 
@@ -66,7 +66,7 @@ def test_the_first_case_is_the_one_that_comes_with_the_program() -> None:
 
 
 def test_the_first_case_gives_the_forces_that_are_told(folder: Path) -> None:
-    lines = run_python(find_snippet("first.toml"), folder)
+    lines = run_python(find_snippet("first.toml", "seat.slip"), folder)
     along, down = (abs(float(number)) for number in lines[2].strip("[]").split())
     assert f"carries {along:.3f} along and {down:.3f} down" in README
     assert float(lines[1]) > 0.9, "the part that slips"
@@ -85,6 +85,14 @@ def test_the_crack_made_in_python_has_the_stress_intensity_of_its_friction(folde
         expected = driving * (3.14159265 * 0.7 * 2**0.5) ** 0.5
         assert abs(start) == pytest.approx(expected, rel=1e-4) == abs(end)
     assert pbem.Case.read(folder / "inclined.toml").interfaces["crack"].friction == 0.2
+
+
+def test_cases_are_changed_and_swept_in_python(folder: Path) -> None:
+    lines = run_python(find_snippet("case.replace("), folder)
+    assert lines[-1] == "interfaces.seat.friction = 0.2"
+    assert pbem.Case.read(folder / "finer.toml").interfaces["seat"].friction == 0.3
+    lines = run_python(find_snippet("pbem.sweep("), folder)
+    assert lines[-1] == "0.6 finished " + lines[-1].split()[-1] and (folder / "first.csv").is_file()
 
 
 def test_a_law_of_ones_own_gives_the_force_that_is_told(folder: Path) -> None:
@@ -109,7 +117,7 @@ def test_the_readme_shows_the_picture_and_is_short() -> None:
 def test_commands_are_those_of_the_program(line: str) -> None:
     words = shlex.split(line, comments=True)
     options = make_parser().parse_args(words[words.index("pbem") + 1 :])
-    assert options.command in ("check", "run", "info", "plot", "make", "help")
+    assert options.command in ("check", "run", "sweep", "info", "plot", "make", "help")
     for name in ("case", "file"):
         path = getattr(options, name, "")
         assert Path(path).stem in ("", "first", "field"), f"{path} is not shown"

@@ -13,12 +13,13 @@ from pathlib import Path
 # The package itself comes last: it offers what they define.
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "solve", "results", "progress",
-    "driver", "make_command", "bundled", "check_command", "pages", "cli", "__main__", "__init__",
+    "driver", "sweeps", "bundled", "terminal", "make_command", "check_command", "run_command", "sweep_command", "pages",
+    "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock")
 # ... but mechanics knows nothing of processes, and results are read without them.
-MAY_BE_PARALLEL = ("solve", "driver", "cli", "__main__", "parallel")
+MAY_BE_PARALLEL = ("solve", "driver", "sweeps", "run_command", "sweep_command", "cli", "__main__", "parallel")
 
 # Each of these comes in by one door only.
 DOORS = {

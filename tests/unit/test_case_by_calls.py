@@ -203,10 +203,16 @@ def test_arguments_are_copied() -> None:
     assert pbem.Case(**case.given) == case != pbem.Case(**tables)
 
 
-def test_a_case_prints_in_a_line() -> None:
-    assert repr(pbem.Case(**alter(("title", "A crack")))) == (
-        "<Case 'A crack': 1 materials, 2 curves, 1 regions, 1 interfaces>"
-    )
+def test_a_case_prints_in_a_few_lines() -> None:
+    case = pbem.Case(**alter(("title", "A crack & more")))
+    assert repr(case).splitlines() == [
+        "<Case: A crack & more", "  materials   rock", "  curves      wall, crack", "  regions     body",
+        "  conditions  wall", "  interfaces  crack", "  stages      1 step", "  analysis    SST, order 2>",
+    ]  # fmt: skip
+    table = case._repr_html_()
+    assert table.startswith("<table><caption>A crack &amp; more</caption><tr><th>materials</th><td>rock</td></tr>")
+    made = repr(pbem.Case.parse(GENERATED.replace("elements = 1", "elements = 4")))
+    assert "cracks joint" in made and len(made.splitlines()) < 10
 
 
 def test_what_was_generated_is_as_in_a_file() -> None:

@@ -153,7 +153,9 @@ def load_fuzzer() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize(("kind", "count", "seed"), [("cases", 150, 7), ("results", 6, 7), ("commands", 40, 7)])
+@pytest.mark.parametrize(("kind", "count", "seed"), [
+    ("cases", 150, 7), ("values", 120, 7), ("results", 6, 7), ("commands", 40, 7),
+])  # fmt: skip
 def test_mutants_are_accepted_or_refused_with_their_place(kind: str, count: int, seed: int) -> None:
     """A few seconds of scripts/fuzz.py, which makes as many as one wants."""
     accepted, failures = load_fuzzer().fuzz(kind, count, seed)

@@ -25,19 +25,24 @@ from pbem.solve.problem.step import ContactState, SilentReporter, Step
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.system.kept import KeptProblems
 
 
 class SecondSolution:
     """Marches on the coarser mesh behind a run; all ranks together, with the same numbers on all."""
 
-    def __init__(self, beside: Beside, comm: MPI.Intracomm, start: Step | None = None) -> None:
-        """Begins at rest, or with the memory of a step of the run, carried over.
+    def __init__(
+        self, beside: Beside, comm: MPI.Intracomm, start: Step | None = None, kept: KeptProblems | None = None
+    ) -> None:
+        """Begins at rest, or with the memory of a step of the run, carried over; with what earlier ones have kept.
 
         Raises ConvergenceError where the operator cannot be assembled well enough.
         """
         self.beside = beside
-        self.problem: Problem = assemble_problem(beside.model, beside.mesh, comm)
-        self.tangent: TangentOperator = self.problem.make_tangent()
+        model, mesh = beside.model, beside.mesh
+        self.problem: Problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
+        self.tangent: TangentOperator = kept.take_tangent(self.problem) if kept else self.problem.make_tangent()
+        self._kept = kept is not None
         self.memory: Memory = start_memory(self.problem.laws)
         self._watch = Watch(comm, SilentReporter(), StopSignals())
         self._watch.look_after(self.problem.laws)
@@ -122,4 +127,5 @@ class SecondSolution:
 
     def destroy(self) -> None:
         """Free the storage; after an exception of one rank it is not called."""
-        self.tangent.destroy()
+        if not self._kept:
+            self.tangent.destroy()

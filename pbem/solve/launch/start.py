@@ -16,7 +16,7 @@ from pbem.environment import find_launch, is_allowed, judge_nodes, read_site, re
 from pbem.errors import LaunchError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.parallel import broadcast, describe_library, gather_by_node, refuse_together
+from pbem.parallel import broadcast, describe_library, gather_by_node, refuse_together, world
 from pbem.solve.petsc.session import PETSc
 from pbem.solve.system.choice import choose_system
 
@@ -45,10 +45,11 @@ def check_start(comm: MPI.Intracomm) -> tuple[str, ...]:
     Raises LaunchError on all ranks alike: copies that MPI does not join, libraries that do not fit, too many threads;
     MemoryError on a rank that has too little to begin with.
     """
-    copies = refuse_copies(find_launch(os.environ), comm.size, describe_library())
+    # The communicator can be a part of the world; what is asked here of the world needs no other rank.
+    copies = refuse_copies(find_launch(os.environ), world.size, describe_library())
     if copies:
         raise LaunchError(copies)  # each copy is alone: there is nobody to ask
-    refuse_together(comm, refuse_libraries(read_libraries(), comm.size))
+    refuse_together(comm, refuse_libraries(read_libraries(), world.size))
     allowed = broadcast(comm, is_allowed(os.environ))
     refusal, notes = judge_nodes(gather_by_node(comm, read_site(os.environ)), allowed)
     if refusal:

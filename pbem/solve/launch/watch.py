@@ -27,7 +27,7 @@ class Watch:
     """
 
     def __init__(self, comm: MPI.Intracomm, listener: Reporter, signals: StopSignals) -> None:
-        self._comm = comm
+        self.comm = comm
         self._listener: Reporter | None = listener
         self._signals = signals
         self._laws: tuple[CustomLaw, ...] = ()
@@ -82,15 +82,15 @@ class Watch:
         fault = find_fault(self._laws)
         sums = np.concatenate([np.zeros(0), *(law.sums for law in self._laws)])
         own = np.concatenate([[bool(self._signals.asked), bool(fault)], sums])
-        alike = np.empty((self._comm.size, len(own)))
-        self._comm.Allgather(own, alike)
+        alike = np.empty((self.comm.size, len(own)))
+        self.comm.Allgather(own, alike)
         for law in self._laws:
             law.sums[:] = 0.0
         if alike[:, 0].any():
-            asked = next(each for each in self._comm.allgather(self._signals.asked) if each)
+            asked = next(each for each in self.comm.allgather(self._signals.asked) if each)
             raise StopError(*asked)
         if alike[:, 1].any():
-            raise LawError(next(text for text in self._comm.allgather(fault) if text))
+            raise LawError(next(text for text in self.comm.allgather(fault) if text))
         for number, law in enumerate(self._laws):
             parts = alike[:, 2 + 6 * number : 8 + 6 * number]
             if (np.abs(parts - parts[0])[:, :3] > EQUAL * parts[:, 3:].max()).any():

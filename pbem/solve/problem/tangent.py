@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -92,6 +92,9 @@ class TangentOperator(Protocol):
     ) -> ModeState:
         """Modes (m,) on which groups of elements settle by themselves; those that there are where none do."""
         return modes
+
+    def take_over(self, problem: Any) -> None:
+        """Serve another problem with the same system and the same pairs that can change; what holds for it is kept."""
 
     def destroy(self) -> None:
         """Free the storage."""

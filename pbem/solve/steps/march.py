@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
+from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
@@ -22,6 +23,10 @@ from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_
 
 # After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
 TRIED_FROM_REST = 2
+
+
+# The modes that are expected at a fraction of a stage; None where nothing is.
+Guess = Callable[[int, float], ModeState | None]
 
 
 @dataclass(frozen=True)
@@ -47,17 +52,21 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     return Start(number, stage, factor, memory)
 
 
-def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> Iterator[Step]:
+def march(
+    problem: Problem, reporter: Reporter, start: Start | None = None, kept: TangentOperator | None = None,
+    guess: Guess | None = None,
+) -> Iterator[Step]:
     """Yield the converged steps of all stages in turn.
 
     A step that fails is halved, down to solver.min_step of a stage, unless its problem is the same at every fraction.
     Where small steps from rest are all alike (see is_proportional_at_last) the least is tried after TRIED_FROM_REST: if
     that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
     always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
-    the steps before it were yielded.
+    the steps before it were yielded. kept: a tangent operator that is used and not destroyed. guess: the modes
+    with which the search for those of a step begins.
     """
     begin = start or start_from_rest(problem)
-    tangent = problem.make_tangent()
+    tangent = kept or problem.make_tangent()
     number, memory, noted, told, depth = begin.number, begin.memory, 0.0, 0.0, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
@@ -67,7 +76,7 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
                 solution, reached, ceiling = _advance(
-                    problem, tangent, memory, stage, reached, planned, ceiling, reporter
+                    problem, tangent, memory, stage, reached, planned, ceiling, reporter, guess
                 )
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
                 number += 1
@@ -79,14 +88,16 @@ def march(problem: Problem, reporter: Reporter, start: Start | None = None) -> I
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
-        tangent.destroy()
+        if kept is None:
+            tangent.destroy()
         raise
-    tangent.destroy()
+    if kept is None:
+        tangent.destroy()
 
 
 def _advance(
     problem: Problem, tangent: TangentOperator, memory: Memory, stage: int, reached: float, planned: float,
-    ceiling: Ceiling, reporter: Reporter,
+    ceiling: Ceiling, reporter: Reporter, guess: Guess | None,
 ) -> tuple[Solution, float, Ceiling]:
     """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
 
@@ -104,7 +115,8 @@ def _advance(
         try:
             load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
             begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
-            solution = solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
+            solution = _solve_guessed(problem, tangent, begin, load, reporter, guess and guess(stage, target))
+            solution = solution or solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
             balanced = find_balanced(problem, memory, stage, reached, target)
@@ -122,6 +134,19 @@ def _advance(
             reporter.reject(error.reason, error.detail)
             tries += 1
             target = reached + (least if alike and tries == TRIED_FROM_REST else half)
+
+
+def _solve_guessed(
+    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Reporter, guessed: ModeState | None
+) -> Solution | None:
+    """The solution of a search that begins with other modes than those of the memory; None if it does not settle."""
+    if guessed is None:
+        return None
+    try:
+        solution = solve_step(problem, tangent, replace(begin, modes=guessed), load, reporter, hurried=True)
+    except ConvergenceError:
+        return None
+    return replace(solution, memory=replace(solution.memory, modes=begin.modes))
 
 
 def _never(_: Memory) -> ConvergenceError | None:

@@ -6,13 +6,13 @@ import numpy as np
 from mpi4py import MPI
 
 from pbem.bem.operator import scale_equations
-from pbem.contact.anchor import anchor_motions
-from pbem.contact.laws import collect_laws
-from pbem.contact.loads import collect_outer_nodes
+from pbem.contact.anchor import Anchor, anchor_motions
+from pbem.contact.laws import PairLaws, collect_laws
+from pbem.contact.loads import OuterNodes, collect_outer_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.rigid_body_modes import find_rigid_body_modes
-from pbem.solve.problem.problem import Problem
+from pbem.model.rigid_body_modes import RigidBodyMode, find_rigid_body_modes
+from pbem.solve.problem.problem import Problem, System
 from pbem.solve.system.choice import choose_system
 
 
@@ -24,13 +24,22 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
     anchored = find_rigid_body_modes(model)
     anchors = anchor_motions(mesh, anchored)
+    system = choose_system(model, mesh).assemble(comm, model, mesh, outer, laws, anchors)
+    return join_problem(comm, model, mesh, outer, laws, system, anchors, anchored)
+
+
+def join_problem(
+    comm: MPI.Intracomm, model: Model, mesh: Mesh, outer: OuterNodes, laws: PairLaws, system: System,
+    anchors: tuple[Anchor, ...], anchored: tuple[RigidBodyMode, ...],
+) -> Problem:
+    """The problem of a system that is there."""
     return Problem(
         comm=comm,
         model=model,
         mesh=mesh,
         outer=outer,
         laws=laws,
-        system=choose_system(model, mesh).assemble(comm, model, mesh, outer, laws, anchors),
+        system=system,
         traction_scale=_scale_tractions(model),
         equation_scale=scale_equations(mesh, [region.material for region in model.regions], model.size),
         anchors=anchors,

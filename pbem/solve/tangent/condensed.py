@@ -270,6 +270,12 @@ class CondensedTangent(TangentOperator):
         """See TangentOperator."""
         return self._condense(self._solve_system(forces), self._split(law).drop_offsets())[0]
 
+    def take_over(self, problem: Problem) -> None:
+        """See TangentOperator."""
+        self.problem = self.reference.problem = problem
+        if self.known is not None:  # the gap may be another
+            self.known = replace(self.known, load=None)
+
     def destroy(self) -> None:
         """See TangentOperator."""
         self.reference.destroy()

@@ -121,6 +121,10 @@ class FactoredTangent(TangentOperator):
         self.reference.form(constraints.matrix)
         self.factored = constraints.matrix
 
+    def take_over(self, problem: Problem) -> None:
+        """See TangentOperator."""
+        self.problem = self.reference.problem = problem
+
     def destroy(self) -> None:
         """See TangentOperator."""
         self.reference.destroy()

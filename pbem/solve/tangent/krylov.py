@@ -262,6 +262,11 @@ class KrylovTangent(TangentOperator):
         self._run_gmres()
         return self.gather(np.array(self._left.getArray()))
 
+    def take_over(self, problem: Problem) -> None:
+        """See TangentOperator."""
+        self.problem = problem
+        self.expected = self._sweeps = None
+
     def destroy(self) -> None:
         for item in (self._solver, self._matrix, self._right, self._left):
             item.destroy()

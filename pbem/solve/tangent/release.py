@@ -121,6 +121,11 @@ class ReleasedTangent(TangentOperator):
         """See TangentOperator."""
         return self.anchored.solve_forces(constraints, load, law, forces)
 
+    def take_over(self, problem: Problem) -> None:
+        """See TangentOperator."""
+        self.problem, self.held = problem, None
+        self.anchored.take_over(problem)
+
     def destroy(self) -> None:
         """See TangentOperator."""
         self.anchored.destroy()

@@ -1,0 +1,119 @@
+"""The state that a run has reached, as far as quantities are taken from it; collected while it goes on, without a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pbem.arrays import Integer, Real
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
+from pbem.model.model import Model
+from pbem.results.energy import Energy, EnergyBalance
+from pbem.results.interface_tips import list_tip_curves
+from pbem.results.tips import collect_tip_rules
+from pbem.solve.problem.step import SilentReporter, Step
+
+FACTORS = ("KI", "KII", "J", "T")
+
+
+@dataclass(frozen=True)
+class Names:
+    """What there is to ask for: outer curves, interfaces and cracks with pairs, cracks with tips; families of several.
+
+    families: the names that stand for more than one, each with its members.
+    """
+
+    reactions: tuple[str, ...]
+    contact: tuple[str, ...]
+    tips: tuple[str, ...]
+    families: Mapping[str, tuple[str, ...]]
+
+
+def list_quantity_names(model: Model, mesh: Mesh) -> Names:
+    """The names of a model; a table [[generate]] and a curve that was cut in pieces stand for all their curves."""
+    families: dict[str, list[str]] = {group.name: list(group.members) for group in model.groups}
+    contact = tuple(sort_pairs(mesh))
+    for name in dict.fromkeys((*model.curves, *contact)):
+        stem, dot, piece = name.rpartition(".")
+        if dot and piece.isdecimal() and stem not in model.curves:
+            families.setdefault(stem, []).append(name)
+    return Names(
+        tuple(model.conditions), contact, tuple(list_tip_curves(model, mesh)),
+        {name: tuple(members) for name, members in families.items()},
+    )
+
+
+class Outcome(SilentReporter):
+    """The last step of a run and its energies. A reporter: a run tells `begin` and `accept`.
+
+    step: None as long as there is none; iterations: of Newton's method so far.
+    """
+
+    model: Model
+    mesh: Mesh
+    energy: Energy
+    _balance: EnergyBalance
+
+    def __init__(self) -> None:
+        self.step: Step | None = None
+        self.iterations = 0
+
+    def begin(self, model: Model) -> None:
+        """A run begins, or a further pass of one."""
+        self.expect(model, generate_mesh(model))
+
+    def expect(self, model: Model, mesh: Mesh) -> None:
+        """The steps that follow are of this model and mesh."""
+        self.__dict__ = {"step": None, "iterations": self.iterations, "model": model, "mesh": mesh,
+                         "_balance": EnergyBalance(model, mesh, None, None), "energy": Energy(0.0, 0.0, 0.0)}
+
+    def accept(self, step: Step) -> None:
+        """Take a converged step."""
+        self.energy = self._balance.add(step)
+        self.iterations += len(step.iterations)
+        self.step = step
+        self.__dict__.pop("_tips", None)
+
+    @property
+    def last(self) -> Step:
+        """The last step; there is one."""
+        assert self.step is not None
+        return self.step
+
+    def find_pairs(self, name: str) -> Integer:
+        """The numbers of an interface's pairs; empty if there is none of this name."""
+        return self._pairs.get(name, np.zeros(0, dtype=np.int64))
+
+    @cached_property
+    def _pairs(self) -> Mapping[str, Integer]:
+        return sort_pairs(self.mesh)
+
+    def sum_reaction(self, curve: str) -> tuple[float, float, float]:
+        """Force along x and y of the traction on an outer curve, and its moment about the origin of coordinates."""
+        faces, step = self._faces, self.last
+        number = self.mesh.curve_names.index(curve)
+        on = faces.curve == number
+        force = faces.weight[on] * step.traction[on]
+        place = faces.position[on] + self.model.origin
+        return float(force.real.sum()), float(force.imag.sum()), float((np.conj(place) * force).imag.sum())
+
+    @cached_property
+    def _faces(self) -> Faces:
+        return list_faces(self.mesh)
+
+    def find_factors(self, crack: str) -> Mapping[str, Real]:
+        """KI, KII, J and T (2,) at the start and the end of a crack; NaN where no tip is."""
+        return self._tips.get(crack, {kind: np.full(2, np.nan) for kind in FACTORS})
+
+    @cached_property
+    def _tips(self) -> Mapping[str, Mapping[str, Real]]:
+        rules = collect_tip_rules(self.model, self.mesh)
+        if not rules.cracks:
+            return {}
+        values = rules.evaluate_all(self.last)
+        return {name: {kind: values[kind][k] for kind in FACTORS} for k, name in enumerate(rules.cracks)}

@@ -1,0 +1,347 @@
+"""A case computed with all combinations of some values: what is common to them is computed once."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, get_args
+
+from pbem.case.build import Source, find_file, make_checked_model
+from pbem.case.case import Case
+from pbem.case.changed import Label, label_key
+from pbem.case.overrides import write_overrides
+from pbem.case.writer import write_tables
+from pbem.description import case as description
+from pbem.driver import impose_operator, run
+from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
+from pbem.mesh.generate import generate_mesh
+from pbem.model.model import Model, Operator
+from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
+from pbem.solve.launch.start import check_shares, check_start
+from pbem.solve.launch.watch import Watch
+from pbem.solve.petsc.options import check_options
+from pbem.solve.petsc.session import petsc_options
+from pbem.solve.problem.step import SilentReporter
+from pbem.solve.steps.march import march
+from pbem.solve.system.kept import KeptProblems
+from pbem.sweeps.files import name_results
+from pbem.sweeps.outcome import Names, Outcome, list_quantity_names
+from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
+from pbem.sweeps.sharing import Share, choose_share, sort_cases
+from pbem.sweeps.table import Row, Table, TableFile
+from pbem.sweeps.values import check_combinations, check_values, combine, write_cell
+
+# Models that were made to try the values and are kept until they are computed.
+MOST_CHECKED = 32
+# Told of every case: how many there are and were before, its values and its row.
+Listener = Callable[[int, int, Mapping[str, Any], Row], None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all ranks know of a sweep. todo: the cases that are to be computed, in that order."""
+
+    names: Names
+    quantities: tuple[str, ...]
+    todo: tuple[dict[str, Any], ...]
+    share: Share
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What holds for all cases of a sweep. label: how messages name what was set. checked: models that are there."""
+
+    case: Source
+    fixed: Mapping[str, Any]
+    operator: Operator | None
+    petsc: Mapping[str, str]
+    keep: Path | None
+    neighbours: bool
+    label: Label
+    checked: dict[tuple[str, ...], Model] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """What messages call the case."""
+        path = find_file(self.case)
+        return description.UNNAMED if path is None else str(path)
+
+
+def sweep(
+    case: Source,
+    values: Mapping[str, Sequence[Any]],
+    quantities: Sequence[str] | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    keep: str | os.PathLike[str] | None = None,
+    set: Mapping[str, Any] | None = None,
+    petsc: Mapping[str, str] | None = None,
+    operator: Operator | None = None,
+    force: bool = False,
+    neighbours: bool = True,
+    comm: Comm | None = None,
+    listener: Listener | None = None,
+    label: Label = label_key,
+    option: str = "",
+) -> Table:
+    """Compute a case with all combinations of values, and return a table with one row each.
+
+    case: as of `pbem.run`. values: by keys, as of `Case.replace`, those that each key takes; the last key changes
+    fastest. quantities: what is taken from the last step of each, see `pbem help sweeps`; without: reactions, the
+    largest slips and openings, stress-intensity factors. out: a file for the table (CSV); one that is there is gone on
+    with: its rows are not computed again. keep: a folder for the result files of the cases; without, none are written,
+    and errors are not estimated. set: values that are the same in all. petsc, operator: as of `pbem.run`. force: begin
+    a table that is there anew. neighbours: begin the search for the statuses of a case with those of the one before
+    it, where laws do not remember; a case with more than one equilibrium, which high friction can have, may so end in
+    another one than alone. comm: ranks that share the cases, or each case, as is faster; all of them call this and
+    get the table. listener: told of each case, on the first rank. label, option: how messages name values, quantities.
+
+    A case that does not converge is a row with the status "failed" and the reason, a combination of values that makes
+    no case one with the status "refused"; neither has quantities, but for those of steps.
+
+    Raises CaseError with all that is wrong with the case, with any value by itself, and with the quantities;
+    ResultFileError (a table that is another one's, a folder that cannot be written); LaunchError; StorageError;
+    StopError or KeyboardInterrupt, after which the table can be gone on with.
+    """
+    comm = check_communicator(comm)
+    if operator is not None and operator not in get_args(Operator):
+        raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
+    setting = Setting(case, set or {}, operator, petsc or {}, None if keep is None else Path(keep), neighbours, label)
+    try:
+        with abort_if_unexpected(comm, PbemError):
+            check_start(comm)
+            several = do_on_first(comm, PbemError, lambda: _check(values, quantities))
+            file: list[TableFile] = []
+            plan = do_on_first(comm, PbemError, lambda: _make_plan(
+                setting, several, quantities, out, force, comm, file, option))
+            columns = read_quantities(plan.quantities, plan.names)
+            rows = _compute_all(setting, plan, columns, comm, _Keeper(several, file, listener, len(plan.todo)))
+            return _make_table(several, [each.title for each in columns], rows)
+    except StopError as error:
+        if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
+            raise KeyboardInterrupt from error
+        raise
+
+
+def _check(values: Mapping[str, Any], quantities: Sequence[str] | None) -> dict[str, list[Any]]:
+    several = check_values(values)
+    check_combinations(several)
+    if isinstance(quantities, str):
+        raise CaseError("the sweep", (Fault("quantities", "a text", "a list of texts"),))
+    return several
+
+
+def _cells(values: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(write_cell(each) for each in values.values())
+
+
+def _make_model(setting: Setting, values: Mapping[str, Any]) -> Model:
+    model = setting.checked.pop(_cells(values), None)
+    if model is None:
+        model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
+    return impose_operator(model, setting.name, setting.operator)
+
+
+def _make_plan(
+    setting: Setting, several: dict[str, list[Any]], quantities: Sequence[str] | None,
+    out: str | os.PathLike[str] | None, force: bool, comm: Comm, file: list[TableFile], option: str,
+) -> Plan:
+    """Check the case with every value, and find out what is to be computed; on the first rank, which opens the table.
+    """
+    cases = list(combine(several))
+    first = _check_values_alone(setting, several, cases[0])
+    check_options(setting.name, first.solver.petsc, setting.petsc)
+    mesh = generate_mesh(first)
+    names = list_quantity_names(first, mesh)
+    wanted = tuple(choose_quantities(first, names) if quantities is None else quantities)
+    columns = read_quantities(wanted, names, option)
+    overlap = [each.title for each in columns if each.title in several]
+    if overlap:
+        raise CaseError("the quantities", tuple(Fault(each, "a key that is set", "a quantity") for each in overlap))
+    if setting.keep is not None:
+        _make_folder(setting.keep)
+    if out is not None:
+        inputs = [path for path in (find_file(setting.case), *map(Path, first.law_texts)) if path is not None]
+        if any(Path(out).exists() and path.exists() and path.samefile(out) for path in inputs):
+            raise ResultFileError(str(out), "is a file that the case is read from; name another file")
+        file.append(TableFile(out, list(several), [each.title for each in columns], _mark(setting, first), force))
+    done = file[0].done if file else {}
+    todo = sort_cases([each for each in cases if _cells(each) not in done], several)
+    return Plan(names, wanted, tuple(todo), choose_share(first, mesh, comm, len(todo), several))
+
+
+def _check_values_alone(
+    setting: Setting, several: Mapping[str, Sequence[Any]], first: Mapping[str, Any]
+) -> Model:
+    """The model of the first case, after every value was tried beside the first of all others.
+
+    Raises CaseError with what is wrong with any.
+    """
+    faults: dict[Fault, None] = {}
+    found: Model | None = None
+    source = ""
+    tried = [dict(first), *({**first, key: each} for key, values in several.items() for each in values[1:])]
+    for values in tried:
+        try:
+            model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
+        except CaseError as error:
+            faults |= dict.fromkeys(error.faults)
+            source = error.source
+            continue
+        found = found or model
+        if len(setting.checked) < MOST_CHECKED:
+            setting.checked[_cells(values)] = model
+    if faults or found is None:
+        raise CaseError(source, tuple(faults))
+    return impose_operator(found, setting.name, setting.operator)
+
+
+def _mark(setting: Setting, model: Model) -> str:
+    """A short text that is another one for another case, or other settings."""
+    case = setting.case
+    if isinstance(case, description.Case):
+        tables = case.given
+    elif isinstance(case, Mapping):
+        tables = Case(**case).given
+    else:
+        tables = Case.read(case).given
+    told = [write_tables(tables), write_overrides(setting.fixed), setting.operator or "",
+            *(f"{name}={value}" for name, value in sorted(setting.petsc.items())), *model.law_texts.values()]
+    return hashlib.sha256("\0".join(told).encode("utf-8", "surrogatepass")).hexdigest()[:12]
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise ResultFileError(str(folder), f"is no folder for result files ({error.strerror})") from error
+
+
+@dataclass
+class _Keeper:
+    """Takes the rows as they come, on the first rank."""
+
+    several: Mapping[str, Sequence[Any]]
+    file: list[TableFile]
+    listener: Listener | None
+    count: int
+    rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
+    new: int = 0
+
+    def add(self, values: Mapping[str, Any], row: Row) -> None:
+        """A case was computed."""
+        self.rows[row.cells] = row
+        self.new += 1
+        for file in self.file:
+            file.add(row)
+        if self.listener is not None:
+            self.listener(self.new, self.count, values, row)
+
+    def finish(self) -> list[Row]:
+        """The rows of all combinations in order, those there were before among them."""
+        order = [_cells(each) for each in combine(self.several)]
+        for file in self.file:
+            file.sort(order)
+            self.rows = {**file.done, **self.rows}
+        return [self.rows[cells] for cells in order]
+
+
+def _compute_all(
+    setting: Setting, plan: Plan, columns: Sequence[Quantity], comm: Comm, keeper: _Keeper
+) -> list[Row]:
+    """All rows, on every rank."""
+    with plan.share.open(comm) as group, _keep(group.comm) as kept, StopSignals() as signals:
+        signals.at_once = group.comm.size == 1
+
+        def compute(values: dict[str, Any]) -> Row:
+            return compute_case(setting, values, columns, kept, signals)
+
+        group.share_out(plan.todo, compute, keeper.add)
+    return broadcast(comm, do_on_first(comm, PbemError, keeper.finish, share=False))  # type: ignore[no-any-return]
+
+
+@contextmanager
+def _keep(comm: Comm) -> Iterator[KeptProblems]:
+    kept = KeptProblems(comm)
+    try:
+        yield kept
+    except PbemError:
+        kept.destroy()
+        raise
+    kept.destroy()
+
+
+def compute_case(
+    setting: Setting, values: dict[str, Any], columns: Sequence[Quantity], kept: KeptProblems, signals: StopSignals
+) -> Row:
+    """The row of one case; all ranks of `kept.comm` call this together, and the first knows the quantities."""
+    begun = time.perf_counter()
+    comm, status, reason = kept.comm, "finished", ""
+    outcome = Outcome()
+    try:
+        model = do_on_first(comm, PbemError, lambda: _make_model(setting, values))
+        if setting.keep is not None or model.analysis.accuracy is not None:
+            _run_with_file(setting, values, outcome, kept)
+        else:
+            _solve(model, setting, outcome, kept, signals)
+    except CaseError as error:
+        status, reason = "refused", "; ".join(str(fault) for fault in error.faults)
+    except (ConvergenceError, LawError) as error:
+        status, reason = "failed", str(error)
+        kept.forget_factors()
+    known = comm.rank == 0 and outcome.step is not None
+    found = tuple(
+        float(each.evaluate(outcome)) if known and (status == "finished" or each.of_steps) else float("nan")
+        for each in columns
+    )
+    return Row(_cells(values), found, status, outcome.iterations, time.perf_counter() - begun, reason)
+
+
+def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems, signals: StopSignals) -> None:
+    """March through the history, without a result file."""
+    comm = kept.comm
+    mesh = generate_mesh(model)
+    check_shares(model, mesh, comm.size)
+    if comm.rank == 0:
+        outcome.expect(model, mesh)
+    watch = Watch(comm, outcome if comm.rank == 0 else SilentReporter(), signals)
+    with petsc_options({**model.solver.petsc, **setting.petsc}):
+        problem = kept.assemble(model, mesh)
+        watch.look_after(problem.laws)
+        watch.check()
+        try:
+            tangent, guess = kept.take_tangent(problem), kept.guess_modes(problem) if setting.neighbours else None
+            kept.remember_modes(problem, {
+                (step.stage, step.factor): step.contact for step in march(problem, watch, None, tangent, guess)
+            })
+        except ConvergenceError:
+            watch.check()  # a law that failed has answered with no strength
+            raise
+
+
+def _run_with_file(setting: Setting, values: dict[str, Any], outcome: Outcome, kept: KeptProblems) -> None:
+    """A whole run, with its result file, and with estimated errors."""
+    def compute(target: Path) -> None:
+        run(setting.case, target, force=True, petsc=setting.petsc, operator=setting.operator, reporter=outcome,
+            set={**setting.fixed, **values}, comm=kept.comm, label=setting.label, kept=kept)
+
+    if setting.keep is not None:
+        compute(setting.keep / name_results(values))
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        compute(Path(do_on_first(kept.comm, PbemError, lambda: folder)) / "case.h5")
+
+
+def _make_table(several: Mapping[str, Sequence[Any]], titles: Sequence[str], rows: Sequence[Row]) -> Table:
+    filled = [
+        {**values, **dict(zip(titles, row.quantities, strict=True)), "status": row.status,
+         "iterations": row.iterations, "seconds": row.seconds, "reason": row.reason}
+        for values, row in zip(combine(several), rows, strict=True)
+    ]
+    return Table(several, titles, filled)

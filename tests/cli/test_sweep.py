@@ -1,0 +1,283 @@
+"""`pbem sweep` and `pbem.sweep`: all combinations, a row each, equal to single runs; gone on with; what is wrong."""
+
+from __future__ import annotations
+
+import csv
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.cli import main
+from pbem.errors import CaseError, ResultFileError
+from pbem.results.reader import open_results
+from pbem.sweeps.files import name_results
+from pbem.sweeps.sharing import sort_cases
+from pbem.sweeps.values import combine, read_values
+from tests.cli.cli_sample import BLOCKS
+
+Capture = pytest.CaptureFixture[str]
+VALUES = {"interfaces.joint.friction": [0.1, 0.4, 0.7], "stages.shear.boundary.top.ux": [0.02, 0.004]}
+ASKED = ["--set", "interfaces.joint.friction=0.1:0.7:3", "--set", "stages.shear.boundary.top.ux=0.02,0.004"]
+QUANTITIES = ["reactions.top.x", "contact.joint.slip.largest", "contact.joint.status.slip", "energy.dissipated",
+              "steps.load_factor"]
+CRACKED = """\
+materials.rock = { young = 1e3, poisson = 0.2 }
+[curves]
+one = { points = [[-1, 0], [1, 0.2]], elements = 4 }
+two = { points = [[-0.5, 1], [1, 1]], elements = 4 }
+[regions]
+plane = { material = "rock", infinite = true, cracks = ["one", "two"] }
+[interfaces]
+one = { friction = 0.3 }
+two = { friction = 0.1, pressure = 2.0 }
+[remote]
+syy = -1.0
+sxy = 0.5
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with the cases."""
+    (tmp_path / "blocks.toml").write_text(BLOCKS)
+    (tmp_path / "cracked.toml").write_text(CRACKED)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def read(path: str) -> list[dict[str, str]]:
+    """The rows of a table."""
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_rows_are_those_of_single_runs(folder: Path) -> None:
+    table = pbem.sweep("blocks.toml", VALUES, QUANTITIES)
+    assert len(table) == 6 and table.columns == (*VALUES, *QUANTITIES, "status", "iterations", "seconds", "reason")
+    assert table["interfaces.joint.friction"].tolist() == [0.1, 0.1, 0.4, 0.4, 0.7, 0.7]
+    for row in table:
+        results = pbem.run("blocks.toml", "one.h5", force=True, set={key: row[key] for key in VALUES})
+        joint = results.contact["joint"]
+        expected = {"reactions.top.x": results.reactions["top"][-1, 0],
+                    "contact.joint.slip.largest": np.abs(joint.slip[-1]).max(),
+                    "energy.dissipated": results.energy.dissipated[-1], "steps.load_factor": 1.0}
+        for name, value in expected.items():
+            assert row[name] == pytest.approx(value, rel=1e-9, abs=1e-12), name
+        assert row["status"] == results.status == "finished"
+    assert not list(folder.glob("*.csv"))
+
+
+def test_the_command_writes_the_same_table(folder: Path, capsys: Capture) -> None:
+    wanted = [part for name in QUANTITIES for part in ("--quantity", name)]
+    assert main(["sweep", "blocks.toml", *ASKED, "-o", "t.csv", *wanted]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 7 and said[-1].startswith("6 cases in ") and said[-1].endswith("table: t.csv")
+    table, rows = pbem.sweep("blocks.toml", VALUES, QUANTITIES), read("t.csv")
+    assert list(rows[0]) == [*VALUES, *QUANTITIES, "status", "iterations", "seconds", "reason", "case"]
+    for row, expected in zip(rows, table, strict=True):
+        assert all(float(row[name]) == pytest.approx(expected[name], rel=1e-9, abs=1e-12) for name in QUANTITIES)
+        assert row["interfaces.joint.friction"] == repr(expected["interfaces.joint.friction"])
+
+
+def test_a_table_is_gone_on_with(folder: Path, capsys: Capture) -> None:
+    command = ["sweep", "blocks.toml", *ASKED, "-o", "t.csv", "--quantity", "reactions.top.x"]
+    assert main(command) == 0
+    whole = Path("t.csv").read_text()
+    lines = whole.splitlines(keepends=True)
+    Path("t.csv").write_text("".join([lines[0], lines[2].replace("finished,", "finished,9"), lines[4], lines[5][:20]]))
+    capsys.readouterr()
+    assert main(command) == 0
+    assert "4 cases in" in (said := capsys.readouterr().out) and "(2 were in the table)" in said
+    rows = read("t.csv")
+    # Not computed again: what was written by hand is still there. The rows are in order.
+    assert rows[1]["iterations"].startswith("9") and [row["stages.shear.boundary.top.ux"] for row in rows] == [
+        "0.02", "0.004"] * 3
+    assert main([*command[:4], "--set", "stages.shear.boundary.top.ux=0.02,0.01", *command[6:]]) == 0
+    assert "3 cases in" in capsys.readouterr().out
+    assert len(read("t.csv")) == 9
+    assert main(command) == 0 and "0 cases in" in capsys.readouterr().out
+    table = pbem.sweep("blocks.toml", VALUES, ["reactions.top.x"], out="t.csv")
+    assert table["iterations"][1] == int(rows[1]["iterations"])
+
+
+def test_a_table_of_another_sweep_is_refused(folder: Path, capsys: Capture) -> None:
+    command = ["sweep", "blocks.toml", *ASKED[:2], "-o", "t.csv", "--quantity", "reactions.top.x"]
+    assert main(command) == 0
+    before = Path("t.csv").read_bytes()
+    for text, more, said in (
+        (BLOCKS.replace("young = 1000.0", "young = 1001.0"), [], "another case, of this case before it was changed"),
+        (BLOCKS, ["-pbem_ksp_rtol", "1e-9"], "or of other settings"),
+        (BLOCKS, ["--quantity", "energy.elastic"], "it lacks energy.elastic"),
+        (BLOCKS, ["--set", "title=a"], "it lacks title"),
+    ):
+        Path("blocks.toml").write_text(text)
+        assert main([*command, *more]) == 2
+        assert said in capsys.readouterr().err and Path("t.csv").read_bytes() == before
+    Path("blocks.toml").write_text("# a comment\n" + BLOCKS)
+    assert main(command) == 0
+    Path("blocks.toml").write_text(BLOCKS.replace("young = 1000.0", "young = 1001.0"))
+    assert main([*command, "--force"]) == 0 and Path("t.csv").read_bytes() != before
+    Path("other.csv").write_text("a,b\n1,2\n")
+    assert main([*command[:4], "-o", "other.csv"]) == 2 and "no table of a sweep" in capsys.readouterr().err
+    assert main([*command[:4], "-o", "blocks.toml"]) == 2 and "the case is read from" in capsys.readouterr().err
+
+
+def test_a_case_that_does_not_converge_is_a_row(folder: Path, capsys: Capture) -> None:
+    text = BLOCKS.replace("ux = 0.02\nuy = -0.01", "tx = 0.1").replace("ux = 0.0\nuy = -0.01", "tx = 0.0\nty = -1.0")
+    Path("blocks.toml").write_text(text)
+    table = pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.3, 0.05, 0.2]},
+                       ["contact.slip.largest", "steps.load_factor"])
+    assert table["status"].tolist() == ["finished", "failed", "finished"]
+    failed = list(table)[1]
+    assert math.isnan(failed["contact.slip.largest"]) and 0 < failed["steps.load_factor"] < 1
+    assert failed["reason"].startswith(("limit load", "free motion"))
+    assert main(["sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.3,0.05", "-o", "t.csv"]) == 0
+    assert "1 failed" in capsys.readouterr().out and read("t.csv")[1]["status"] == "failed"
+
+
+def test_files_are_kept_where_they_are_asked_for(folder: Path) -> None:
+    table = pbem.sweep("blocks.toml", VALUES, QUANTITIES, keep="files")
+    names = sorted(path.name for path in Path("files").glob("*.h5"))
+    assert len(names) == 6 and "friction=0.1,ux=0.004.h5" in names
+    results = open_results("files/friction=0.4,ux=0.02.h5")
+    assert results.overrides == "interfaces.joint.friction = 0.4\nstages.shear.boundary.top.ux = 0.02"
+    assert table["reactions.top.x"][2] == results.reactions["top"][-1, 0]
+    assert name_results({"a.x": 1, "b.x": 2}) == "a.x=1,b.x=2.h5" and name_results({"t": "a/b"}).startswith("case-")
+
+
+def test_cracks_have_factors_and_families(folder: Path) -> None:
+    table = pbem.sweep("cracked.toml", {"remote.sxy": [0.5, 1.0]}, [
+        "tips.*.KII", "tips.two.end.KI", "tips.KI", "contact.opening.max", "contact.t*.opening.mean", "tips.one.0.J",
+        "contact.two.slip.integral", "contact.two.traction_n.min",
+    ])  # fmt: skip
+    assert table.columns[1:4] == ("tips.one.KII", "tips.two.KII", "tips.two.end.KI") and len(table.columns) == 14
+    results = pbem.run("cracked.toml", "x.h5", set={"remote.sxy": 1.0})
+    last = list(table)[1]
+    for name in ("one", "two"):
+        factors = results.tips[name].KII[-1]
+        assert last[f"tips.{name}.KII"] == pytest.approx(factors[np.argmax(np.abs(factors))], rel=1e-9)
+    assert last["tips.two.end.KI"] == pytest.approx(results.tips["two"].KI[-1, 1], rel=1e-9)
+    assert last["tips.one.start.J"] == pytest.approx(results.tips["one"].J[-1, 0], rel=1e-9)
+    two = results.contact["two"]
+    assert last["contact.opening.max"] == pytest.approx(two.opening[-1].max(), rel=1e-9)
+    # An ellipse opens by pi/4 of its middle in the mean.
+    assert last["contact.two.opening.mean"] == pytest.approx(math.pi / 4 * two.opening[-1].max(), rel=0.03)
+    assert "contact.one.slip.largest" in pbem.sweep("cracked.toml", {"remote.sxy": [0.5]}).columns
+
+
+def test_reactions_have_moments(folder: Path) -> None:
+    body = """\
+materials.m = { young = 1e3, poisson = 0.2 }
+[curves]
+left = { points = [[5, 1], [5, 0]], elements = 4 }
+rest = { points = [[5, 0], [7, 0]], elements = 4 }
+right = { points = [[7, 0], [7, 1]], elements = 4 }
+top = { points = [[7, 1], [5, 1]], elements = 4 }
+[regions]
+body = { material = "m", boundary = ["left", "rest", "right", "top"] }
+[boundary]
+left = { ux = 0, uy = 0 }
+right = { ty = 3.0 }
+"""
+    Path("body.toml").write_text(body)
+    wanted = ["reactions.right.moment", "reactions.left.moment", "reactions.left.y"]
+    row = next(iter(pbem.sweep("body.toml", {"boundary.right.ty": [3.0]}, wanted)))
+    assert [row[name] for name in wanted] == pytest.approx([21.0, -21.0, -3.0], rel=1e-3)
+
+
+WRONG: list[tuple[list[str], str]] = [
+    (["--set", "interfaces.joint.frction=0.1,0.2"], "--set interfaces.joint.frction=0.1: found unknown key 'frction'"),
+    (["--set", "interfaces.joint.friction=0.1,-0.2"], "--set interfaces.joint.friction=-0.2: found -0.2; expected a"),
+    (["--set", "interfaces.joint.friction=0.1:0.2"], "found \"0.1:0.2\", which is no value; expected KEY=a,b,c"),
+    (["--set", "interfaces.joint.friction=0.1:0.2:0"], "which is no range of numbers"),
+    (["--set", "interfaces.joint.friction=0.1:0.2:1.5"], "which is no range of numbers"),
+    (["--set", "interfaces.joint.friction=0.1,,0.2"], "found no value"),
+    (["--set", "interfaces.joint.friction=0.1,0.1"], "interfaces.joint.friction: found the value 0.1 twice"),
+    (["--set", "interfaces.joint.friction=0:1:99999", "--set", "title=a,b"], "found 199998 combinations"),
+    (["--set", "interfaces.joint.friction=0.1", "--quantity", "reactions.tp.x"], "--quantity reactions.tp.x: found 'tp'"
+     "; did you mean 'top'?"),
+    (["--set", "interfaces.joint.friction=0.1", "--quantity", "contact.joint.slp.max"], "did you mean 'slip'?"),
+    (["--set", "interfaces.joint.friction=0.1", "--quantity", "contact.joint.slip.maxx"], "did you mean 'max'?"),
+    (["--set", "interfaces.joint.friction=0.1", "--quantity", "reaction.top.x"], "did you mean 'reactions'?"),
+    (["--set", "interfaces.joint.friction=0.1", "--quantity", "tips.KI.a.b"], "expected tips.NAME.KI"),
+    (["--set", "interfaces.joint.friction=0.1", "--quantity", ""], "found \"\"; expected a quantity such as"),
+    (["--set", "interfaces.joint.friction=0.1", "-o", "none/t.csv"], "none/t.csv: cannot be written"),
+    (["--set", "interfaces.joint.friction=0.1", "--keep", "none/files"], "none/files: is no folder for result files"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), WRONG, ids=[" ".join(each) for each, _ in WRONG])
+def test_what_is_wrong_is_said_before_anything_is_computed(
+    folder: Path, capsys: Capture, arguments: list[str], said: str
+) -> None:
+    assert main(["sweep", "blocks.toml", *arguments]) == 2
+    printed = capsys.readouterr()
+    assert said in printed.err and "Traceback" not in printed.err and not printed.out
+    assert not Path("blocks.csv").exists()
+
+
+@pytest.mark.parametrize(("values", "quantities"), [
+    ({}, None), ([1], None), ({"interfaces.joint.friction": []}, None), ({3: [1]}, None),
+    ({"interfaces.joint.friction": [object()]}, None), ({"interfaces.joint.friction": "much"}, None),
+    ({"interfaces.joint.friction": [0.1]}, "reactions.top.x"), ({"interfaces.joint.friction": [0.1]}, [3]),
+    ({"interfaces.joint.friction": [0.1, np.nan]}, None), ({"interfaces.joint.friction": [[0.1]]}, None),
+])  # fmt: skip
+def test_wrong_arguments_are_refused(folder: Path, values: Any, quantities: Any) -> None:
+    with pytest.raises(CaseError):
+        pbem.sweep("blocks.toml", values, quantities)
+
+
+def test_values_of_the_command_line() -> None:
+    found = read_values(["a=0.1:0.3:3", "b=1:5:3", "c=x,y", "d=[1, 2],[3, 4]", 'e="p,q",r', "f=1e3,true", "g=5:5:1"])
+    assert found == {"a": [0.1, 0.2, 0.3], "b": [1, 3, 5], "c": ["x", "y"], "d": [[1, 2], [3, 4]], "e": ["p,q", "r"],
+                     "f": [1000.0, True], "g": [5]}
+    assert all(type(each) is int for each in found["b"])
+
+
+def test_neighbours_differ_by_one_value_and_operators_come_together() -> None:
+    several = {"interfaces.a.friction": [1, 2, 3, 4], "materials.m.young": [5, 6], "remote.sxx": [7, 8, 9]}
+    order = sort_cases(list(combine(several)), several)
+    assert len(order) == 24 and [case["materials.m.young"] for case in order] == [5] * 12 + [6] * 12
+    for one, other in pairwise(order):
+        (key,) = [key for key in several if one[key] != other[key]]
+        assert abs(several[key].index(one[key]) - several[key].index(other[key])) == 1
+
+
+def test_operators_are_kept_while_geometry_and_materials_stay(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from pbem.solve.system.dense import DenseSystem
+
+    made, whole = [], DenseSystem.assemble
+    monkeypatch.setattr(DenseSystem, "assemble", staticmethod(lambda *args: made.append(1) or whole(*args)))
+    pbem.sweep("blocks.toml", VALUES)
+    assert len(made) == 1
+    several = {"interfaces.joint.friction": [0.1, 0.4], "materials.soft.young": [1000.0, 2000.0]}
+    table = pbem.sweep("blocks.toml", several, ["reactions.top.y"])
+    assert len(made) == 3
+    np.testing.assert_allclose(table["reactions.top.y"][1::2], 2 * table["reactions.top.y"][::2], rtol=1e-9)
+
+
+def test_a_table_prints_and_becomes_a_dataframe(folder: Path) -> None:
+    table = pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.1, 0.4]}, ["reactions.top.x"])
+    lines = repr(table).splitlines()
+    assert len(lines) == 4 and lines[0].startswith("interfaces.joint.friction  reactions.top.x  status")
+    assert lines[-1] == "[2 cases, 0 not finished]" and table._repr_html_().count("<tr>") == 3
+    with pytest.raises(KeyError, match=r"no column 'x'; there are interfaces\.joint\.friction"):
+        table["x"]
+    try:
+        import pandas
+    except ImportError:
+        with pytest.raises(ImportError, match="pip install pandas"):
+            table.to_dataframe()
+    else:
+        frame = table.to_dataframe()
+        assert isinstance(frame, pandas.DataFrame) and tuple(frame.columns) == table.columns and len(frame) == 2
+
+
+def test_a_file_that_cannot_be_a_table_is_refused(folder: Path) -> None:
+    with pytest.raises(ResultFileError, match="is a folder"):
+        pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.1]}, out=".")

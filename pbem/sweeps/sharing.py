@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from pbem.bem.operator_choice import choose_operator
 from pbem.errors import PbemError
+from pbem.forecast.forecast import make_forecast
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import Comm, alone, read_available_memory
@@ -22,8 +22,6 @@ SMALL = 4000
 CASES_EACH = 8
 # The operators of all ranks of a node take up to this part of its memory.
 PART_OF_MEMORY = 0.4
-# A run needs about so many times the memory of its operator.
-TIMES_OPERATOR = 2.5
 # Keys of these tables change the operator; of [[generate]] all but those of laws.
 OF_GEOMETRY = ("materials", "curves", "regions", "contacts", "analysis", "generate")
 TAG = 1
@@ -81,8 +79,7 @@ def choose_share(model: Model, mesh: Mesh, comm: Comm, count: int, several: Mapp
     if comm.size == 1:
         return Share(False, blocks)
     least = comm.size * (1 if 2 * mesh.nodes <= SMALL or blocks else CASES_EACH)
-    memory = choose_operator(model, mesh).estimate_memory(model, mesh)
-    needed = TIMES_OPERATOR * (sum(size for _, size in memory.stored) + memory.everywhere)
+    needed = make_forecast(model, mesh, 1, timed=False).rank_memory
     return Share(count >= least and comm.size * needed <= PART_OF_MEMORY * read_available_memory(), blocks)
 
 

@@ -204,6 +204,15 @@ def open_quietly(path: Path) -> Iterator[h5py.File]:
         yield file
 
 
+def has_journal(path: Path) -> bool:
+    """Whether pages of the file are still on their way to their places: its run was killed while it wrote them."""
+    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        return find_unapplied(disk) is not None
+    finally:
+        os.close(disk)
+
+
 @contextmanager
 def _open(path: Path) -> Iterator[h5py.File]:
     disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)

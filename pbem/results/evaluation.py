@@ -22,6 +22,7 @@ from pbem.mesh.numbering import split_components
 from pbem.results.contents import Elements, Nodes, Steps
 from pbem.results.lazy import open_quietly
 from pbem.results.rebuilt import RebuiltRun, find_opposite_faces, rebuild_run
+from pbem.results.resampling import Resampling, resample
 from pbem.results.whereabouts import Whereabouts, find_points
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 
@@ -61,6 +62,7 @@ class Evaluator:
         """Raises ResultFileError if the file is of a version that did not store what this needs."""
         self._path, self._steps = path, steps
         self._run: RebuiltRun = rebuild_run(str(path), nodes, elements, configuration)
+        self._fine: Resampling = resample(self._run.mesh)
 
     def evaluate(self, points: ArrayLike, steps: Sequence[int], tips: Complex, side: Side = "first") -> Evaluation:
         """The field at points (q, 2), after the steps stored at these places in the file.
@@ -93,17 +95,17 @@ class Evaluator:
 
     @cached_property
     def _rigid(self) -> tuple[RigidMotions, ...]:
-        mesh = self._run.mesh
+        mesh = self._fine.mesh
         return find_rigid_motions(mesh, self._run.model.finite_regions, np.ones(4 * mesh.nodes, dtype=bool))
 
     def _place(self, points: Complex, location: Location) -> InteriorRows | PointRows:
-        run = self._run
+        run, fine = self._run, self._fine.mesh
         materials = [region.material for region in run.model.regions]
         inside = np.flatnonzero((location.region >= 0) & (location.element < 0))
-        counts = np.bincount(run.mesh.region, minlength=len(materials))
+        counts = np.bincount(fine.region, minlength=len(materials))
         if int(counts[location.region[inside]].sum()) <= DIRECT:
-            return InteriorRows(run.mesh, materials, points, location, self._rigid)
-        return spread_points(run.mesh, materials, choose_terms(TOLERANCE), points[inside], location.region[inside])
+            return InteriorRows(fine, materials, points, location, self._rigid)
+        return spread_points(fine, materials, choose_terms(TOLERANCE), points[inside], location.region[inside])
 
     def _evaluate_steps(
         self, points: Complex, where: Whereabouts, field: InteriorRows | PointRows, steps: Sequence[int]
@@ -134,7 +136,7 @@ class Evaluator:
                     if len(own) and not background.is_zero:
                         total.displacement[own] += background.displacement(points[own])
                         total.stress[own] += background.stress(points[own])
-            densities.append((u, t))
+            densities.append((self._fine.displacement @ u, self._fine.traction @ t))
             totals.append(total)
         for total, elastic in zip(totals, self._represent(field, densities), strict=True):
             total.displacement[inside] += elastic.displacement

@@ -64,7 +64,9 @@ def _collect_columns(
     elements, _, nodes = density.shape
     terms = phi.shape[-1]
     out = np.zeros((2, terms + 1, elements, nodes, 2), dtype=complex)  # function, power, element, node, component
-    series = [np.einsum("eqn,eqk->ken", density, factor) for factor in (phi, psi, conjugate)]
+    # Real matrices times complex ones, by the real parts of both.
+    by_node = density.transpose(0, 2, 1)
+    series = [_multiply(by_node, factor) for factor in (phi, psi, conjugate)]
     for component, unit in enumerate((1.0, 1j)):
         out[0, 1:, :, :, component] = unit * series[0]
         out[1, 1:, :, :, component] = unit * series[1] + np.conj(unit) * series[2]
@@ -73,6 +75,12 @@ def _collect_columns(
             out[1, 0, :, :, component] = np.conj(unit) * np.einsum("eqn,eq->en", density, psi_log)
     flat = out.reshape(2 * (terms + 1), -1)
     return np.stack([flat.real, flat.imag], axis=1).reshape(4 * (terms + 1), -1)
+
+
+def _multiply(real: Real, factor: Complex) -> Complex:
+    """Products (power, element, node) of (element, node, point) and (element, point, power)."""
+    parts = np.ascontiguousarray(factor).view(float)
+    return np.ascontiguousarray(real @ parts).view(complex).transpose(2, 0, 1)
 
 
 @cache

@@ -76,7 +76,7 @@ def export_vtkhdf(results: Results, target: Path, copy: bool = False) -> Exporte
         with open_quietly(results.path) as source:
             blocks = list_blocks(results, source)
             try:
-                with h5py.File(part, "w", libver=("v108", "v110")) as file:
+                with h5py.File(part, "w", libver=("v108", "v110"), track_order=True) as file:
                     _write(file, results, source, blocks, target.parent if refers else None)
                 part.replace(target)
             except OSError as error:
@@ -150,7 +150,7 @@ def _write(
         group = root.create_group(block.name, track_order=True)
         _mark(group, "UnstructuredGrid")
         group.attrs["Index"] = np.int64(number)
-        named = assembly.create_group(block.name)
+        named = assembly.create_group(block.name, track_order=True)
         named[block.name] = h5py.SoftLink(f"/VTKHDF/{block.name}")
         _write_grid(group, block)
         steps = _write_steps(group, results)
@@ -164,7 +164,6 @@ def _write(
         for each in block.growing:
             if each.dataset in source:
                 _write_growing(group, steps, results, source, each, len(block.points), folder)
-    _write_times(root.create_group("Steps"), results)
     for name in ("title", "units_length", "units_stress"):
         file.attrs[name] = source.attrs[name]
 
@@ -186,21 +185,17 @@ def _write_grid(group: h5py.Group, block: Block) -> None:
         group.create_group(name, track_order=True)
 
 
-def _write_times(group: h5py.Group, results: Results) -> None:
-    """Time: the number of finished stages plus the fraction reached of the present one."""
-    group.attrs["NSteps"] = np.int64(len(results.steps))
-    group["Values"] = results.steps.stage + results.steps.factor
-
-
 def _write_steps(group: h5py.Group, results: Results) -> h5py.Group:
-    steps = group.create_group("Steps")
-    _write_times(steps, results)
+    """Time: the number of finished stages plus the fraction reached of the present one."""
+    steps = group.create_group("Steps", track_order=True)
+    steps.attrs["NSteps"] = np.int64(len(results.steps))
+    steps["Values"] = results.steps.stage + results.steps.factor
     zeros = np.zeros(len(results.steps), dtype="i8")
     for name in ("PartOffsets", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = zeros if name in ("PartOffsets", "PointOffsets") else zeros[:, None]
     steps["NumberOfParts"] = zeros + 1
     for name in ("PointDataOffsets", "CellDataOffsets", "FieldDataOffsets", "FieldDataSizes"):
-        steps.create_group(name)
+        steps.create_group(name, track_order=True)
     return steps
 
 
@@ -227,17 +222,16 @@ def _write_growing(
     width = 3 if vector else int(np.prod(stored.shape[1:])) // stored.shape[1] if each.columns is None else 1
     width = 1 if each.dataset.startswith("all/tips/") else width
     shape = (k * count,) if width == 1 else (k * count, width)
-    if folder is not None and each.columns is None:
+    kind = np.dtype("i1") if stored.dtype.kind == "b" else stored.dtype  # VTK knows no truth values
+    if folder is not None and each.columns is None and kind == stored.dtype:
         _refer(group, each.name, results.path, stored, shape, k, folder)
     else:
-        whole = data.create_dataset(each.name, shape=shape, dtype=stored.dtype)
+        whole = data.create_dataset(each.name, shape=shape, dtype=kind)
         for at in range(k):
             values = stored[at]
             if each.columns is not None:
                 values = _rearrange(values, each.columns)
             whole[at * count : (at + 1) * count] = _widen(values) if vector else values.reshape(count, *shape[1:])
-    if vector:
-        data[each.name].attrs["Attribute"] = "Vectors" if each.name == "displacement" else "None"
 
 
 def _rearrange(values: NDArray[Any], columns: Integer) -> NDArray[Any]:

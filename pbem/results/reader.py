@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
@@ -42,7 +43,7 @@ STATUSES = ("running", "finished", "failed", "stopped")
 ATTEMPTS = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Results:
     """What a result file holds. k stored steps, n nodes.
 
@@ -149,6 +150,30 @@ class Results:
                 raise IndexError(f"steps: there is no stored step at place {each}; {count} are stored")
         return [int(each) % count for each in chosen]
 
+    def to_dataframe(self, what: str) -> Any:
+        """A pandas.DataFrame: of an interface, crack or contact by its name, a row for each stored step and pair.
+
+        Also "steps", "reactions", "tips", "interior", and "contact" for all interfaces together; an interface with one
+        of these names is "contact.NAME". Columns are called as in the file.
+
+        Raises ImportError if pandas is not installed, ResultFileError if the file has nothing of this name.
+        """
+        return _load_module("tables").make_dataframe(self, what)
+
+    def plot(self, kind: str | None = None, **options: Any) -> Any:
+        """A matplotlib Figure; `pbem.results.curve_plot.plot` lists the options.
+
+        Without options the picture of `pbem plot`; curve= draws a quantity (field=) along an interface, crack or outer
+        curve, field= alone a map of it at the interior points; ax= draws into axes of yours.
+        """
+        return _load_module("curve_plot").plot(self, kind, **options)
+
+    def __repr__(self) -> str:
+        return _load_module("summary").summarise(self)
+
+    def _repr_html_(self) -> str:
+        return _load_module("summary").summarise_html(self)
+
     def find_curve_ends(self, name: str) -> Real:
         """(2, 2): where a curve starts and ends; NaN in files of earlier versions."""
         stored = self._configured
@@ -173,6 +198,11 @@ class Results:
     def _load(self, name: str) -> Real:
         with open_quietly(self.path) as file:
             return freeze(file[name][: len(self.steps)])
+
+
+def _load_module(name: str) -> Any:
+    """A module that itself needs Results."""
+    return import_module(f"pbem.results.{name}")
 
 
 def open_results(path: str | os.PathLike[str]) -> Results:

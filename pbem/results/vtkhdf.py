@@ -152,7 +152,7 @@ def _write(
         group.attrs["Index"] = np.int64(number)
         named = assembly.create_group(block.name, track_order=True)
         named[block.name] = h5py.SoftLink(f"/VTKHDF/{block.name}")
-        _write_grid(group, block)
+        _write_grid(group, block.points, block.cells)
         steps = _write_steps(group, results)
         for name, values in block.static.items():
             group["PointData"][name] = _widen(values)
@@ -164,6 +164,7 @@ def _write(
         for each in block.growing:
             if each.dataset in source:
                 _write_growing(group, steps, results, source, each, len(block.points), folder)
+    _write_series(root, results, len(blocks))
     for name in ("title", "units_length", "units_stress"):
         file.attrs[name] = source.attrs[name]
 
@@ -173,12 +174,23 @@ def _mark(group: h5py.Group, kind: str) -> None:
     group.attrs.create("Type", kind.encode("ascii"), dtype=h5py.string_dtype("ascii", len(kind)))
 
 
-def _write_grid(group: h5py.Group, block: Block) -> None:
-    cells = block.cells
-    group["Points"] = _widen(block.points)
+def _write_series(root: h5py.Group, results: Results, number: int) -> None:
+    """Say that the whole is a series: VTK looks for that in a group Steps, and takes any group for a block.
+
+    Without it VTK 9.4 to 9.7 shows the first step at all times. The block is empty.
+    """
+    group = _write_steps(root, results)
+    _mark(group, "UnstructuredGrid")
+    group.attrs["Index"] = np.int64(number)
+    _write_grid(group, np.zeros((0, 3)), Cells.vertices(0))
+    _write_steps(group, results)
+
+
+def _write_grid(group: h5py.Group, points: Real, cells: Cells) -> None:
+    group["Points"] = _widen(points)
     group["Connectivity"], group["Offsets"] = cells.connectivity.astype("i8"), cells.offsets.astype("i8")
     group["Types"] = cells.types.astype("u1")
-    for name, count in (("Points", len(block.points)), ("Cells", len(cells.types)),
+    for name, count in (("Points", len(points)), ("Cells", len(cells.types)),
                         ("ConnectivityIds", len(cells.connectivity))):
         group[f"NumberOf{name}"] = np.array([count], dtype="i8")
     for name in ("PointData", "CellData", "FieldData"):
@@ -203,7 +215,9 @@ def _write_words(group: h5py.Group, steps: h5py.Group, results: Results, block: 
     """Names, by their numbers; and the number of the load step."""
     k = len(results.steps)
     for name, words in block.words.items():
-        group["FieldData"][name] = np.array(list(words), dtype=h5py.string_dtype())
+        # VTK reads no strings that are marked as UTF-8, but takes those of ASCII as such.
+        text = [word.encode("utf-8") for word in words]
+        group["FieldData"][name] = np.array(text, dtype=h5py.string_dtype("ascii"))
         steps["FieldDataOffsets"][name] = np.zeros(k, dtype="i8")
         steps["FieldDataSizes"][name] = np.tile([1, len(words)], (k, 1))
     group["FieldData"]["step"] = results.steps.number.astype("i8")

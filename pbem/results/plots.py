@@ -18,7 +18,16 @@ from pbem.arrays import Real
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
 from pbem.results.outline import Outline, find_tips, trace_outlines
-from pbem.results.plot_style import MODES, TIP, choose_shades, describe_step, label, scale_axis, style
+from pbem.results.plot_style import (
+    MODES,
+    TIP,
+    choose_magnification,
+    choose_shades,
+    describe_step,
+    label,
+    scale_axis,
+    style,
+)
 from pbem.results.reader import Results
 
 __all__ = ["draw_results", "plot_model", "plot_results"]
@@ -73,16 +82,6 @@ def choose_interfaces(results: Results) -> list[Contact]:
     lengths = pairs.arc_length[begins[1:] - 1] - pairs.arc_length[begins[:-1]]
     order = sorted(range(len(lengths)), key=lambda i: (pairs.laws[i] != "bonded", lengths[i]), reverse=True)
     return [results.contact[pairs.names[number]] for number in sorted(order[:MOST_PANELS])]
-
-
-def choose_magnification(displacement: Real, size: float) -> float:
-    """1, 2 or 5 times a power of ten that brings the largest displacement to about 7 % of the size; at least 1."""
-    largest = float(np.abs(displacement).max(initial=0.0))
-    if largest == 0.0:
-        return 1.0
-    wanted = 0.07 * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return max(1.0, float(power * max(digit for digit in (1, 2, 5) if digit * power <= wanted * (1 + 1e-12))))
 
 
 def _draw_body(axes: Axes, results: Results, step: int | None, magnify: float | None, named: list[Contact]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from weakref import WeakKeyDictionary
 
 from matplotlib.axes import Axes
@@ -55,17 +56,22 @@ def draw_profile(
 
 
 def finish_axes(
-    axes: Axes, profiles: list[Profile], x: str, unit: str, ordinate: str,
+    axes: Axes, profiles: Sequence[Profile], x: str, unit: str, ordinate: str,
     xlim: tuple[float, float] | None = None, ylim: tuple[float, float] | None = None,
+    among: Sequence[Profile] | None = None,
 ) -> str:
-    """Labels, ticks and limits of axes with these profiles; returns what it says of values that are cut off."""
+    """Labels, ticks and limits of axes with these profiles; returns what it says of values that are cut off.
+
+    among: the limits are those of all these, else of all that the axes show.
+    """
     if not any(each.get_label() == "_zero" for each in axes.get_lines()):
         axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=1, label="_zero")
     axes.set_xlabel(label(ABSCISSA_TITLES[x], "\N{DEGREE SIGN}" if x == "angle" else unit))
     axes.set_ylabel(ordinate)
     scale_axis(axes)
-    drawn = _DRAWN.setdefault(axes, [])
-    drawn += profiles
+    shown = _DRAWN.setdefault(axes, [])
+    shown += profiles
+    drawn = shown if among is None else among
     if x == "angle":
         span = max(float(each.place.max() - each.place.min()) for each in drawn if len(each.place))
         for step in (90, 60, 45, 30, 15, 5):

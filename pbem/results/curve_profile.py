@@ -77,6 +77,13 @@ def check_curve(results: Results, name: str) -> None:
                          f"{list_names(known)}")
 
 
+def check_abscissa(abscissa: str) -> None:
+    """Raises ValueError, with a near miss, if there is none of this name."""
+    if abscissa not in ABSCISSAE:
+        raise ValueError(f"there is no abscissa '{abscissa}'{suggest(abscissa, ABSCISSAE)}; there are: "
+                         f"{', '.join(ABSCISSAE)}")
+
+
 def read_profile(
     results: Results, name: str, quantity: str, step: int = -1, abscissa: str = "arc_length"
 ) -> Profile:
@@ -86,9 +93,7 @@ def read_profile(
     ValueError for no such curve or quantity, for an angle along what is no circle, IndexError for no such step.
     """
     check_curve(results, name)
-    if abscissa not in ABSCISSAE:
-        raise ValueError(f"there is no abscissa '{abscissa}'{suggest(abscissa, ABSCISSAE)}; there are: "
-                         f"{', '.join(ABSCISSAE)}")
+    check_abscissa(abscissa)
     known = list_quantities(results, name)
     if quantity not in known:
         raise ValueError(f"there is no quantity '{quantity}' along '{name}'{suggest(quantity, known)}; there are: "

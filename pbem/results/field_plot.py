@@ -19,8 +19,17 @@ from pbem.errors import ResultFileError
 from pbem.results.field_formulas import FIELDS
 from pbem.results.field_values import VertexField, VertexValues
 from pbem.results.outline import to_columns, trace_outlines
-from pbem.results.page import Box, Page, choose_box, describe_box, finish_plane, read_infinite, save
-from pbem.results.picture_limits import Limits, format_number, join_sentences, limit_field
+from pbem.results.page import (
+    Box,
+    Page,
+    choose_box,
+    describe_box,
+    finish_plane,
+    read_infinite,
+    save,
+    write_around,
+)
+from pbem.results.picture_limits import Limits, format_number, limit_field
 from pbem.results.plot_style import choose_magnification, describe_step, label, style
 from pbem.results.reader import Results
 from pbem.results.region_points import View
@@ -29,7 +38,7 @@ from pbem.results.singular_points import name_singular_place
 from pbem.wording import suggest
 
 # Points across the picture, and by how much closer they may lie where the boundary asks for it.
-ACROSS, CLOSER = 70, 8.0
+ACROSS, CLOSER = 64, 6.0
 # Colours diverge from zero if the field reaches beyond it on both sides by this part of the larger one.
 BOTH_SIDES = 0.1
 HALO = [withStroke(linewidth=1.8, foreground="white")]
@@ -92,7 +101,10 @@ class FieldPicture:
         self._shown = self._values.exact & self._box.contains(to_columns(self._triangles.position))
         weights = np.tile(np.where(self._shown, self._triangles.weights, 0.0), len(self._steps))
         there = weights > 0
-        self._limits = limit_field(self._field.ravel()[there], weights[there])
+        vertices = np.tile(np.arange(len(self._shown)), len(self._steps))[there]
+        self._limits = limit_field(
+            self._field.ravel()[there], weights[there], lambda number: bool(self._name_place(int(vertices[number])))
+        )
         self._magnify = 0.0
         if options.displaced:
             largest = max((results.displacement_at(at) for at in self._steps), key=lambda u: float(np.abs(u).max()))
@@ -120,7 +132,7 @@ class FieldPicture:
 
     def draw(self, step: int, axes: Axes | None = None) -> Figure:
         """The picture of one of the steps, in a figure of its own or in given axes."""
-        page, box = self._options.page, self._box
+        page, box, own = self._options.page, self._box, axes is None
         if axes is None:
             width = page.width or 17.8
             figure = page.make_figure(min(box.height(width - 4.0), 17.0) + 2.6)
@@ -149,13 +161,12 @@ class FieldPicture:
         self._draw_outlines(axes, step)
         notes = self._mark_extremes(axes, values, places)
         finish_plane(axes, self._results, self._widen_box(places))
-        lines = [describe_step(self._results, step) + (f", displacements × {self._magnify:g}" if self._magnify else "")]
-        axes.set_title("\n".join(lines), loc="left", fontsize=9)
+        said = describe_step(self._results, step) + (f", displacements × {self._magnify:g}" if self._magnify else "")
         notes = [self._describe_cut(title, low, high), *notes, describe_box(box)]
-        said = join_sentences(notes)
-        if said and axes.figure is figure:
-            width = figure.get_figwidth()
-            figure.supxlabel(wrap(said, int(24 * width)), x=0.01, ha="left", fontsize=6.5, color="0.25")
+        if own:
+            write_around(figure, said, notes)
+        else:
+            axes.set_title(said, loc="left", fontsize=9)
         return figure
 
     def _choose_colours(self) -> tuple[float, float, str]:
@@ -216,10 +227,17 @@ class FieldPicture:
                 xytext=(5 if right else -5, 5 if above else -5), textcoords="offset points",
                 ha="left" if right else "right", va="bottom" if above else "top", path_effects=HALO,
             )
-            if not FIELDS[self._name][1]:
-                place = name_singular_place(self._results, complex(self._triangles.position[vertex]))
-                said += [f"{name} is {place}, where stress may be infinite and grows with refinement"] if place else []
+            value, limits = float(values[vertex]), self._limits
+            if value > limits.high or value < min(limits.low, 0.0):
+                place = self._name_place(int(vertex))
+                said += [f"{name} is {place}, where stress may be infinite: it grows with refinement"] if place else []
         return said
+
+    def _name_place(self, vertex: int) -> str:
+        """The singular place that a vertex is at; displacements are nowhere singular."""
+        if FIELDS[self._name][1]:
+            return ""
+        return name_singular_place(self._results, complex(self._triangles.position[vertex]))
 
     def _widen_box(self, places: Real) -> Box:
         """With room for what the displacements bring out of it, unless a box was asked for."""
@@ -230,10 +248,3 @@ class FieldPicture:
             room = 0.03 * float((high - low).max())
             return Box(low - room, high + room, False)
         return self._box
-
-
-def wrap(text: str, width: int) -> str:
-    """In lines of at most so many characters."""
-    import textwrap
-
-    return "\n".join(textwrap.wrap(text, max(width, 20)))

@@ -34,7 +34,7 @@ from pbem.results.region_triangles import Triangles
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 
 # Up to so many products of a point and an element every element is looked at; above, cluster trees.
-DIRECT = 20_000_000
+DIRECT = 2_000_000
 # Of the trees' expansions: far less than can be seen.
 TOLERANCE = 1e-6
 

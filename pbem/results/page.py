@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import textwrap
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from matplotlib.lines import Line2D
 
 from pbem.arrays import Bool, Real
-from pbem.results.picture_limits import format_number
+from pbem.results.picture_limits import format_number, join_sentences
 from pbem.results.plot_style import scale_plane
 from pbem.results.reader import Results
 
@@ -54,6 +58,25 @@ def save(figure: Figure, path: str | os.PathLike[str], page: Page) -> None:
         # What is too small for all labels is drawn as well as it can be; matplotlib would only say so.
         warnings.filterwarnings("ignore", message="constrained_layout not applied")
         figure.savefig(path, dpi=page.dpi)
+
+
+def write_around(figure: Figure, title: str, notes: Sequence[str] = ()) -> None:
+    """The title above, and notes below in small type, both from the left edge."""
+    width = figure.get_figwidth()
+    lines = [line for each in title.split("\n") for line in textwrap.wrap(each, int(15 * width)) or [""]]
+    figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=9)
+    said = join_sentences(notes)
+    if said:
+        said = "\n".join(textwrap.wrap(said, int(20 * width)))
+        figure.supxlabel(said, x=0.01, ha="left", fontsize=6.5, color="0.25")
+
+
+def add_legend_row(figure: Figure, cell: SubplotSpec, handles: Sequence[Line2D], page: Page) -> None:
+    """A legend in a row of its own, each entry once."""
+    unique = list({str(handle.get_label()): handle for handle in handles}.values())
+    axes = figure.add_subplot(cell)
+    axes.set_axis_off()
+    axes.legend(handles=unique, loc="center", ncol=2 if page.is_narrow else 4, borderaxespad=0.0)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +16,8 @@ SPOILT = 1.8
 END_PART = 0.03
 # Of a field, the share of the area at either end of the values that may be cut off ...
 CUT = 0.005
-# ... if the colours would else have to span so many times the range.
-STRETCHED = 1.25
+# ... if the colours would else have to reach so many times the range further.
+SINGULAR, REGULAR = 0.25, 3.0
 
 
 @dataclass(frozen=True)
@@ -73,21 +73,25 @@ def find_ends(place: Real) -> Bool:
     return np.asarray(ends)
 
 
-def limit_field(values: Real, weights: Real) -> Limits:
-    """Limits for the colours of values (q,) that stand for areas `weights` (q,): but for a small part of the area, if
-    that spares much of the range."""
-    there = np.isfinite(values)
-    values, weights = values[there], weights[there]
-    if not len(values):
+def limit_field(values: Real, weights: Real, is_singular: Callable[[int], bool]) -> Limits:
+    """Limits for the colours of values (q,) that stand for areas `weights` (q,).
+
+    A small part of the area is left out at either end if that spares much of the range, or some of it where the
+    outermost value is a singular one; is_singular: tells so of the number of a value.
+    """
+    there = np.flatnonzero(np.isfinite(values))
+    if not len(there):
         return Limits(0.0, 0.0, 0.0, 0.0)
-    order = np.argsort(values)
-    values, share = values[order], np.cumsum(weights[order])
+    order = there[np.argsort(values[there])]
+    share = np.cumsum(weights[order])
     share = (share - 0.5 * weights[order]) / max(float(share[-1]), 1e-300)
-    low, high = (float(each) for each in np.interp([CUT, 1 - CUT], share, values))
-    least, largest = float(values[0]), float(values[-1])
+    low, high = (float(each) for each in np.interp([CUT, 1 - CUT], share, values[order]))
+    least, largest = float(values[order[0]]), float(values[order[-1]])
     span = high - low
-    if span > 0 and least < low and (largest - least) <= STRETCHED * span:
-        low, high = least, largest
+    if low - least <= (SINGULAR if is_singular(int(order[0])) else REGULAR) * span or span <= 0:
+        low = least
+    if largest - high <= (SINGULAR if is_singular(int(order[-1])) else REGULAR) * span or span <= 0:
+        high = largest
     return Limits(low, high, least, largest)
 
 

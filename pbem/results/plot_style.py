@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import matplotlib
@@ -83,10 +84,15 @@ def label(quantity: str, unit: str) -> str:
 
 def escape(text: str) -> str:
     """Names and titles as they were written: a dollar sign begins no formula, and what the font lacks is marked."""
-    font = get_font(findfont(FontProperties(family="sans-serif")))
-    known = font.get_charmap()
+    known = _list_characters()
     shown = "".join(each if each == "\n" or ord(each) in known else "\N{REPLACEMENT CHARACTER}" for each in text)
     return shown.replace("$", r"\$")
+
+
+@lru_cache
+def _list_characters() -> frozenset[int]:
+    """The characters that the font of the pictures has."""
+    return frozenset(get_font(findfont(FontProperties(family=["sans-serif"]))).get_charmap())
 
 
 def scale_axis(axes: Axes, which: str = "y", most: int = 7) -> None:

@@ -10,8 +10,8 @@ from pbem.results.reader import Results
 
 # A value nearer than this many lengths of the nearest element belongs to the place.
 NEAR = 1.0
-# A corner of a region is re-entrant if its boundary turns to the outside by more than this (radians).
-RE_ENTRANT = 0.1
+# A boundary that turns by more than this between two elements has a corner there (radians).
+CORNER = 0.1
 
 
 def name_singular_place(results: Results, point: complex) -> str:
@@ -24,7 +24,7 @@ def name_singular_place(results: Results, point: complex) -> str:
     tips = np.array(sorted(find_tips(elements, results.nodes.curve_names, results.tips))).reshape(-1, 2)
     for name, places in (
         ("at a crack tip", tips @ np.array([1, 1j])),
-        ("at a re-entrant corner", find_corners(results) @ np.array([1, 1j])),
+        ("at a corner", find_corners(results) @ np.array([1, 1j])),
         ("at an end of an interface", find_interface_ends(results) @ np.array([1, 1j])),
     ):
         if len(places) and np.abs(places - point).min() <= reach:
@@ -33,7 +33,7 @@ def name_singular_place(results: Results, point: complex) -> str:
 
 
 def find_corners(results: Results) -> Real:
-    """Corners (c, 2) of the regions at which their angle is more than half a turn."""
+    """Corners (c, 2) of the regions: re-entrant ones, or with conditions that the stress cannot follow."""
     elements = results.elements
     outer = np.flatnonzero(~elements.crack)
     geometry = elements.geometry.select(outer)
@@ -44,7 +44,7 @@ def find_corners(results: Results) -> Real:
                           for e, end in zip(outer, geometry.end, strict=True)], dtype=np.int64)
     met = following >= 0
     turn = np.angle(leaves[following] * np.conj(arrives))
-    chosen = met & (turn < -RE_ENTRANT)
+    chosen = met & (np.abs(turn) > CORNER)
     return np.column_stack([geometry.end[chosen].real, geometry.end[chosen].imag])
 
 

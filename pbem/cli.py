@@ -25,9 +25,12 @@ from pbem.errors import (
     StorageError,
     printable,
 )
-from pbem.make_command import add_make_commands, make, read_finite
+from pbem.make_command import add_make_commands, make
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
+from pbem.plot_command import NOTES as PLOT_NOTES
+from pbem.plot_command import add_plot_arguments, plot
 from pbem.version import __version__
+from pbem.wording import suggest
 
 if TYPE_CHECKING:
     from pbem.results.reader import Results
@@ -38,8 +41,6 @@ if TYPE_CHECKING:
 
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
 COMMANDS = ("make", "check", "run", "info", "plot", "help")
-# Of `pbem plot --field`; defined in pbem.results.field_plot.
-FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
 # Of `pbem run --operator`; defined in pbem.model.model.
 OPERATORS = ("auto", "dense", "hierarchical")
 
@@ -148,6 +149,15 @@ class _Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: Any = None) -> None:
         super()._print_message(printable(message, keep="\n"), file)
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse does; of an option that a command does not have a near miss is named."""
+        found, rest = super().parse_known_args(args, namespace)
+        wrong = [each for each in rest if each.startswith("--")]
+        if wrong and self._subparsers is None:
+            near = suggest(wrong[0].partition("=")[0], self._option_string_actions)
+            self.error(f"unrecognized arguments: {' '.join(rest)}{near}")
+        return found, rest
+
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line, without the options of PETSc."""
@@ -178,14 +188,8 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
     info = add("info", _info, "show what a result file holds")
     info.add_argument("file", metavar="FILE.h5")
-    plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")
-    plot.add_argument("file", metavar="FILE.h5")
-    plot.add_argument("-o", "--output", metavar="FILE.png", help="picture (default: beside the result file)")
-    plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
-    plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
-                      help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
-    plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
-    plot.add_argument("--magnify", type=read_finite, default=None, metavar="X", help="scale of the displacements")
+    about = "draw bodies, fields, curves, networks or animations of a result file"
+    add_plot_arguments(add("plot", _plot, about, PLOT_NOTES))
     pages = add("help", _help, "print a page of the documentation, or the list of its topics")
     pages.add_argument("topic", nargs="*", metavar="TOPIC", help="name of a page, or of a command")
     return parser
@@ -243,28 +247,7 @@ def _info(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from pbem.results.field_plot import plot_field
-    from pbem.results.output import check_picture_path
-    from pbem.results.plots import plot_results
-    from pbem.results.reader import open_results
-
-    results = open_results(options.file)
-    source = Path(options.file)
-    kind = "mesh" if options.mesh else options.field
-    beside = source.with_name(f"{source.stem}_{kind}.png") if kind else source.with_suffix(".png")
-    target = check_picture_path(options.output or beside)
-    step = -1 if options.step is None else results.find_step(options.step)
-    if options.mesh:
-        from pbem.results.plots import plot_model
-        from pbem.results.refinement_plot import read_refined
-
-        model, mesh, levels = read_refined(results)
-        plot_model(model, mesh, target, levels)
-    elif options.field:
-        plot_field(results, options.field, target, step)
-    else:
-        plot_results(results, target, step, options.magnify)
-    _tell(f"picture: {target}")
+    _tell(f"picture: {plot(options)}")
     return 0
 
 

@@ -13,6 +13,7 @@ from pbem.results.tail import SIGNATURE
 from pbem.results.trial import check_contents
 
 PICTURE_FORMATS = (".png", ".pdf", ".svg")
+MOVIE_FORMATS = (".gif", ".mp4")
 
 
 def check_output_path(
@@ -91,10 +92,11 @@ def _refuse_to_replace(target: Path, force: bool, source: str | None) -> None:
         )
 
 
-def check_picture_path(path: str | os.PathLike[str]) -> Path:
-    """As `check_output_path`, for a picture; its ending says the format."""
-    if Path(path).suffix.lower() not in PICTURE_FORMATS:
-        raise ResultFileError(str(path), f"is no picture; its name should end with {', '.join(PICTURE_FORMATS)}")
+def check_picture_path(path: str | os.PathLike[str], *, movies: bool = False) -> Path:
+    """As `check_output_path`, for a picture, or an animation (`movies`); its ending says the format."""
+    known = PICTURE_FORMATS + (MOVIE_FORMATS if movies else ())
+    if Path(path).suffix.lower() not in known:
+        raise ResultFileError(str(path), f"is no picture; its name should end with {', '.join(known)}")
     target = _check_folder(path)
     if target.exists():
         try:

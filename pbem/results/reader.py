@@ -160,13 +160,14 @@ class Results:
         """
         return _load_module("tables").make_dataframe(self, what)
 
-    def plot(self, kind: str | None = None, **options: Any) -> Any:
-        """A matplotlib Figure; `pbem.results.curve_plot.plot` lists the options.
+    def plot(self, **options: Any) -> Any:
+        """A matplotlib Figure: the displaced bodies; with curve= quantities along curves; with field= alone a map.
 
-        Without options the picture of `pbem plot`; curve= draws a quantity (field=) along an interface, crack or outer
-        curve, field= alone a map of it at the interior points; ax= draws into axes of yours.
+        curve: a name, or several. field: what is drawn, or a list of it along curves. step: place of a stored step,
+        by default the last. x: "arc_length", "angle", "x" or "y". xlim, ylim: of the axes. ax: axes to draw into.
+        All options and errors: `pbem.results.drawing.plot`.
         """
-        return _load_module("curve_plot").plot(self, kind, **options)
+        return _load_module("drawing").plot(self, **options)
 
     def __repr__(self) -> str:
         return _load_module("summary").summarise(self)

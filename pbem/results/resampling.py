@@ -174,5 +174,4 @@ def _take_roots(mesh: Mesh, element: Integer, along: Real) -> Real:
     own = chain[element]
     place = (before[element, None] + along * length[element, None]) / total[own][:, None]
     root = np.where(begins[own][:, None], np.sqrt(np.maximum(place, 0)), 1.0)
-    rest = (total[own] - before[element])[:, None] / total[own][:, None] - along * (length[element] / total[own])[:, None]
-    return np.asarray(root * np.where(ends[own][:, None], np.sqrt(np.maximum(rest, 0)), 1.0))
+    return np.asarray(root * np.where(ends[own][:, None], np.sqrt(np.maximum(1 - place, 0)), 1.0))

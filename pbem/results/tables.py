@@ -35,6 +35,15 @@ def make_table(results: Results, what: str) -> Table:
     raise ResultFileError(str(results.path), f"has no table '{what}'{hint} it has {list_names(known)}")
 
 
+def choose_table(results: Results) -> str:
+    """What is written where nothing was asked for: the contact of all interfaces. Raises ResultFileError without any.
+    """
+    if len(results.contact):
+        return "contact"
+    known = list_names(list_tables(results))
+    raise ResultFileError(str(results.path), f"has no interfaces; --what chooses among {known}")
+
+
 def list_tables(results: Results) -> list[str]:
     """The names of all tables that the file holds."""
     there = {"steps": True, "reactions": bool(results.reactions), "tips": bool(results.tips),

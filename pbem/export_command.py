@@ -14,8 +14,8 @@ NOTES = """\
   pbem export run.h5 -o run.csv           the contact of all interfaces
   pbem export run.h5 -o seat.csv --what contact.seat
 
-Tables: contact.NAME, contact (of all interfaces), reactions, tips, interior, steps; a row for each stored step and pair,
-curve, tip or point; numbers with all their digits, empty where they are not known."""
+Tables: contact.NAME, contact (of all interfaces), reactions, tips, interior, steps; a row for each stored step and
+pair, curve, tip or point; numbers with all their digits, empty where they are not known."""
 
 
 class ExportError(PbemError):
@@ -25,12 +25,12 @@ class ExportError(PbemError):
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `pbem export`."""
     parser.add_argument("file", metavar="FILE.h5")
-    parser.add_argument("-o", "--output", metavar="FILE", help="a name ending with .vtkhdf (default: that of the result "
-                        "file) or .csv")
-    parser.add_argument("--what", metavar="TABLE", help="of a .csv: contact.NAME, contact, reactions, tips, interior or "
-                        "steps (default: contact)")
-    parser.add_argument("--copy", action="store_true", help="of a .vtkhdf: copy all arrays in place of referring to the "
-                        "result file where that is possible")
+    parser.add_argument("-o", "--output", metavar="FILE",
+                        help="a name ending with .vtkhdf (default: that of the result file) or .csv")
+    parser.add_argument("--what", metavar="TABLE",
+                        help="of a .csv: contact.NAME, contact, reactions, tips, interior or steps (default: contact)")
+    parser.add_argument("--copy", action="store_true",
+                        help="of a .vtkhdf: copy all arrays, also where it could refer to the result file")
 
 
 def export(options: argparse.Namespace) -> str:

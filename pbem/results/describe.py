@@ -17,6 +17,7 @@ from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
 from pbem.results.tip_notes import compare_release, explain_missing_factors
+from pbem.results.trace_names import name_trace
 from pbem.results.traces import list_traces
 
 MOST_ROWS = 40
@@ -277,8 +278,9 @@ def _describe_traces(results: Results, most: int) -> list[str]:
     """A row for each crack, interface or trace that is no bond: those of the largest moments."""
     if not most:
         return []
-    bonds = {name for name, law in zip(results.pairs.names, results.pairs.laws, strict=True) if law == "bonded"}
-    found = [each for each in list_traces(results) if each.name not in bonds]
+    laws = zip(results.pairs.names, results.pairs.laws, strict=True)
+    free = {name_trace(name) for name, law in laws if law != "bonded"}
+    found = [each for each in list_traces(results) if each.name in free]
     rows = [[each.name, *([str(each.pieces)] if any(one.pieces > 1 for one in found) else []),
              *map(_number, (each.length, each.mean_slip, each.largest_slip, each.mean_opening, each.largest_opening,
                             each.moment))] for each in found[:most]]

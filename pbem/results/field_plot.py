@@ -134,8 +134,7 @@ class FieldPicture:
         """The picture of one of the steps, in a figure of its own or in given axes."""
         page, box, own = self._options.page, self._box, axes is None
         if axes is None:
-            width = page.width or 17.8
-            figure = page.make_figure(min(box.height(width - 4.0), 17.0) + 2.6)
+            figure = page.make_figure(page.map_height(box, 17.0))
             axes = figure.add_subplot()
         figure = axes.figure
         values = self.values(step)
@@ -151,7 +150,7 @@ class FieldPicture:
         beyond = extend[bool(self._limits.least < low), bool(self._limits.largest > high)]
         bar = figure.colorbar(
             drawn, ax=axes, extend=beyond, shrink=0.85, aspect=25,
-            **({"location": "bottom", "pad": 0.02} if page.is_narrow else {}),
+            **({"location": "bottom", "pad": 0.02} if page.has_bar_below(box) else {}),
         )
         bar.set_label(label(title, self._results.units.length if is_length else self._results.units.stress))
         bar.formatter.set_powerlimits((-3, 4))
@@ -160,7 +159,7 @@ class FieldPicture:
         self._draw_contours(axes, triangulation, values, low, high, bar)
         self._draw_outlines(axes, step)
         notes = self._mark_extremes(axes, values, places)
-        finish_plane(axes, self._results, self._widen_box(places))
+        finish_plane(axes, self._results, self._widen_box(places), page)
         said = describe_step(self._results, step) + (f", displacements × {self._magnify:g}" if self._magnify else "")
         notes = [self._describe_cut(title, low, high), *notes, describe_box(box)]
         if own:

@@ -23,11 +23,12 @@ HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
 def draw_body(
-    axes: Axes, results: Results, step: int | None, magnify: float, names: dict[str, list[str]], box: Box, page: Page
+    axes: Axes, results: Results, step: int | None, magnify: float, names: dict[str, list[str]], box: Box, page: Page,
+    frame: Box,
 ) -> list[Line2D]:
     """Draw the body at a stored step (None: as it was), displaced magnify times; returns legend handles.
 
-    names: to be written, each with the interfaces that it stands for.
+    names: to be written, each with the interfaces that it stands for; box: what was asked for, frame: what is shown.
     """
     none = np.zeros_like(results.nodes.position)
     displacement = none if step is None else results.displacement_at(step)
@@ -40,19 +41,9 @@ def draw_body(
     marks = _mark_modes(axes, results, step, places, box) if step is not None else []
     marks += _mark_tips(axes, results, outlines, magnify, box)
     write_names(axes, results, names, box, places)
-    finish_plane(axes, results, widen_box(box, lines), page)
+    finish_plane(axes, results, frame, page)
     return [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
             Line2D([], [], color="0.7", linewidth=0.6, label="as it was"), *marks]
-
-
-def widen_box(box: Box, lines: Sequence[Real]) -> Box:
-    """With room for what is displaced out of it, unless it was asked for."""
-    if box.asked:
-        return box
-    points = np.concatenate([*lines, box.low[None], box.high[None]])
-    low, high = points.min(axis=0), points.max(axis=0)
-    room = 0.04 * float((high - low).max())
-    return Box(low - room, high + room, False)
 
 
 def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: Box, places: Real) -> None:

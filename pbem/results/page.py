@@ -146,6 +146,17 @@ def choose_box(results: Results, box: tuple[float, float, float, float] | None =
     return asked
 
 
+def widen_box(box: Box, places: Sequence[Real], room: float) -> Box:
+    """With room for points (p, 2) that are displaced out of it, unless it was asked for; room: beyond them, as a part
+    of the size."""
+    if box.asked:
+        return box
+    points = np.concatenate([*places, box.low[None], box.high[None]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    beyond = room * float((high - low).max())
+    return Box(low - beyond, high + beyond, False)
+
+
 def read_infinite(results: Results) -> Bool:
     """Which regions are infinite."""
     return np.array([region["infinite"] for region in json.loads(results.configuration)["regions"]], dtype=bool)

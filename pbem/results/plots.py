@@ -17,7 +17,7 @@ from pbem.results.curve_plot import LINE_STYLES, draw_profile, finish_axes
 from pbem.results.curve_profile import check_abscissa, read_profile
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
-from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, write_around
+from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, widen_box, write_around
 from pbem.results.plot_style import MODES, choose_magnification, describe_step, escape, label, style
 from pbem.results.reader import Results
 from pbem.results.trace_names import find_names
@@ -88,6 +88,8 @@ class BodyPicture:
         moved = [results.displacement_at(at) for at in self._steps]
         largest = max(moved, key=lambda each: float(np.abs(each).max(initial=0.0)), default=np.zeros((1, 2)))
         self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+        places = [results.nodes.position, *(results.nodes.position + self._magnify * each for each in moved)]
+        self._frame = widen_box(self._box, places, 0.04)
         self._profiles = {
             (name, quantity, at): read_profile(results, name, quantity, at, options.abscissa)
             for name in self._names for _, quantities in PANELS for quantity in quantities for at in self._steps
@@ -98,12 +100,12 @@ class BodyPicture:
         results, page = self._results, self._options.page
         rows = len(self._names) if step is not None else 0
         width = page.width or 17.8
-        body = max(4.0, min(self._box.height(width - 2.0), 12.0 if rows else 17.0)) + 1.6
+        body = max(4.0, min(self._frame.height(width - 2.0), 12.0 if rows else 17.0)) + 1.6
         each, legend = 4.8, 1.9 if page.is_narrow else 1.0
         figure = page.make_figure(body + legend + each * rows + 1.2)
         grid = figure.add_gridspec(2 + rows, 2, height_ratios=[body, legend, *[each] * rows])
         axes = figure.add_subplot(grid[0, :])
-        handles = draw_body(axes, results, step, self._magnify, self._labels, self._box, page)
+        handles = draw_body(axes, results, step, self._magnify, self._labels, self._box, page, self._frame)
         notes = [describe_box(self._box)]
         if step is None:
             write_around(figure, f"{escape(results.title)}\nno step stored".strip(), notes)

@@ -25,6 +25,9 @@ from pbem.errors import (
     StorageError,
     printable,
 )
+from pbem.export_command import NOTES as EXPORT_NOTES
+from pbem.export_command import add_export_arguments, export
+from pbem.info_command import add_info_arguments, describe
 from pbem.make_command import add_make_commands, make
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
 from pbem.plot_command import NOTES as PLOT_NOTES
@@ -40,7 +43,7 @@ if TYPE_CHECKING:
 # threads has to be set before.
 
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
-COMMANDS = ("make", "check", "run", "info", "plot", "help")
+COMMANDS = ("make", "check", "run", "info", "plot", "export", "help")
 # Of `pbem run --operator`; defined in pbem.model.model.
 OPERATORS = ("auto", "dense", "hierarchical")
 
@@ -52,6 +55,7 @@ Boundary elements for frictional contact in two-dimensional elasticity.
   pbem run CASE              compute; `pbem CASE` does the same
   pbem info FILE.h5          what a result file holds
   pbem plot FILE.h5          draw a result file
+  pbem export FILE.h5        for ParaView and PyVista, or a table (-o FILE.csv)
   pbem help TOPIC            a page of the documentation; without TOPIC: the list of them
 
 CASE is a TOML file, or the name of a case that comes with the program.
@@ -186,8 +190,8 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    info = add("info", _info, "show what a result file holds")
-    info.add_argument("file", metavar="FILE.h5")
+    add_info_arguments(add("info", _info, "show what a result file holds"))
+    add_export_arguments(add("export", _export, "write results for ParaView and PyVista, or as a table", EXPORT_NOTES))
     about = "draw bodies, fields, curves, networks or animations of a result file"
     add_plot_arguments(add("plot", _plot, about, PLOT_NOTES))
     pages = add("help", _help, "print a page of the documentation, or the list of its topics")
@@ -239,10 +243,12 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from pbem.results.describe import describe_results
-    from pbem.results.reader import open_results
+    _tell(describe(options))
+    return 0
 
-    _tell(describe_results(open_results(options.file)))
+
+def _export(options: argparse.Namespace) -> int:
+    _tell(export(options))
     return 0
 
 

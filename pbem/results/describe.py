@@ -17,6 +17,7 @@ from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
 from pbem.results.tip_notes import compare_release, explain_missing_factors
+from pbem.results.traces import list_traces
 
 MOST_ROWS = 40
 MOST_TIPS = 10
@@ -45,8 +46,11 @@ def describe_model(model: Model, mesh: Mesh) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def describe_results(results: Results) -> str:
-    """What `pbem info` prints: where the file comes from, how far the run got, and the last step in numbers."""
+def describe_results(results: Results, traces: int = 10) -> str:
+    """What `pbem info` prints: where the file comes from, how far the run got, and the last step in numbers.
+
+    traces: so many are listed at most.
+    """
     k = len(results.steps)
     units = f"length {results.units.length or '-'}, stress {results.units.stress or '-'}"
     elements = len(results.elements.vertices)
@@ -66,6 +70,7 @@ def describe_results(results: Results) -> str:
         parts.append(_section("contact at the last step", _table(
             ["interface", "pairs", "stick", "slip", "open", "max opening", "max |slip|"],
             _contact_rows(results))))
+        parts.append(_section("traces at the last step, by moment", _describe_traces(results, traces)))
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
@@ -268,6 +273,22 @@ def _contact_rows(results: Results) -> list[list[str]]:
     return [[title, *map(str, each[:4]), *map(_number, each[4:])] for title, *each in numbers]
 
 
+def _describe_traces(results: Results, most: int) -> list[str]:
+    """A row for each crack, interface or trace that is no bond: those of the largest moments."""
+    if not most:
+        return []
+    bonds = {name for name, law in zip(results.pairs.names, results.pairs.laws, strict=True) if law == "bonded"}
+    found = [each for each in list_traces(results) if each.name not in bonds]
+    rows = [[each.name, *([str(each.pieces)] if any(one.pieces > 1 for one in found) else []),
+             *map(_number, (each.length, each.mean_slip, each.largest_slip, each.mean_opening, each.largest_opening,
+                            each.moment))] for each in found[:most]]
+    pieces = ["pieces"] if rows and len(rows[0]) == 8 else []
+    titles = ["trace", *pieces, "length", "mean slip", "max |slip|", "mean opening", "max opening", "moment"]
+    left_out = len(found) - len(rows)
+    return [*_table(titles, rows, most), *([f"... and {left_out} of smaller moments (--traces N lists more)"]
+                                           if left_out else [])]
+
+
 def _describe_energy(results: Results) -> list[str]:
     """The balance, and what it lacks: a measure of the mesh."""
     external, elastic, dissipated, released = (float(each[-1]) for each in vars(results.energy).values())
@@ -313,20 +334,16 @@ def _section(title: str, lines: Iterable[str]) -> str:
     return "\n".join([title, *(f"  {line}" for line in listed)]) if listed else ""
 
 
-def _table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned lines, numbers to the right; at most MOST_ROWS of them."""
+def _table(titles: Sequence[str], rows: Sequence[Sequence[str]], most: int = MOST_ROWS) -> list[str]:
+    """Aligned lines, numbers to the right; at most so many of them."""
     if not rows:
         return []
-    shown = [titles, *rows[:MOST_ROWS]]
+    shown = [titles, *rows[:most]]
     widths = [max(len(row[i]) for row in shown) for i in range(len(titles))]
     right = [all(_is_number(row[i]) for row in rows) for i in range(len(titles))]
     lines = ["  ".join(cell.rjust(width) if flush else cell.ljust(width)
                        for cell, width, flush in zip(row, widths, right, strict=True)).rstrip() for row in shown]
-    return lines + _left_out(len(rows))
-
-
-def _left_out(count: int) -> list[str]:
-    return [f"... and {count - MOST_ROWS} more"] if count > MOST_ROWS else []
+    return lines + ([f"... and {len(rows) - most} more"] if len(rows) > most else [])
 
 
 def _shorten(texts: Sequence[str], most: int = MOST_ROWS) -> list[str]:

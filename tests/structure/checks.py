@@ -13,7 +13,7 @@ from pathlib import Path
 # The package itself comes last: it offers what they define.
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "case", "solve", "results", "progress", "driver",
-    "make_command", "plot_command", "bundled", "pages", "cli", "__main__", "__init__",
+    "make_command", "export_command", "info_command", "plot_command", "bundled", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact")

@@ -21,7 +21,8 @@ from pbem.results.picture_limits import format_number, join_sentences
 from pbem.results.plot_style import scale_plane
 from pbem.results.reader import Results
 
-CM = 1 / 2.54
+# Sizes in inches are not rounded to one dot less than was asked for.
+INCH, NUDGE = 2.54, 1e-9
 # Widths by name, in cm: of one column, and of the type area, as most journals have them.
 WIDTHS = {"column": 8.6, "page": 17.8}
 MOST_HEIGHT = 28.0
@@ -60,7 +61,7 @@ class Page:
         """An empty figure of the page's size; height: of a picture of the usual width, in cm."""
         width = self.width or WIDTHS["page"]
         chosen = self.height or min(height, MOST_HEIGHT)
-        figure = Figure(figsize=(width * CM, chosen * CM), layout="constrained")
+        figure = Figure(figsize=(width / INCH + NUDGE, chosen / INCH + NUDGE), layout="constrained")
         FigureCanvasAgg(figure)
         return figure
 

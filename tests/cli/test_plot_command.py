@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ import pbem.plot_command
 import pbem.results.curve_profile
 import pbem.results.page
 import pbem.results.trace_plot
-from pbem.cli import main
+from pbem.cli import main, make_parser
 from tests.verification.planes import make_plane, make_straight, solve
 
 Capture = pytest.CaptureFixture[str]
@@ -57,7 +58,7 @@ def test_pictures_are_written(folder: Path, capsys: Capture, options: str, writt
 
 
 def test_sizes_are_those_asked_for(folder: Path) -> None:
-    assert main("plot run.h5 --traces slip --size 9 7 --dpi 127".split()) == 0
+    assert main(["plot", "run.h5", "--traces", "slip", "--size", "9", "7", "--dpi", "127"]) == 0
     assert image.imread("run_slip.png").shape[:2] == (350, 450)
 
 
@@ -71,7 +72,7 @@ def test_sizes_are_those_asked_for(folder: Path) -> None:
     ("--field ux --shape 1 3 --contours -1 --dpi 0", ["--shape: found 1 3", "--contours: found -1", "--dpi: found 0"]),
     ("--width colum", ["--width: found 'colum'; did you mean 'column'?"]),
     ("--width 5 --size 5 5", ["--width and --size are both given"]),
-    ("--curve t2", ["there is no interface or crack 't2'; did you mean 't1'", "t1.1, t1.2"]),
+    ("--curve t2", ["there is no interface or crack 't2'; did you mean 't1.", "t1.1, t1.2"]),
     ("--label t2", ["there is no interface or crack 't2'"]),
     ("--curve t1.1 --field slipp", ["no quantity 'slipp' along 't1.1'; did you mean 'slip'"]),
     ("--curve t1.1 --x angle", ["'t1.1' is no arc of a circle"]),
@@ -95,7 +96,7 @@ def test_wrong_options_are_refused(folder: Path, capsys: Capture, options: str, 
 
 def test_a_film_without_its_program_says_so(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
-    assert main("plot run.h5 -o run.mp4".split()) == 2
+    assert main(["plot", "run.h5", "-o", "run.mp4"]) == 2
     assert "needs the program ffmpeg" in capsys.readouterr().err
     assert not (folder / "run.mp4").exists()
 
@@ -114,17 +115,14 @@ def test_help_has_examples(capsys: Capture) -> None:
         words = line.split("  ")[1] if line.startswith("  pbem plot run.h5") else ""
         if words:
             arguments = words.split()[1:]
-            from pbem.cli import make_parser
-
             assert make_parser().parse_args(arguments).command == "plot"
     assert said.count("pbem plot run.h5") >= 8
 
 
 def test_drawing_loads_neither_mpi_nor_petsc(folder: Path) -> None:
-    code = ("import sys; from pbem.cli import main; code = main(['plot', 'run.h5', '--field', 'ux', '--shape', '5', '5']); "
+    code = ("import sys; from pbem.cli import main; "
+            "code = main(['plot', 'run.h5', '--field', 'ux', '--shape', '5', '5']); "
             "print([name for name in ('mpi4py', 'petsc4py') if name in sys.modules]); sys.exit(code)")
-    import sys
-
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "[]"

@@ -21,6 +21,7 @@ TOPICS = {
     "laws": "friction laws, and how to write one",
     "signs": "signs and directions",
     "results": "the result file, and how to read it in Python",
+    "pictures": "what `pbem plot` draws, and how it is asked for",
     "convergence": "how contact is solved, why a run stops, and what to do",
     "accuracy": "meshes, estimated errors, and measured accuracy",
     "large-models": "thousands of cracks or inclusions: methods, time and memory",

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.results.outline import Outline, find_tips, trace_outlines
-from pbem.results.page import Box, finish_plane
+from pbem.results.page import Box, Page, finish_plane
 from pbem.results.plot_style import MODES, TIP, choose_shades, escape
 from pbem.results.reader import Results
 
@@ -23,11 +23,12 @@ HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
 def draw_body(
-    axes: Axes, results: Results, step: int | None, magnify: float, names: dict[str, list[str]], box: Box
+    axes: Axes, results: Results, step: int | None, magnify: float, names: dict[str, list[str]], box: Box, page: Page,
+    frame: Box,
 ) -> list[Line2D]:
     """Draw the body at a stored step (None: as it was), displaced magnify times; returns legend handles.
 
-    names: to be written, each with the interfaces that it stands for.
+    names: to be written, each with the interfaces that it stands for; box: what was asked for, frame: what is shown.
     """
     none = np.zeros_like(results.nodes.position)
     displacement = none if step is None else results.displacement_at(step)
@@ -36,26 +37,18 @@ def draw_body(
     axes.add_collection(LineCollection([each.position for each in outlines], colors="0.7", linewidths=0.6, zorder=1))
     lines = [each.position + magnify * each.displacement for each in outlines]
     axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.8, zorder=3))
-    marks = _mark_modes(axes, results, step, displacement, magnify, box) if step is not None else []
+    places = _displace_pairs(results, displacement, magnify)
+    marks = _mark_modes(axes, results, step, places, box) if step is not None else []
     marks += _mark_tips(axes, results, outlines, magnify, box)
-    write_names(axes, results, names, box)
-    finish_plane(axes, results, widen_box(box, lines))
+    write_names(axes, results, names, box, places)
+    finish_plane(axes, results, frame, page)
     return [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
             Line2D([], [], color="0.7", linewidth=0.6, label="as it was"), *marks]
 
 
-def widen_box(box: Box, lines: Sequence[Real]) -> Box:
-    """With room for what is displaced out of it, unless it was asked for."""
-    if box.asked:
-        return box
-    points = np.concatenate([*lines, box.low[None], box.high[None]])
-    low, high = points.min(axis=0), points.max(axis=0)
-    room = 0.04 * float((high - low).max())
-    return Box(low - room, high + room, False)
-
-
-def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: Box) -> None:
-    """Write names beside the middle of the longest piece that each stands for, where it is seen."""
+def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: Box, places: Real) -> None:
+    """Write names beside the middle of the longest piece that each stands for, where it is seen; places (m, 2): of all
+    pairs."""
     pairs = results.pairs
     number = {name: k for k, name in enumerate(pairs.names)}
     begins = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
@@ -66,9 +59,15 @@ def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: 
             own = own[box.contains(pairs.position[own])]
             longest = own if len(own) > len(longest) else longest
         if len(longest):
-            place = pairs.position[longest[len(longest) // 3]]
-            axes.annotate(escape(name), place, xytext=(4, -9), textcoords="offset points", fontsize=7, zorder=6,
-                          path_effects=HALO, annotation_clip=True)
+            pair = longest[len(longest) // 3]
+            # Off the line, below it or to its right.
+            across = pairs.normal[pair] * (-1 if pairs.normal[pair] @ [-0.5, 1.0] > 0 else 1)
+            axes.annotate(
+                escape(name), places[pair], xytext=tuple(7.0 * across), textcoords="offset points", fontsize=7,
+                ha="left" if across[0] > 0.4 else "right" if across[0] < -0.4 else "center",
+                va="top" if across[1] < -0.4 else "bottom" if across[1] > 0.4 else "center",
+                zorder=6, path_effects=HALO, annotation_clip=True,
+            )
 
 
 def _fill_regions(axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float) -> None:
@@ -95,19 +94,24 @@ def _area(shape: Real) -> float:
     return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
 
 
-def _mark_modes(
-    axes: Axes, results: Results, step: int, displacement: Real, magnify: float, box: Box
-) -> list[Line2D]:
-    """Mark every contact pair on its displaced first side, by lines where there are many; returns legend handles."""
+def _displace_pairs(results: Results, displacement: Real, magnify: float) -> Real:
+    """Where the first sides of all pairs are (m, 2)."""
     pairs = results.pairs
     if not pairs.names:
-        return []
-    position, normal, mode = pairs.position, pairs.normal, pairs.at("mode", step)
+        return np.zeros((0, 2))
     # Nodes of both sides lie at the same place; their normals tell which one is on the first side.
     size = float(np.ptp(results.nodes.position, axis=0).max())
     tree = cKDTree(np.hstack([results.nodes.position, size * results.nodes.normal]))
-    _, nodes = tree.query(np.hstack([position, size * normal]))
-    places = results.nodes.position[nodes] + magnify * displacement[nodes]
+    _, nodes = tree.query(np.hstack([pairs.position, size * pairs.normal]))
+    return np.asarray(results.nodes.position[nodes] + magnify * displacement[nodes])
+
+
+def _mark_modes(axes: Axes, results: Results, step: int, places: Real, box: Box) -> list[Line2D]:
+    """Mark every contact pair at its place, by lines where there are many; returns legend handles."""
+    pairs = results.pairs
+    if not pairs.names:
+        return []
+    position, mode = pairs.position, pairs.at("mode", step)
     seen: Bool = box.contains(position) if box.asked else np.ones(len(mode), dtype=bool)
     used = [which for which in MODES if (mode[seen] == which).any()]
     if seen.sum() <= MOST_MARKS:

@@ -75,7 +75,7 @@ def finish_axes(
     if x == "angle":
         span = max(float(each.place.max() - each.place.min()) for each in drawn if len(each.place))
         for step in (90, 60, 45, 30, 15, 5):
-            if span / step >= 4:
+            if span / step >= 3:
                 axes.xaxis.set_major_locator(MultipleLocator(step))
                 break
     if xlim is not None:
@@ -85,6 +85,8 @@ def finish_axes(
         return ""
     limits = join_limits([limit_line(each.place, each.values, each.closed) for each in drawn])
     axes.set_ylim(*widen(limits, 0.08))
+    if limits.low == limits.high == 0.0:
+        axes.set_yticks([0.0])
     said = limits.describe_cut("")
     axes.set_title(said.replace(":  reaches", ": values to"), loc="right", fontsize=6.5, color="0.3")
     return said

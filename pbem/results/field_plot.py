@@ -20,13 +20,13 @@ from pbem.results.field_formulas import FIELDS
 from pbem.results.field_values import VertexField, VertexValues
 from pbem.results.outline import to_columns, trace_outlines
 from pbem.results.page import (
-    Box,
     Page,
     choose_box,
     describe_box,
     finish_plane,
     read_infinite,
     save,
+    widen_box,
     write_around,
 )
 from pbem.results.picture_limits import Limits, format_number, limit_field
@@ -110,6 +110,10 @@ class FieldPicture:
             largest = max((results.displacement_at(at) for at in self._steps), key=lambda u: float(np.abs(u).max()))
             size = float(np.ptp(results.nodes.position, axis=0).max())
             self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+        # The same for all steps.
+        places = [to_columns(self._triangles.position) + self._magnify * each for each in self._values.displacement]
+        infinite = bool(read_infinite(results).any())
+        self._frame = widen_box(self._box, places, 0.0 if infinite else 0.03)
 
     @property
     def triangles(self) -> Triangles:
@@ -134,8 +138,7 @@ class FieldPicture:
         """The picture of one of the steps, in a figure of its own or in given axes."""
         page, box, own = self._options.page, self._box, axes is None
         if axes is None:
-            width = page.width or 17.8
-            figure = page.make_figure(min(box.height(width - 4.0), 17.0) + 2.6)
+            figure = page.make_figure(page.map_height(self._frame, 17.0))
             axes = figure.add_subplot()
         figure = axes.figure
         values = self.values(step)
@@ -151,7 +154,7 @@ class FieldPicture:
         beyond = extend[bool(self._limits.least < low), bool(self._limits.largest > high)]
         bar = figure.colorbar(
             drawn, ax=axes, extend=beyond, shrink=0.85, aspect=25,
-            **({"location": "bottom", "pad": 0.02} if page.is_narrow else {}),
+            **({"location": "bottom", "pad": 0.02} if page.has_bar_below(self._frame) else {}),
         )
         bar.set_label(label(title, self._results.units.length if is_length else self._results.units.stress))
         bar.formatter.set_powerlimits((-3, 4))
@@ -160,7 +163,7 @@ class FieldPicture:
         self._draw_contours(axes, triangulation, values, low, high, bar)
         self._draw_outlines(axes, step)
         notes = self._mark_extremes(axes, values, places)
-        finish_plane(axes, self._results, self._widen_box(places))
+        finish_plane(axes, self._results, self._frame, page)
         said = describe_step(self._results, step) + (f", displacements × {self._magnify:g}" if self._magnify else "")
         notes = [self._describe_cut(title, low, high), *notes, describe_box(box)]
         if own:
@@ -215,36 +218,29 @@ class FieldPicture:
         if not len(inside) or np.ptp(values[inside]) <= 1e-9 * np.abs(values[inside]).max():
             return []
         middle = places[inside].mean(axis=0)
-        said = []
-        for name, marker, which in (("max", "^", np.argmax(values[inside])), ("min", "v", np.argmin(values[inside]))):
-            vertex = inside[which]
+        ends = {"max": int(inside[np.argmax(values[inside])]), "min": int(inside[np.argmin(values[inside])])}
+        said: dict[str, list[str]] = {}
+        for name, marker, other in (("max", "^", "min"), ("min", "v", "max")):
+            vertex = ends[name]
             x, y = places[vertex]
             axes.plot([x], [y], marker, markersize=5, markerfacecolor="white", markeredgecolor="black",
                       markeredgewidth=0.8, zorder=6, clip_on=False, label=f"_{name}")
-            right, above = x < middle[0], y < middle[1]
+            # Away from each other, so that they do not meet.
+            right, above = x < middle[0], y > places[ends[other]][1]
             axes.annotate(
                 f"{name} {format_number(float(values[vertex]))}", (x, y), zorder=7, fontsize=7,
-                xytext=(5 if right else -5, 5 if above else -5), textcoords="offset points",
+                xytext=(5 if right else -5, 4 if above else -4), textcoords="offset points",
                 ha="left" if right else "right", va="bottom" if above else "top", path_effects=HALO,
             )
             value, limits = float(values[vertex]), self._limits
-            if value > limits.high or value < min(limits.low, 0.0):
-                place = self._name_place(int(vertex))
-                said += [f"{name} is {place}, where stress may be infinite: it grows with refinement"] if place else []
-        return said
+            place = self._name_place(vertex) if value > limits.high or value < min(limits.low, 0.0) else ""
+            if place:
+                said.setdefault(place, []).append(name)
+        return [f"{' and '.join(names)} {place}, where stress may be infinite and grows with refinement"
+                for place, names in said.items()]
 
     def _name_place(self, vertex: int) -> str:
         """The singular place that a vertex is at; displacements are nowhere singular."""
         if FIELDS[self._name][1]:
             return ""
         return name_singular_place(self._results, complex(self._triangles.position[vertex]))
-
-    def _widen_box(self, places: Real) -> Box:
-        """With room for what the displacements bring out of it, unless a box was asked for."""
-        if self._box.asked:
-            return self._box
-        low, high = np.minimum(self._box.low, places.min(axis=0)), np.maximum(self._box.high, places.max(axis=0))
-        if not read_infinite(self._results).any():
-            room = 0.03 * float((high - low).max())
-            return Box(low - room, high + room, False)
-        return self._box

@@ -21,13 +21,16 @@ from pbem.results.picture_limits import format_number, join_sentences
 from pbem.results.plot_style import scale_plane
 from pbem.results.reader import Results
 
-CM = 1 / 2.54
+# Sizes in inches are not rounded to one dot less than was asked for.
+INCH, NUDGE = 2.54, 1e-9
 # Widths by name, in cm: of one column, and of the type area, as most journals have them.
 WIDTHS = {"column": 8.6, "page": 17.8}
-MOST_HEIGHT = 24.0
+MOST_HEIGHT = 28.0
 # An infinite region is shown around all that is in it by this part of its size.
 AROUND = 0.4
 EMPTY = 1e-3
+# What is lower than this part of its width has no room for a bar of colours at its side.
+FLAT = 0.45
 
 
 @dataclass(frozen=True)
@@ -43,11 +46,22 @@ class Page:
         """Whether there is no room for a legend beside the axes."""
         return self.width is not None and self.width < 12.0
 
+    def map_height(self, box: Box, most: float) -> float:
+        """Of a picture of the box with a bar of colours, in cm."""
+        width = self.width or WIDTHS["page"]
+        if self.has_bar_below(box):
+            return min(max(box.height(width - 2.0), 2.0), most) + 4.4
+        return min(box.height(width - 4.0), most) + 2.6
+
+    def has_bar_below(self, box: Box) -> bool:
+        """Whether the bar of colours is better below a picture of the box than beside it."""
+        return self.is_narrow or bool(box.size[1] < FLAT * box.size[0])
+
     def make_figure(self, height: float) -> Figure:
         """An empty figure of the page's size; height: of a picture of the usual width, in cm."""
         width = self.width or WIDTHS["page"]
         chosen = self.height or min(height, MOST_HEIGHT)
-        figure = Figure(figsize=(width * CM, chosen * CM), layout="constrained")
+        figure = Figure(figsize=(width / INCH + NUDGE, chosen / INCH + NUDGE), layout="constrained")
         FigureCanvasAgg(figure)
         return figure
 
@@ -71,12 +85,14 @@ def write_around(figure: Figure, title: str, notes: Sequence[str] = ()) -> None:
         figure.supxlabel(said, x=0.01, ha="left", fontsize=6.5, color="0.25")
 
 
-def add_legend_row(figure: Figure, cell: SubplotSpec, handles: Sequence[Line2D], page: Page) -> None:
+def add_legend_row(
+    figure: Figure, cell: SubplotSpec, handles: Sequence[Line2D], page: Page, columns: int = 4
+) -> None:
     """A legend in a row of its own, each entry once."""
     unique = list({str(handle.get_label()): handle for handle in handles}.values())
     axes = figure.add_subplot(cell)
     axes.set_axis_off()
-    axes.legend(handles=unique, loc="center", ncol=2 if page.is_narrow else 4, borderaxespad=0.0)
+    axes.legend(handles=unique, loc="center", ncol=min(columns, 2) if page.is_narrow else columns, borderaxespad=0.0)
 
 
 @dataclass(frozen=True)
@@ -131,14 +147,25 @@ def choose_box(results: Results, box: tuple[float, float, float, float] | None =
     return asked
 
 
+def widen_box(box: Box, places: Sequence[Real], room: float) -> Box:
+    """With room for points (p, 2) that are displaced out of it, unless it was asked for; room: beyond them, as a part
+    of the size."""
+    if box.asked:
+        return box
+    points = np.concatenate([*places, box.low[None], box.high[None]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    beyond = room * float((high - low).max())
+    return Box(low - beyond, high + beyond, False)
+
+
 def read_infinite(results: Results) -> Bool:
     """Which regions are infinite."""
     return np.array([region["infinite"] for region in json.loads(results.configuration)["regions"]], dtype=bool)
 
 
-def finish_plane(axes: Axes, results: Results, box: Box) -> None:
+def finish_plane(axes: Axes, results: Results, box: Box, page: Page) -> None:
     """Labels, ticks and limits of a picture of the plane."""
-    scale_plane(axes, results)
+    scale_plane(axes, results, 4 if page.is_narrow else 6)
     box.limit(axes)
 
 

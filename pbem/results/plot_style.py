@@ -101,11 +101,11 @@ def scale_axis(axes: Axes, which: str = "y", most: int = 7) -> None:
     axes.locator_params(axis=which, nbins=most)
 
 
-def scale_plane(axes: Axes, results: Results) -> None:
-    """Equal scales, and the axes' names and ticks of a picture of the plane."""
+def scale_plane(axes: Axes, results: Results, most: int = 6) -> None:
+    """Equal scales, and the axes' names and ticks (about `most` at most) of a picture of the plane."""
     axes.set_aspect("equal")
     for which in ("x", "y"):
-        scale_axis(axes, which, 6)
+        scale_axis(axes, which, most)
     axes.set_xlabel(label("$x$", results.units.length))
     axes.set_ylabel(label("$y$", results.units.length))
 
@@ -115,7 +115,7 @@ def describe_step(results: Results, step: int) -> str:
     steps = results.steps
     stage = escape(steps.stage_names[int(steps.stage[step])])
     title = "\n".join(textwrap.wrap(escape(results.title), TITLE_WIDTH))
-    return f"{title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g})"
+    return f"{title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g})".strip()
 
 
 def choose_magnification(displacement: Real, size: float) -> float:

@@ -17,7 +17,7 @@ from pbem.results.curve_plot import LINE_STYLES, draw_profile, finish_axes
 from pbem.results.curve_profile import check_abscissa, read_profile
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
-from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, write_around
+from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, widen_box, write_around
 from pbem.results.plot_style import MODES, choose_magnification, describe_step, escape, label, style
 from pbem.results.reader import Results
 from pbem.results.trace_names import find_names
@@ -88,6 +88,8 @@ class BodyPicture:
         moved = [results.displacement_at(at) for at in self._steps]
         largest = max(moved, key=lambda each: float(np.abs(each).max(initial=0.0)), default=np.zeros((1, 2)))
         self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+        places = [results.nodes.position, *(results.nodes.position + self._magnify * each for each in moved)]
+        self._frame = widen_box(self._box, places, 0.04)
         self._profiles = {
             (name, quantity, at): read_profile(results, name, quantity, at, options.abscissa)
             for name in self._names for _, quantities in PANELS for quantity in quantities for at in self._steps
@@ -98,20 +100,17 @@ class BodyPicture:
         results, page = self._results, self._options.page
         rows = len(self._names) if step is not None else 0
         width = page.width or 17.8
-        room = 0.5 if page.is_narrow else 4.0
-        body = max(4.0, min(self._box.height(width - room - 1.5), 12.0 if rows else 17.0)) + 2.0
-        each = 5.2 if not page.is_narrow else 4.6
-        below = 2.2 if page.is_narrow else 0.0
-        figure = page.make_figure(body + each * rows + below + 1.0)
-        last = [below] if page.is_narrow else []
-        grid = figure.add_gridspec(1 + rows + len(last), 2, height_ratios=[body, *[each] * rows, *last])
+        body = max(4.0, min(self._frame.height(width - 2.0), 12.0 if rows else 17.0)) + 1.6
+        each, legend = 4.8, 1.9 if page.is_narrow else 1.0
+        figure = page.make_figure(body + legend + each * rows + 1.2)
+        grid = figure.add_gridspec(2 + rows, 2, height_ratios=[body, legend, *[each] * rows])
         axes = figure.add_subplot(grid[0, :])
-        handles = draw_body(axes, results, step, self._magnify, self._labels, self._box)
+        handles = draw_body(axes, results, step, self._magnify, self._labels, self._box, page, self._frame)
         notes = [describe_box(self._box)]
         if step is None:
-            write_around(figure, f"{escape(results.title)}: no step stored", notes)
+            write_around(figure, f"{escape(results.title)}\nno step stored".strip(), notes)
         else:
-            for row, name in enumerate(self._names, start=1):
+            for row, name in enumerate(self._names, start=2):
                 left = figure.add_subplot(grid[row, 0])
                 pair = left, figure.add_subplot(grid[row, 1], sharex=left)
                 handles += self._draw_panels(pair, results.contact[name], step)
@@ -120,12 +119,8 @@ class BodyPicture:
                             for line, text in zip(LINE_STYLES, LINES, strict=False)]
             write_around(figure, f"{describe_step(results, step)}, displacements × {self._magnify:g}",
                          [*notes, self._say_left_out()])
-        # One legend for all axes: beside the body, in a narrow picture below everything.
-        if page.is_narrow:
-            add_legend_row(figure, grid[1 + rows, :], handles, page)
-        else:
-            unique = list({str(handle.get_label()): handle for handle in handles}.values())
-            axes.legend(handles=unique, loc="center left", bbox_to_anchor=(1.01, 0.5))
+        # One for all axes, between the body and the lines.
+        add_legend_row(figure, grid[1, :], handles, page)
         return figure
 
     def _draw_panels(self, pair: tuple[Axes, Axes], contact: Contact, step: int) -> list[Line2D]:

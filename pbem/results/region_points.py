@@ -50,7 +50,7 @@ def fill_points(boundary: Complex, spacing: Real, view: View) -> Complex:
     columns = np.column_stack([boundary.real, boundary.imag])
     low, high = columns.min(axis=0), columns.max(axis=0)
     tree = cKDTree(columns)
-    side = float(min((high - low).max(), 2 * view.spacing))
+    side = float((high - low).min())
     counts = np.maximum(1, np.ceil((high - low) / side)).astype(int)
     grid = np.meshgrid(*(low[i] + (np.arange(counts[i]) + 0.5) * side for i in range(2)), indexing="ij")
     cells = np.column_stack([each.ravel() for each in grid])

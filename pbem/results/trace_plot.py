@@ -84,10 +84,9 @@ class TracePicture:
     def draw(self, step: int) -> Figure:
         """The picture of one of the steps."""
         results, page, box = self._results, self._options.page, self._box
-        width = page.width or 17.8
-        figure = page.make_figure(min(box.height(width - 4.0), 18.0) + 2.6)
+        figure = page.make_figure(page.map_height(box, 18.0))
         below = page.is_narrow and self._quantity == "status"
-        grid = figure.add_gridspec(2, 1, height_ratios=[12, 2]) if below else figure.add_gridspec(1, 1)
+        grid = figure.add_gridspec(2, 1, height_ratios=[12, 3]) if below else figure.add_gridspec(1, 1)
         axes = figure.add_subplot(grid[0])
         outlines = [each.position for each in trace_outlines(
             results.nodes, results.elements, np.zeros_like(results.nodes.position)) if not each.crack]
@@ -96,13 +95,13 @@ class TracePicture:
         if self._quantity == "status":
             handles = self._draw_status(axes, self._values[step])
             if page.is_narrow:
-                add_legend_row(figure, grid[1], handles, page)
+                add_legend_row(figure, grid[1], handles, page, 1)
             else:
                 axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
         else:
             notes = self._draw_values(figure, axes, self._values[step])
-        write_names(axes, results, self._labels, box)
-        finish_plane(axes, results, box)
+        write_names(axes, results, self._labels, box, results.pairs.position)
+        finish_plane(axes, results, box, page)
         write_around(figure, describe_step(results, step), [*notes, describe_box(box)])
         return figure
 
@@ -123,10 +122,10 @@ class TracePicture:
         lines.set_clim(low, high)
         axes.add_collection(lines)
         beyond = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-        narrow = self._options.page.is_narrow
+        below = self._options.page.has_bar_below(self._box)
         bar = figure.colorbar(lines, ax=axes, shrink=0.85, aspect=25,
                               extend=beyond[bool(limits.least < low), bool(limits.largest > high)],
-                              **({"location": "bottom", "pad": 0.02} if narrow else {}))
+                              **({"location": "bottom", "pad": 0.02} if below else {}))
         units = self._results.units
         bar.set_label(label(title, units.length if is_length else units.stress))
         bar.formatter.set_powerlimits((-3, 4))

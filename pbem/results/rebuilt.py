@@ -41,7 +41,11 @@ def rebuild_run(path: str, nodes: contents.Nodes, elements: contents.Elements, c
     """Model and mesh of a result file. Raises ResultFileError if it does not tell, being of an earlier version."""
     if not configuration:
         raise ResultFileError(path, "was written by an older version of pbem, which did not store what this needs")
-    model = _read_model(json.loads(configuration))
+    try:
+        model = _read_model(json.loads(configuration))
+    except (KeyError, TypeError, ValueError) as error:
+        reason = f"was written by another version of pbem, whose configuration lacks what this needs ({error})"
+        raise ResultFileError(path, reason) from error
     start, end = (elements.vertices[..., 0] + 1j * elements.vertices[..., 1]).T - model.origin
     faces = Elements.by_ends(start, end, elements.sweep)
     return RebuiltRun(model, _build_mesh(path, model, nodes, elements, faces), faces)

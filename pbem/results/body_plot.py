@@ -135,5 +135,7 @@ def _mark_tips(
               for face in outlines if face.crack for end in (0, -1) if tuple(face.position[end]) in tips]
     if not places or (box.asked and not box.contains(np.array(places)).any()):
         return []
-    axes.plot(*np.transpose(places), ".", color=TIP, markersize=4.0 if len(places) < 20 else 2.0, zorder=5)
+    # Of many they would hide the cracks.
+    size = 4.0 if len(places) < 40 else 2.0 if len(places) <= MOST_MARKS else 0.8
+    axes.plot(*np.transpose(places), ".", color=TIP, markersize=size, markeredgewidth=0.0, zorder=5)
     return [Line2D([], [], linestyle="none", marker=".", color=TIP, markersize=4.0, label="crack tip")]

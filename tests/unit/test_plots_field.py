@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -230,6 +231,6 @@ def test_units_from_small_to_large_have_few_ticks(tmp_path: Path) -> None:
             figure.canvas.draw()
         axes = figure.axes[0]
         for axis in (axes.xaxis, axes.yaxis):
-            texts = [each.get_text() for each in axis.get_ticklabels()]
-            assert 3 <= len(texts) <= 9 and max(map(len, texts)) <= 8
+            texts = [re.sub(r"[^0-9.]", "", each.get_text()) for each in axis.get_ticklabels()]
+            assert 3 <= len(texts) <= 9 and max(map(len, texts)) <= 5
             assert r"10" in axis.get_offset_text().get_text()

@@ -110,7 +110,7 @@ def test_the_readme_shows_the_picture_and_is_short() -> None:
 def test_commands_are_those_of_the_program(line: str) -> None:
     words = shlex.split(line, comments=True)
     options = make_parser().parse_args(words[words.index("pbem") + 1 :])
-    assert options.command in ("check", "run", "info", "plot", "make", "help")
+    assert options.command in ("check", "run", "info", "plot", "export", "make", "help")
     for name in ("case", "file"):
         path = getattr(options, name, "")
         assert Path(path).stem in ("", "first", "field"), f"{path} is not shown"

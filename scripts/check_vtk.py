@@ -26,9 +26,10 @@ def read_blocks(path):
             reader.UpdateTimeStep(time)
         whole = reader.GetOutputDataObject(0)
         blocks = {}
-        for number in range(whole.GetNumberOfPartitionedDataSets()):
+        for number in range(whole.GetNumberOfBlocks()):
             name = whole.GetMetaData(number).Get(whole.NAME())
-            blocks[name] = whole.GetPartition(number, 0)
+            block = whole.GetBlock(number)
+            blocks[name] = block.GetPartition(0) if hasattr(block, "GetPartition") else block
         yield at, time, blocks
 
 

@@ -22,6 +22,7 @@ TOPICS = {
     "signs": "signs and directions",
     "results": "the result file, and how to read it in Python",
     "pictures": "what `pbem plot` draws, and how it is asked for",
+    "paraview": "results in ParaView and PyVista",
     "convergence": "how contact is solved, why a run stops, and what to do",
     "accuracy": "meshes, estimated errors, and measured accuracy",
     "large-models": "thousands of cracks or inclusions: methods, time and memory",

@@ -30,7 +30,7 @@ Side = Literal["first", "second"]
 
 # More products of points and elements than this are summed by cluster trees, to this relative error.
 DIRECT = 1_000_000
-TOLERANCE = 1e-8
+TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)

@@ -144,14 +144,13 @@ def _write(
 ) -> None:
     """folder: that of the file, if arrays are to refer to the result file."""
     root = file.create_group("VTKHDF", track_order=True)
-    _mark(root, "PartitionedDataSetCollection")
+    _mark(root, "MultiBlockDataSet")  # PyVista knows no other collection
     assembly = root.create_group("Assembly", track_order=True)
     for number, block in enumerate(blocks):
         group = root.create_group(block.name, track_order=True)
         _mark(group, "UnstructuredGrid")
         group.attrs["Index"] = np.int64(number)
-        named = assembly.create_group(block.name, track_order=True)
-        named[block.name] = h5py.SoftLink(f"/VTKHDF/{block.name}")
+        assembly[block.name] = h5py.SoftLink(f"/VTKHDF/{block.name}")
         _write_grid(group, block.points, block.cells)
         steps = _write_steps(group, results)
         for name, values in block.static.items():
@@ -164,7 +163,7 @@ def _write(
         for each in block.growing:
             if each.dataset in source:
                 _write_growing(group, steps, results, source, each, len(block.points), folder)
-    _write_series(root, results, len(blocks))
+    _write_steps(root, results)  # VTK 9.7 shows the first step at all times unless the whole is said to be a series
     for name in ("title", "units_length", "units_stress"):
         file.attrs[name] = source.attrs[name]
 
@@ -172,18 +171,6 @@ def _write(
 def _mark(group: h5py.Group, kind: str) -> None:
     group.attrs["Version"] = np.array(VERSION, dtype="i8")
     group.attrs.create("Type", kind.encode("ascii"), dtype=h5py.string_dtype("ascii", len(kind)))
-
-
-def _write_series(root: h5py.Group, results: Results, number: int) -> None:
-    """Say that the whole is a series: VTK looks for that in a group Steps, and takes any group for a block.
-
-    Without it VTK 9.4 to 9.7 shows the first step at all times. The block is empty.
-    """
-    group = _write_steps(root, results)
-    _mark(group, "UnstructuredGrid")
-    group.attrs["Index"] = np.int64(number)
-    _write_grid(group, np.zeros((0, 3)), Cells.vertices(0))
-    _write_steps(group, results)
 
 
 def _write_grid(group: h5py.Group, points: Real, cells: Cells) -> None:

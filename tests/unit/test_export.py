@@ -84,7 +84,7 @@ def expect_arrays(exported: Path, results: Results) -> None:
     source = read_all(results.path)
     with h5py.File(exported, "r") as file:
         root = file["VTKHDF"]
-        assert root.attrs["Type"] == b"PartitionedDataSetCollection"
+        assert root.attrs["Type"] == b"MultiBlockDataSet"
         names = list(root["Assembly"])
         assert [root[name].attrs["Index"] for name in names] == list(range(len(names)))
         k, n = len(results.steps), len(results.nodes.position)

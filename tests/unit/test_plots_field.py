@@ -224,10 +224,10 @@ def test_units_from_small_to_large_have_few_ticks(tmp_path: Path) -> None:
     for scale in (1e-9, 1e9):
         model = make_plane((0.0, 1.0, 0.0), {"crack": [make_straight(-scale, scale, 4)]})
         mesh, steps = solve(model)
-        with ResultWriter(tmp_path / "a.h5", replace(model, units_length="m"), mesh, 1, "") as writer:
+        with ResultWriter(tmp_path / f"{scale}.h5", replace(model, units_length="m"), mesh, 1, "") as writer:
             writer.append(steps[-1])
         with style():
-            figure = draw_field(open_results(tmp_path / "a.h5"), "syy", options=FieldOptions(shape=(12, 12)))
+            figure = draw_field(open_results(tmp_path / f"{scale}.h5"), "syy", options=FieldOptions(shape=(12, 12)))
             figure.canvas.draw()
         axes = figure.axes[0]
         for axis in (axes.xaxis, axes.yaxis):

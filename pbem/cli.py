@@ -18,19 +18,23 @@ from pbem.bundled import find_case
 from pbem.check_command import add_check_options, check
 from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import PbemError, printable
-from pbem.make_command import add_make_commands, make, read_finite
+from pbem.export_command import NOTES as EXPORT_NOTES
+from pbem.export_command import add_export_arguments, export
+from pbem.info_command import add_info_arguments, describe
+from pbem.make_command import add_make_commands, make
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
+from pbem.plot_command import NOTES as PLOT_NOTES
+from pbem.plot_command import add_plot_arguments, plot
 from pbem.run_command import RUN_NOTES, add_run_options, add_set_option, run_case
 from pbem.sweep_command import SWEEP_NOTES, add_sweep_options, run_sweep
 from pbem.terminal import INTERRUPTED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
 from pbem.version import __version__
+from pbem.wording import suggest
 
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.
 
-COMMANDS = ("make", "check", "run", "sweep", "info", "plot", "help")
-# Of `pbem plot --field`; defined in pbem.results.field_plot.
-FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
+COMMANDS = ("make", "check", "run", "sweep", "info", "plot", "export", "help")
 
 DESCRIPTION = """\
 Boundary elements for frictional contact in two-dimensional elasticity.
@@ -41,6 +45,7 @@ Boundary elements for frictional contact in two-dimensional elasticity.
   pbem sweep CASE            compute it with several values of some keys: a table
   pbem info FILE.h5          what a result file holds
   pbem plot FILE.h5          draw a result file
+  pbem export FILE.h5        for ParaView and PyVista, or a table (-o FILE.csv)
   pbem help TOPIC            a page of the documentation; without TOPIC: the list of them
 
 CASE is a TOML file, or the name of a case that comes with the program.
@@ -126,6 +131,15 @@ class _Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: Any = None) -> None:
         super()._print_message(printable(message, keep="\n"), file)
 
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse does; of an option that a command does not have a near miss is named."""
+        found, rest = super().parse_known_args(args, namespace)
+        wrong = [each for each in rest if each.startswith("--")]
+        if wrong and self._subparsers is None:
+            near = suggest(wrong[0].partition("=")[0], self._option_string_actions)
+            self.error(f"unrecognized arguments: {' '.join(rest)}{near}")
+        return found, rest
+
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line, without the options of PETSc."""
@@ -149,16 +163,10 @@ def make_parser() -> argparse.ArgumentParser:
     add_set_option(check)
     add_run_options(add("run", None, "compute a case and write its results", RUN_NOTES))
     add_sweep_options(add("sweep", None, "compute a case with all combinations of some values", SWEEP_NOTES))
-    info = add("info", _info, "show what a result file holds")
-    info.add_argument("file", metavar="FILE.h5")
-    plot = add("plot", _plot, "draw the deformed outline and the contact tractions, openings and slips, or a field")
-    plot.add_argument("file", metavar="FILE.h5")
-    plot.add_argument("-o", "--output", metavar="FILE.png", help="picture (default: beside the result file)")
-    plot.add_argument("--step", type=int, default=None, metavar="N", help="number of the load step (default: last)")
-    plot.add_argument("--field", choices=FIELDS, metavar="FIELD",
-                      help=f"draw a field at the interior points instead: {', '.join(FIELDS)}")
-    plot.add_argument("--mesh", action="store_true", help="the elements, and how often analysis.accuracy halved them")
-    plot.add_argument("--magnify", type=read_finite, default=None, metavar="X", help="scale of the displacements")
+    add_info_arguments(add("info", _info, "show what a result file holds"))
+    add_export_arguments(add("export", _export, "write results for ParaView and PyVista, or as a table", EXPORT_NOTES))
+    about = "draw bodies, fields, curves, networks or animations of a result file"
+    add_plot_arguments(add("plot", _plot, about, PLOT_NOTES))
     pages = add("help", _help, "print a page of the documentation, or the list of its topics")
     pages.add_argument("topic", nargs="*", metavar="TOPIC", help="name of a page, or of a command")
     return parser
@@ -196,34 +204,15 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _info(options: argparse.Namespace) -> int:
-    from pbem.results.describe import describe_results
-    from pbem.results.reader import open_results
+    tell(describe(options))
+    return 0
 
-    tell(describe_results(open_results(options.file)))
+
+def _export(options: argparse.Namespace) -> int:
+    tell(export(options))
     return 0
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from pbem.results.field_plot import plot_field
-    from pbem.results.output import check_picture_path
-    from pbem.results.plots import plot_results
-    from pbem.results.reader import open_results
-
-    results = open_results(options.file)
-    source = Path(options.file)
-    kind = "mesh" if options.mesh else options.field
-    beside = source.with_name(f"{source.stem}_{kind}.png") if kind else source.with_suffix(".png")
-    target = check_picture_path(options.output or beside)
-    step = -1 if options.step is None else results.find_step(options.step)
-    if options.mesh:
-        from pbem.results.plots import plot_model
-        from pbem.results.refinement_plot import read_refined
-
-        model, mesh, levels = read_refined(results)
-        plot_model(model, mesh, target, levels)
-    elif options.field:
-        plot_field(results, options.field, target, step)
-    else:
-        plot_results(results, target, step, options.magnify)
-    tell(f"picture: {target}")
+    tell(f"picture: {plot(options)}")
     return 0

@@ -10,7 +10,7 @@ stamp=$venv/pbem-setup-stamp
 # The MPI, PETSc and HDF5 of the distribution fit each other, with mpi4py, petsc4py and h5py built against them.
 system_packages=(
     gcc libc6-dev python3-dev python3-venv python3-pip python3-setuptools python3-wheel
-    python3-numpy python3-scipy python3-matplotlib python3-pytest python3-pytest-xdist
+    python3-numpy python3-scipy python3-matplotlib python3-pandas python3-pytest python3-pytest-xdist
     python3-mpi4py python3-petsc4py libpetsc-real-dev python3-h5py python3-h5py-mpi openmpi-bin libopenblas0-pthread
 )
 # Of these the ones of the distribution stay, whatever else is installed into .venv: wheels bring another MPI and HDF5.

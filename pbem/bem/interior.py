@@ -42,7 +42,8 @@ class _Chunk:
 class InteriorRows:
     """The rows of points inside regions, kept from step to step as far as they fit into the memory allowed.
 
-    rigid: motions of bodies whose rotations, as the elements interpolate them, would count as strain.
+    rigid: motions of bodies whose rotations, as the elements interpolate them, would count as strain. inside (i,): the
+    points that lie in regions, off their boundaries.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class InteriorRows:
     ) -> None:
         self._mesh, self._rigid = mesh, rigid
         self._points = points
+        self.inside = np.flatnonzero((location.region >= 0) & (location.element < 0))
         self._location = location
         self._sources = collect_sources(mesh, materials)
         self._chunks: list[_Chunk] = []
@@ -120,7 +122,7 @@ def evaluate_limits(
         moved[at[tips]] += ((rooted - shapes[tips]) * half_jump).sum(axis=1)
     carried, along = (shapes * traction[nodes]).sum(axis=1), (shapes * hoop_stress[nodes]).sum(axis=1)
     normal = mesh.geometry.select(element).normals_at(points[at, None])[:, 0]
-    stress[at] = _turn_stress(normal, carried, along)
+    stress[at] = turn_stress(normal, carried, along)
     return Values(moved, stress)
 
 
@@ -132,7 +134,7 @@ def _evaluate(sources: Sources, points: Complex, normal: complex | None) -> Real
     return np.concatenate([part for part in parts if part is not None], axis=1)
 
 
-def _turn_stress(normal: Complex, traction: Complex, hoop_stress: Real) -> Real:
+def turn_stress(normal: Complex, traction: Complex, hoop_stress: Real) -> Real:
     """sxx, syy, sxy (k, 3) from the traction on a normal and the normal stress along the boundary."""
     across, shear = (np.conj(normal) * traction).real, (np.conj(1j * normal) * traction).real
     mean, deviator = 0.5 * (across + hoop_stress), (0.5 * (across - hoop_stress) + 1j * shear) * normal**2

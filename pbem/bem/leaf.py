@@ -13,7 +13,6 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.bem.rows import Sources
-from pbem.mesh.shape_functions import interpolate_shapes, tip_shapes
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,8 @@ def form_p2m(sources: Sources, center: complex, radius: float, terms: int) -> Re
     f = -1 / (2 * np.pi * (sources.kappa + 1))
     number = np.arange(1, terms + 1)
     z = (point - center) / radius
-    power = z[:, :, None] ** np.arange(terms + 1)  # element, point, power
+    power = np.ones((*z.shape, terms + 1), dtype=complex)  # element, point, power
+    np.multiply.accumulate(np.broadcast_to(z[:, :, None], (*z.shape, terms)), axis=2, out=power[:, :, 1:])
     along, back = dzeta / radius, np.conj(dzeta) / radius
     # factors of the density a and of its conjugate, at the points
     phi = 1j * g * along[:, :, None] * power[:, :, :-1]
@@ -64,7 +64,9 @@ def _collect_columns(
     elements, _, nodes = density.shape
     terms = phi.shape[-1]
     out = np.zeros((2, terms + 1, elements, nodes, 2), dtype=complex)  # function, power, element, node, component
-    series = [np.einsum("eqn,eqk->ken", density, factor) for factor in (phi, psi, conjugate)]
+    # Real matrices times complex ones, by the real parts of both.
+    by_node = density.transpose(0, 2, 1)
+    series = [_multiply(by_node, factor) for factor in (phi, psi, conjugate)]
     for component, unit in enumerate((1.0, 1j)):
         out[0, 1:, :, :, component] = unit * series[0]
         out[1, 1:, :, :, component] = unit * series[1] + np.conj(unit) * series[2]
@@ -73,6 +75,12 @@ def _collect_columns(
             out[1, 0, :, :, component] = np.conj(unit) * np.einsum("eqn,eq->en", density, psi_log)
     flat = out.reshape(2 * (terms + 1), -1)
     return np.stack([flat.real, flat.imag], axis=1).reshape(4 * (terms + 1), -1)
+
+
+def _multiply(real: Real, factor: Complex) -> Complex:
+    """Products (power, element, node) of (element, node, point) and (element, point, power)."""
+    parts = np.ascontiguousarray(factor).view(float)
+    return np.ascontiguousarray(real @ parts).view(complex).transpose(2, 0, 1)
 
 
 @cache
@@ -87,13 +95,12 @@ def _place_points(sources: Sources, terms: int) -> tuple[Complex, Complex, Real]
     """
     s, weight = _gauss_points(terms + 4)
     order = len(sources.local) - 1
-    on_crack = sources.local if sources.crack_local is None else sources.crack_local
     root, half = 0.5 * (1 + s), 0.5 * weight  # t = root^2 from the tip
-    tips = tip_shapes(tuple(on_crack))
+    plain, *tips, on_crack = sources.shape
     power = np.arange(order + 1)
     rules = {
-        0: (s, weight, s[:, None] ** power @ interpolate_shapes(sources.local)),
-        3: (s, weight, s[:, None] ** power @ interpolate_shapes(on_crack)),
+        0: (s, weight, s[:, None] ** power @ plain),
+        3: (s, weight, s[:, None] ** power @ on_crack),
         1: (2 * root**2 - 1, 4 * root * half, root[:, None] ** (2 * power + 1) @ tips[0]),
         2: (1 - 2 * root**2, 4 * root * half, root[:, None] ** (2 * power + 1) @ tips[1]),
     }
@@ -105,7 +112,7 @@ def _traction_density(sources: Sources, terms: int) -> Real:
     """Traction at the integration points (e, q) by nodal values; none on cracks (theory, 18)."""
     s, _ = _gauss_points(terms + 4)
     local = sources.local
-    shapes = s[:, None] ** np.arange(len(local)) @ interpolate_shapes(local)
+    shapes = s[:, None] ** np.arange(len(local)) @ sources.shape[0]
     stretched = sources.geometry.crowding(s)[:, :, None] / sources.geometry.crowding(local)[:, None, :]
     density: Real = stretched * shapes * (sources.family == 0)[:, None, None]
     return density

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
-from pbem.bem.hierarchical import RATIO, HierarchicalOperator, Sorted, list_columns, log_lengths
+from pbem.bem.hierarchical import (
+    RATIO,
+    HierarchicalOperator,
+    Sorted,
+    list_columns,
+    log_lengths,
+    prepare_sources,
+    sort_elements,
+)
 from pbem.bem.interior import Values
 from pbem.bem.leaf import Medium, form_l2p
 from pbem.bem.location import Location
 from pbem.bem.rigid_motions import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
 from pbem.bem.tree import Interactions, build_forest, find_interactions
+from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
+from pbem.model.material import Material
 
 # Points in a leaf at most.
 LEAF_POINTS = 32
@@ -46,9 +57,37 @@ class PointRows:
         along = self._evaluate(v, (1.0, 1j))
         return np.stack([along[:, 0].real, along[:, 1].imag, 0.5 * (along[:, 0].imag + along[:, 1].real)], axis=1)
 
-    def _evaluate(self, v: Real, normals: tuple[complex | None, ...]) -> Complex:
+    def sample(self, v: Real, strained: Real) -> tuple[Complex, Real]:
+        """Displacement (k, c) and stress (k, c, 3) at points off all elements, for many densities (4 nodes, c) at once.
+
+        strained: the same without what makes no stress. Near elements are evaluated once for all of them.
+        """
+        far = [self._carry(each) for each in v.T]
+        far_strained = far if strained is v else [self._carry(each) for each in strained.T]
+        forest = self.targets.forest
+        leaves = forest.leaves
+        begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
+        shape = (len(self.point), v.shape[1])
+        values = np.zeros((3, *shape), dtype=complex)
+        for leaf, low, high in zip(leaves, begin, end, strict=True):
+            chosen = forest.items(leaf)
+            near = self.met.near_source[low:high]
+            for k, normal in enumerate((None, 1.0, 1j)):
+                density, fields = (v, far) if normal is None else (strained, far_strained)
+                value = self._add_near(int(leaf), chosen, near, normal, density)
+                matrix = self._form_l2p(int(leaf), chosen, normal)
+                value += matrix @ np.stack([each[leaf] for each in fields], axis=1)
+                values[k, chosen] = value[0::2] + 1j * value[1::2]
+        moved, along_x, along_y = values
+        return moved, np.stack([along_x.real, along_y.imag, 0.5 * (along_x.imag + along_y.real)], axis=-1)
+
+    def _carry(self, v: Real) -> Real:
+        """Coefficients of the far field in all clusters of points, as rows of real numbers."""
         fields = self.targets.spread(self.sources.collect(v), self.sources.forest)
-        far = np.ascontiguousarray(fields).view(float).reshape(len(fields), 4 * (self.parts.terms + 1))
+        return np.ascontiguousarray(fields).view(float).reshape(len(fields), 4 * (self.parts.terms + 1))
+
+    def _evaluate(self, v: Real, normals: tuple[complex | None, ...]) -> Complex:
+        far = self._carry(v)
         forest = self.targets.forest
         leaves = forest.leaves
         begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
@@ -65,7 +104,7 @@ class PointRows:
     def _add_near(self, leaf: int, chosen: Integer, near: Integer, normal: complex | None, v: Real) -> Real:
         parts = self.parts
         if len(near) == 0:
-            return np.zeros(2 * len(chosen))
+            return np.zeros((2 * len(chosen), *v.shape[1:]))
         elements = np.sort(np.concatenate([parts.forest.items(source) for source in near]))
         region = int(self.targets.forest.region[leaf])
         sources = parts.sources[region].select(elements - parts.first_element[region])
@@ -80,15 +119,17 @@ class PointRows:
         return total if len(whole) == 1 else total + whole[1] @ v[columns[width:]]
 
     def _add_far(self, leaf: int, chosen: Integer, normal: complex | None, far: Real) -> Real:
+        result: Real = self._form_l2p(leaf, chosen, normal) @ far[leaf]
+        return result
+
+    def _form_l2p(self, leaf: int, chosen: Integer, normal: complex | None) -> Real:
         forest = self.targets.forest
         material = self.parts.materials[int(forest.region[leaf])]
         normals = None if normal is None else np.full(len(chosen), normal, dtype=complex)
-        matrix = form_l2p(
+        return form_l2p(
             self.point[chosen], normals, Medium(material.kappa, material.shear_modulus),
             forest.center[leaf], forest.radius[leaf], self.parts.terms,
         )  # fmt: skip
-        result: Real = matrix @ far[leaf]
-        return result
 
 
 def place_points(
@@ -105,6 +146,16 @@ def place_points(
         log_lengths(parts, forest), met.far_target, met.far_source,
     )  # fmt: skip
     return PointRows(parts, sources, targets, met, point, on, local)
+
+
+def spread_points(
+    mesh: Mesh, materials: Sequence[Material], terms: int, point: Complex, region: Integer
+) -> PointRows:
+    """Trees of points (k,) in regions, off all elements, and of all elements; by one process, without operator."""
+    parts = sort_elements(mesh, materials, terms)
+    everything = np.ones(4 * mesh.nodes, dtype=bool)
+    sources = prepare_sources(parts, everything, parts.forest.leaves, lambda own: own)
+    return place_points(parts, sources, point, region, np.full(len(point), -1), np.zeros(len(point)))
 
 
 class TreeRows:

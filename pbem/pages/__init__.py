@@ -23,6 +23,8 @@ TOPICS = {
     "results": "the result file, and how to read it in Python",
     "python": "cases, runs and values that are set, in Python",
     "sweeps": "a case with many values: a table, one row each",
+    "pictures": "what `pbem plot` draws, and how it is asked for",
+    "paraview": "results in ParaView and PyVista",
     "convergence": "how contact is solved, why a run stops, and what to do",
     "accuracy": "meshes, estimated errors, and measured accuracy",
     "large-models": "thousands of cracks or inclusions: methods, time and memory",

@@ -9,19 +9,24 @@ from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
-from pbem.results.tables import count as _count
-from pbem.results.tables import format_number as _number
-from pbem.results.tables import section as _section
-from pbem.results.tables import shorten as _shorten
-from pbem.results.tables import table as _table
+from pbem.results.text_tables import count as _count
+from pbem.results.text_tables import format_number as _number
+from pbem.results.text_tables import section as _section
+from pbem.results.text_tables import shorten as _shorten
+from pbem.results.text_tables import table as _table
 from pbem.results.tip_notes import compare_release, explain_missing_factors
+from pbem.results.trace_names import name_trace
+from pbem.results.traces import list_traces
 
 MOST_TIPS = 10
 MOST_ERRORS = 10
 
 
-def describe_results(results: Results) -> str:
-    """What `pbem info` prints: where the file comes from, how far the run got, and the last step in numbers."""
+def describe_results(results: Results, traces: int = 10) -> str:
+    """What `pbem info` prints: where the file comes from, how far the run got, and the last step in numbers.
+
+    traces: so many are listed at most.
+    """
     k = len(results.steps)
     units = f"length {results.units.length or '-'}, stress {results.units.stress or '-'}"
     elements = len(results.elements.vertices)
@@ -43,6 +48,7 @@ def describe_results(results: Results) -> str:
         parts.append(_section("contact at the last step", _table(
             ["interface", "pairs", "stick", "slip", "open", "max opening", "max |slip|"],
             _contact_rows(results))))
+        parts.append(_section("traces at the last step, by moment", _describe_traces(results, traces)))
         parts.append(_section("stress-intensity factors at the last step", _describe_tips(results)))
         parts.append(_section("energy at the last step", _describe_energy(results)))
         parts.append(_section("balance at the last step", describe_balance(results.balance)))
@@ -125,6 +131,23 @@ def _contact_rows(results: Results) -> list[list[str]]:
     np.maximum.at(largest[1], row, np.abs(slip))
     numbers = zip(titles, np.bincount(row, minlength=len(titles)), *counts, *largest, strict=True)
     return [[title, *map(str, each[:4]), *map(_number, each[4:])] for title, *each in numbers]
+
+
+def _describe_traces(results: Results, most: int) -> list[str]:
+    """A row for each crack, interface or trace that is no bond: those of the largest moments."""
+    if not most:
+        return []
+    laws = zip(results.pairs.names, results.pairs.laws, strict=True)
+    free = {name_trace(name) for name, law in laws if law != "bonded"}
+    found = [each for each in list_traces(results) if each.name in free]
+    rows = [[each.name, *([str(each.pieces)] if any(one.pieces > 1 for one in found) else []),
+             *map(_number, (each.length, each.mean_slip, each.largest_slip, each.mean_opening, each.largest_opening,
+                            each.moment))] for each in found[:most]]
+    pieces = ["pieces"] if rows and len(rows[0]) == 8 else []
+    titles = ["trace", *pieces, "length", "mean slip", "max |slip|", "mean opening", "max opening", "moment"]
+    left_out = len(found) - len(rows)
+    return [*_table(titles, rows, most), *([f"... and {left_out} of smaller moments (--traces N lists more)"]
+                                           if left_out else [])]
 
 
 def _describe_energy(results: Results) -> list[str]:

@@ -1,132 +1,246 @@
-"""Pictures of a field at the interior points: a map where they form a grid, the outline of the model on top."""
+"""Pictures of a field in the regions: on triangles that follow the outlines, with contours, least and largest value."""
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+from matplotlib.tri import Triangulation
 
 from pbem.arrays import Real
 from pbem.errors import ResultFileError
-from pbem.results.outline import trace_outlines
-from pbem.results.plot_style import describe_step, label, style
+from pbem.results.field_formulas import FIELDS
+from pbem.results.field_values import VertexField, VertexValues
+from pbem.results.outline import to_columns, trace_outlines
+from pbem.results.page import (
+    Page,
+    choose_box,
+    describe_box,
+    finish_plane,
+    read_infinite,
+    save,
+    widen_box,
+    write_around,
+)
+from pbem.results.picture_limits import Limits, format_number, limit_field
+from pbem.results.plot_style import choose_magnification, describe_step, label, style
 from pbem.results.reader import Results
+from pbem.results.region_points import View
+from pbem.results.region_triangles import Triangles, triangulate
+from pbem.results.singular_points import name_singular_place
+from pbem.wording import suggest
 
-# Displacement (q, 2), stress sxx, syy, sxy (q, 3) and szz (q,) to the field (q,).
-Formula = Callable[[Real, Real, Real], Real]
-
-
-def _deviator(s: Real) -> Real:
-    """Largest shear stress in the plane."""
-    return np.hypot(0.5 * (s[:, 0] - s[:, 1]), s[:, 2])
-
-
-def _mises(u: Real, s: Real, szz: Real) -> Real:
-    xx, yy, xy = s.T
-    return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - szz) ** 2 + (szz - xx) ** 2) + 3 * xy**2)
+# Points across the picture, and by how much closer they may lie where the boundary asks for it.
+ACROSS, CLOSER = 64, 6.0
+# Colours diverge from zero if the field reaches beyond it on both sides by this part of the larger one.
+BOTH_SIDES = 0.1
+HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
-# What `pbem plot --field` offers: title, whether it is a length (else a stress), formula.
-FIELDS: dict[str, tuple[str, bool, Formula]] = {
-    "ux": ("$u_x$", True, lambda u, s, szz: u[:, 0]),
-    "uy": ("$u_y$", True, lambda u, s, szz: u[:, 1]),
-    "u": ("$|u|$", True, lambda u, s, szz: np.hypot(*u.T)),
-    "sxx": (r"$\sigma_{xx}$", False, lambda u, s, szz: s[:, 0]),
-    "syy": (r"$\sigma_{yy}$", False, lambda u, s, szz: s[:, 1]),
-    "sxy": (r"$\sigma_{xy}$", False, lambda u, s, szz: s[:, 2]),
-    "s1": (r"$\sigma_1$", False, lambda u, s, szz: 0.5 * (s[:, 0] + s[:, 1]) + _deviator(s)),
-    "s2": (r"$\sigma_2$", False, lambda u, s, szz: 0.5 * (s[:, 0] + s[:, 1]) - _deviator(s)),
-    "shear": (r"$\tau_{max}$", False, lambda u, s, szz: _deviator(s)),
-    "mises": (r"$\sigma_{Mises}$", False, _mises),
-}
-# Stresses are singular at corners and tips: the colours span all but this share of the values at either end.
-CUT = 0.005
+@dataclass(frozen=True)
+class FieldOptions:
+    """box: x0, y0, x1, y1, None: the model. shape: points across and up. displaced: on the displaced bodies, magnify
+    times, None: a visible displacement. limits: of the colours, None: chosen. contours: about so many, 0: none."""
+
+    box: tuple[float, float, float, float] | None = None
+    shape: tuple[int, int] | None = None
+    displaced: bool = False
+    magnify: float | None = None
+    limits: tuple[float, float] | None = None
+    contours: int = 10
+    page: Page = field(default_factory=Page)
 
 
-def plot_field(results: Results, field: str, path: str | os.PathLike[str], step: int = -1) -> None:
+def plot_field(
+    results: Results, name: str, path: str | os.PathLike[str], step: int = -1, options: FieldOptions | None = None
+) -> None:
     """Write the picture of a field of one stored step (its place in the file); the ending of `path` says the format.
 
-    field: a key of FIELDS. Raises ResultFileError if the file has no interior points or no steps, IndexError for no
-    such step.
+    name: a key of FIELDS. Raises ResultFileError if the file has no steps, IndexError for no such step, ValueError for
+    no such field or a box that shows nothing.
     """
+    chosen = options or FieldOptions()
     with style():
-        draw_field(results, field, step).savefig(path, dpi=200)
+        save(draw_field(results, name, step, chosen), path, chosen.page)
 
 
-def draw_field(results: Results, field: str, step: int = -1) -> Figure:
-    """The figure of `plot_field`."""
-    interior = results.interior
-    if interior is None:
-        raise ResultFileError(str(results.path), "has no interior points; ask for them in the case: "
-                                                 "[output] interior = { box = [x0, y0, x1, y1], shape = [nx, ny] }")
+def draw_field(
+    results: Results, name: str, step: int = -1, options: FieldOptions | None = None, axes: Axes | None = None
+) -> Figure:
+    """The figure of `plot_field`; axes: draw into these in place of a figure of its own."""
     if not len(results.steps):
         raise ResultFileError(str(results.path), "holds no load step yet")
     at = range(len(results.steps))[step]
-    values = evaluate_field(results, field, at)
-    figure = Figure(figsize=(7.2, 5.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    inside = values[np.isfinite(values)]
-    low, high = np.quantile(inside, [CUT, 1 - CUT]) if len(inside) else (0.0, 1.0)
-    colors = {"cmap": "viridis"}
-    if low < 0 < high:
-        low, high, colors = -max(-low, high), max(-low, high), {"cmap": "RdBu_r"}
-    limits = {"vmin": low, "vmax": high if high > low else low + max(abs(low), 1e-300)}
-    shape = find_grid(interior.position)
-    across, up = shape or (0, 0)
-    drawn = None
-    if shape:
-        x, y = interior.position[:across, 0], interior.position[: across * up : across, 1]
-        grid = np.ma.masked_invalid(values[: across * up].reshape(up, across))
-        drawn = axes.pcolormesh(x, y, grid, shading="nearest", rasterized=True, zorder=1, **colors, **limits)
-    rest = np.arange(across * up, len(values))
-    rest = rest[np.isfinite(values[rest])]
-    if len(rest) or drawn is None:
-        drawn = axes.scatter(*interior.position[rest].T, c=values[rest], s=12.0, zorder=4, **colors, **limits)
-    outlines = trace_outlines(results.nodes, results.elements, results.displacement_at(at))
-    axes.add_collection(LineCollection([each.position for each in outlines], colors="0.1", linewidths=0.8, zorder=3))
-    title, is_length, _ = FIELDS[field]
-    beyond = "neither" if not len(inside) or (low <= inside.min() and inside.max() <= high) else "both"
-    bar = figure.colorbar(drawn, ax=axes, extend=beyond, shrink=0.85)
-    bar.set_label(label(title, results.units.length if is_length else results.units.stress))
-    axes.set_aspect("equal")
-    axes.autoscale_view()
-    axes.set_xlabel(label("$x$", results.units.length))
-    axes.set_ylabel(label("$y$", results.units.length))
-    axes.set_title(describe_step(results, at), loc="left", fontsize=9)
-    return figure
+    picture = FieldPicture(results, name, options or FieldOptions(), [at])
+    return picture.draw(at, axes)
 
 
-def evaluate_field(results: Results, field: str, step: int) -> Real:
-    """Values (q,) at the interior points, NaN outside of the regions. Raises KeyError for no field of this name."""
-    assert results.interior is not None
-    stress = results.interior.stress[step]
-    return FIELDS[field][2](results.interior.displacement[step], stress, _stress_out_of_plane(results, stress))
+class FieldPicture:
+    """A field at some stored steps, evaluated together, in pictures with the same colours and limits."""
 
+    def __init__(self, results: Results, name: str, options: FieldOptions, steps: Sequence[int]) -> None:
+        if name not in FIELDS:
+            raise ValueError(f"there is no field '{name}'{suggest(name, FIELDS)}; there are: {', '.join(FIELDS)}")
+        self._results, self._name, self._options = results, name, options
+        self._box = choose_box(results, options.box)
+        self._triangles = self._triangulate()
+        if not len(self._triangles.corners):
+            raise ValueError("the box shows nothing: no region has a part in it")
+        self._values: VertexValues = VertexField(results, self._triangles).evaluate(steps)
+        self._steps = list(steps)
+        formula = FIELDS[name][2]
+        self._field = np.array([formula(u, s) for u, s in
+                                zip(self._values.displacement, self._values.stress, strict=True)])
+        self._shown = self._values.exact & self._box.contains(to_columns(self._triangles.position))
+        weights = np.tile(np.where(self._shown, self._triangles.weights, 0.0), len(self._steps))
+        there = weights > 0
+        vertices = np.tile(np.arange(len(self._shown)), len(self._steps))[there]
+        self._limits = limit_field(
+            self._field.ravel()[there], weights[there], lambda number: bool(self._name_place(int(vertices[number])))
+        )
+        self._magnify = 0.0
+        if options.displaced:
+            largest = max((results.displacement_at(at) for at in self._steps), key=lambda u: float(np.abs(u).max()))
+            size = float(np.ptp(results.nodes.position, axis=0).max())
+            self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+        # The same for all steps.
+        places = [to_columns(self._triangles.position) + self._magnify * each for each in self._values.displacement]
+        infinite = bool(read_infinite(results).any())
+        self._frame = widen_box(self._box, places, 0.0 if infinite else 0.03)
 
-def _stress_out_of_plane(results: Results, stress: Real) -> Real:
-    """szz (q,): Poisson's ratio times sxx + syy in plane strain, an in-situ stress included; zero in plane stress."""
-    assert results.interior is not None
-    materials = [region["material"] for region in json.loads(results.configuration)["regions"]]
-    lateral = np.array([each["poisson"] if each["plane"] == "strain" else 0.0 for each in materials])
-    return np.asarray(lateral[np.maximum(results.interior.region, 0)] * (stress[:, 0] + stress[:, 1]))
+    @property
+    def triangles(self) -> Triangles:
+        """What is drawn."""
+        return self._triangles
 
+    def values(self, step: int) -> Real:
+        """The field (v,) at the vertices at one of the steps."""
+        return np.asarray(self._field[self._steps.index(step)])
 
-def find_grid(position: Real) -> tuple[int, int] | None:
-    """Number of columns and rows if the points (q, 2) begin with a grid, x fastest; None if they do not."""
-    if len(position) < 4:
-        return None
-    x, y = position.T
-    across = int(np.argmax(y != y[0])) or len(y)
-    up = 1
-    while (up + 1) * across <= len(y):
-        row = slice(up * across, (up + 1) * across)
-        if (x[row] != x[:across]).any() or (y[row] != y[up * across]).any() or y[up * across] == y[(up - 1) * across]:
-            break
-        up += 1
-    return (across, up) if across > 1 and up > 1 else None
+    def _triangulate(self) -> Triangles:
+        results, box = self._results, self._box
+        across, up = self._options.shape or (ACROSS, ACROSS)
+        spacing = float((box.size / (across, up)).max() if self._options.shape is None
+                        else (box.size / (across, up)).min())
+        view = View(box.low, box.high, spacing, spacing / CLOSER)
+        triangles = triangulate(results.elements, read_infinite(results), view)
+        places = to_columns(triangles.position)[triangles.corners]
+        return triangles.select(view.meets(places.min(axis=1), places.max(axis=1)))
+
+    def draw(self, step: int, axes: Axes | None = None) -> Figure:
+        """The picture of one of the steps, in a figure of its own or in given axes."""
+        page, box, own = self._options.page, self._box, axes is None
+        if axes is None:
+            figure = page.make_figure(page.map_height(self._frame, 17.0))
+            axes = figure.add_subplot()
+        figure = axes.figure
+        values = self.values(step)
+        moved = self._magnify * self._values.displacement[self._steps.index(step)]
+        places = to_columns(self._triangles.position) + moved
+        low, high, colours = self._choose_colours()
+        triangulation = Triangulation(*places.T, self._triangles.corners)
+        drawn = axes.tripcolor(
+            triangulation, values, shading="gouraud", cmap=colours, vmin=low, vmax=high, rasterized=True, zorder=1
+        )
+        title, is_length, _ = FIELDS[self._name]
+        extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+        beyond = extend[bool(self._limits.least < low), bool(self._limits.largest > high)]
+        bar = figure.colorbar(
+            drawn, ax=axes, extend=beyond, shrink=0.85, aspect=25,
+            **({"location": "bottom", "pad": 0.02} if page.has_bar_below(self._frame) else {}),
+        )
+        bar.set_label(label(title, self._results.units.length if is_length else self._results.units.stress))
+        bar.formatter.set_powerlimits((-3, 4))
+        bar.locator = MaxNLocator(6)
+        bar.update_ticks()
+        self._draw_contours(axes, triangulation, values, low, high, bar)
+        self._draw_outlines(axes, step)
+        notes = self._mark_extremes(axes, values, places)
+        finish_plane(axes, self._results, self._frame, page)
+        said = describe_step(self._results, step) + (f", displacements × {self._magnify:g}" if self._magnify else "")
+        notes = [self._describe_cut(title, low, high), *notes, describe_box(box)]
+        if own:
+            write_around(figure, said, notes)
+        else:
+            axes.set_title(said, loc="left", fontsize=9)
+        return figure
+
+    def _choose_colours(self) -> tuple[float, float, str]:
+        """Limits, and a map of colours: from zero to both sides if the field does so."""
+        low, high = self._options.limits or (self._limits.low, self._limits.high)
+        scale = max(abs(low), abs(high))
+        if high - low <= 1e-9 * scale or high <= low:
+            return low - (0.5 * scale or 1.0), high + (0.5 * scale or 1.0), "viridis"
+        if self._options.limits is None and min(-low, high) > BOTH_SIDES * scale:
+            return -scale, scale, "RdBu_r"
+        return low, high, "RdBu_r" if low == -high else "viridis"
+
+    def _describe_cut(self, title: str, low: float, high: float) -> str:
+        limits = self._limits
+        return Limits(low, high, limits.least, limits.largest).describe_cut(title).replace(
+            "cut off", "colours end before the values"
+        )
+
+    def _draw_contours(
+        self, axes: Axes, triangulation: Triangulation, values: Real, low: float, high: float, bar: object
+    ) -> None:
+        """Lines of equal values, the negative ones dashed, and the same lines in the bar of colours."""
+        if not self._options.contours or not values.max() - values.min() > 1e-9 * np.abs(values).max():
+            return
+        levels = MaxNLocator(self._options.contours + 1).tick_values(low, high)
+        levels = levels[(levels > max(low, float(values.min()))) & (levels < min(high, float(values.max())))]
+        if len(levels):
+            dashes = ["--" if level < 0 else "-" for level in levels]
+            widths = [0.9 if level == 0 else 0.4 for level in levels]
+            lines = axes.tricontour(triangulation, values, levels, colors="0.15", linewidths=widths, linestyles=dashes,
+                                    zorder=2)
+            bar.add_lines(lines)  # type: ignore[attr-defined]
+
+    def _draw_outlines(self, axes: Axes, step: int) -> None:
+        results = self._results
+        outlines = trace_outlines(results.nodes, results.elements, results.displacement_at(step))
+        if self._magnify:
+            before = [each.position for each in outlines]
+            axes.add_collection(LineCollection(before, colors="0.6", linewidths=0.5, zorder=0.5))
+        lines = [each.position + self._magnify * each.displacement for each in outlines]
+        axes.add_collection(LineCollection(lines, colors="0.1", linewidths=0.8, zorder=3))
+
+    def _mark_extremes(self, axes: Axes, values: Real, places: Real) -> list[str]:
+        """Marks with the values; returns what is to be said of them."""
+        inside = np.flatnonzero(self._shown)
+        if not len(inside) or np.ptp(values[inside]) <= 1e-9 * np.abs(values[inside]).max():
+            return []
+        middle = places[inside].mean(axis=0)
+        ends = {"max": int(inside[np.argmax(values[inside])]), "min": int(inside[np.argmin(values[inside])])}
+        said: dict[str, list[str]] = {}
+        for name, marker, other in (("max", "^", "min"), ("min", "v", "max")):
+            vertex = ends[name]
+            x, y = places[vertex]
+            axes.plot([x], [y], marker, markersize=5, markerfacecolor="white", markeredgecolor="black",
+                      markeredgewidth=0.8, zorder=6, clip_on=False, label=f"_{name}")
+            # Away from each other, so that they do not meet.
+            right, above = x < middle[0], y > places[ends[other]][1]
+            axes.annotate(
+                f"{name} {format_number(float(values[vertex]))}", (x, y), zorder=7, fontsize=7,
+                xytext=(5 if right else -5, 4 if above else -4), textcoords="offset points",
+                ha="left" if right else "right", va="bottom" if above else "top", path_effects=HALO,
+            )
+            value, limits = float(values[vertex]), self._limits
+            place = self._name_place(vertex) if value > limits.high or value < min(limits.low, 0.0) else ""
+            if place:
+                said.setdefault(place, []).append(name)
+        return [f"{' and '.join(names)} {place}, where stress may be infinite and grows with refinement"
+                for place, names in said.items()]
+
+    def _name_place(self, vertex: int) -> str:
+        """The singular place that a vertex is at; displacements are nowhere singular."""
+        if FIELDS[self._name][1]:
+            return ""
+        return name_singular_place(self._results, complex(self._triangles.position[vertex]))

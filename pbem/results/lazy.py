@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Integer, Real
 from pbem.errors import ResultFileError
+from pbem.results.contents import Elements
 from pbem.results.journal import OverlaidFile
+from pbem.results.pair_weights import JUMPS, weigh_pairs
 from pbem.results.tail import DamageError, find_unapplied
+from pbem.wording import suggest
+
+INTEGRABLE = ("opening", "slip", "traction_n", "traction_s")
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,28 @@ class Contact:
     @property
     def traction_s(self) -> Real:
         return self._arrays["traction_s"]
+
+    def integrate(self, quantity: str) -> Real:
+        """(k,): integral over the curve of a quantity of its pairs: opening, slip, traction_n or traction_s.
+
+        By the elements' quadrature; beside the tips of a crack slip and opening have the square-root shape. Where the
+        normal turns it is the component that is integrated, no force. Raises ValueError for no such quantity.
+        """
+        if quantity not in INTEGRABLE:
+            raise ValueError(f"found {quantity!r}{suggest(str(quantity), INTEGRABLE)}; expected one of: "
+                             f"{', '.join(INTEGRABLE)}")
+        plain, rooted = self._weights
+        return np.asarray(getattr(self, quantity) @ (rooted if quantity in JUMPS else plain))
+
+    @cached_property
+    def _weights(self) -> tuple[Real, Real]:
+        with open_quietly(self.path) as file:
+            nodes, stored = file["nodes"], file["elements"]
+            elements = Elements(
+                vertices=stored["vertices"][...], sweep=stored["sweep"][...], region=stored["region"][...],
+                curve=stored["curve"][...], crack=stored["crack"][...].astype(bool), tip=stored["tip"][...],
+            )
+            return weigh_pairs(elements, nodes["position"][...], int(nodes.attrs["order"]), self.position)
 
     @property
     def internal(self) -> Mapping[str, Real]:
@@ -202,6 +229,15 @@ def open_quietly(path: Path) -> Iterator[h5py.File]:
     """
     with refuse_damage(path), _open(path) as file:
         yield file
+
+
+def has_journal(path: Path) -> bool:
+    """Whether pages of the file are still on their way to their places: its run was killed while it wrote them."""
+    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        return find_unapplied(disk) is not None
+    finally:
+        os.close(disk)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Value, evaluate
 from pbem.results.model_text import describe_condition
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
-from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, label, style
+from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, escape, label, style
 from pbem.results.refinement_plot import draw_levels
 
 MOST_NAMES = 30
@@ -65,7 +65,7 @@ def draw_model(model: Model, mesh: Mesh, levels: Integer | None = None) -> Figur
     axes.margins(0.06)
     axes.set_xlabel(label("$x$", model.units_length))
     axes.set_ylabel(label("$y$", model.units_length))
-    axes.set_title(f"{model.title}\n{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, "
+    axes.set_title(f"{escape(model.title)}\n{mesh.elements} elements of order {mesh.order}, {mesh.nodes} nodes, "
                    f"{mesh.pairs.count} contact pairs", loc="left", fontsize=9)
     handles = _list_handles(model, few)
     if levels is not None:
@@ -89,14 +89,15 @@ def _draw_regions(axes: Axes, model: Model, mesh: Mesh) -> None:
         if region.infinite:
             axes.set_facecolor(shades[number])
             cavities += loops
-            text = f"{region.name} (infinite)"
+            text = f"{escape(region.name)} (infinite)"
             axes.text(0.02, 0.02, text, transform=axes.transAxes, style="italic", color="0.3", zorder=6)
             continue
         bodies.append(OutlinePath.make_compound_path(*(OutlinePath(loop.vertices, closed=True) for loop in loops)))
         if region.name not in made:
             place = _find_room(bodies[-1], np.concatenate([mesh.start, mesh.end]))
             axes.text(
-                place.real, place.imag, region.name, ha="center", va="center", style="italic", color="0.3", zorder=6
+                place.real, place.imag, escape(region.name), ha="center", va="center", style="italic", color="0.3",
+                zorder=6,
             )
     shown = [shade for shade, region in zip(shades, model.regions, strict=True) if not region.infinite]
     axes.add_collection(PathCollection(cavities, facecolors="white", edgecolors="none", zorder=0))
@@ -248,7 +249,7 @@ def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: Integ
     steep = abs(normal.real) > 0.75
     at = place + far * model.size * normal
     axes.text(
-        at.real, at.imag, text, rotation=90 if steep else 0, fontsize=7, color="0.2", zorder=6, linespacing=1.4,
+        at.real, at.imag, escape(text), rotation=90 if steep else 0, fontsize=7, color="0.2", zorder=6, linespacing=1.4,
         ha="left" if normal.real > 0.4 else "right" if normal.real < -0.4 else "center",
         va="center" if steep else "bottom" if normal.imag > 0 else "top",
     )

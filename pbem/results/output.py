@@ -13,6 +13,7 @@ from pbem.results.tail import SIGNATURE
 from pbem.results.trial import check_contents
 
 PICTURE_FORMATS = (".png", ".pdf", ".svg")
+MOVIE_FORMATS = (".gif", ".mp4")
 
 
 def check_output_path(
@@ -93,10 +94,38 @@ def _refuse_to_replace(target: Path, force: bool, source: str | None, overrides:
         )
 
 
-def check_picture_path(path: str | os.PathLike[str]) -> Path:
-    """As `check_output_path`, for a picture; its ending says the format."""
-    if Path(path).suffix.lower() not in PICTURE_FORMATS:
-        raise ResultFileError(str(path), f"is no picture; its name should end with {', '.join(PICTURE_FORMATS)}")
+def check_export_path(path: str | os.PathLike[str], source: str | os.PathLike[str]) -> Path:
+    """As `check_output_path`, for what is made of a result file, which it must not replace, nor another."""
+    target = _check_folder(path)
+    if target.exists():
+        with target.open("rb") as file:
+            stored = file.read(len(SIGNATURE)) == SIGNATURE
+        if Path(source).exists() and target.samefile(source):
+            raise ResultFileError(str(path), "is the result file itself; name another file")
+        if stored:
+            _refuse_results(target)
+        try:
+            target.open("ab").close()
+        except OSError as error:
+            raise ResultFileError(str(path), f"is there already and is not writable ({error.strerror})") from error
+    return target
+
+
+def _refuse_results(target: Path) -> None:
+    try:
+        with open_quietly(target) as file:
+            known = "pbem_version" in file.attrs
+    except ResultFileError:
+        known = False
+    if known:
+        raise ResultFileError(str(target), "holds the results of a run; name another file")
+
+
+def check_picture_path(path: str | os.PathLike[str], *, movies: bool = False) -> Path:
+    """As `check_output_path`, for a picture, or an animation (`movies`); its ending says the format."""
+    known = PICTURE_FORMATS + (MOVIE_FORMATS if movies else ())
+    if Path(path).suffix.lower() not in known:
+        raise ResultFileError(str(path), f"is no picture; its name should end with {', '.join(known)}")
     target = _check_folder(path)
     if target.exists():
         try:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties, findfont, get_font
 
+from pbem.arrays import Real
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.description.generation import GeneratedGroup
 from pbem.results.reader import Results
@@ -54,6 +59,7 @@ def choose_shades(names: Sequence[str], groups: Sequence[GeneratedGroup]) -> lis
 SHADES = ("#DCE6EE", "#EFE6D5", "#DFEBDC", "#EADFEA", "#E4E4E4", "#F2DEDA")
 POWER, SUPERSCRIPT = r"\^(-?[0-9.]+)", r"$^{\1}$"
 TIP = "#A51C30"
+TITLE_WIDTH = 90
 FORCE, MOTION, SUPPORT = "#D55E00", "#0072B2", "#444444"
 
 
@@ -72,17 +78,51 @@ def label(quantity: str, unit: str) -> str:
     """`quantity (unit)`; powers in the unit as superscripts."""
     if not unit:
         return quantity
-    plain = unit.replace("$", r"\$").replace("**", "^")
+    plain = escape(unit).replace("**", "^")
     return f"{quantity} ({re.sub(POWER, SUPERSCRIPT, plain)})"
 
 
-def scale_axis(axes: Axes) -> None:
-    """Write small and large numbers of the vertical axis with a common power of ten."""
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+def escape(text: str) -> str:
+    """Names and titles as they were written: a dollar sign begins no formula, and what the font lacks is marked."""
+    known = _list_characters()
+    shown = "".join(each if each == "\n" or ord(each) in known else "\N{REPLACEMENT CHARACTER}" for each in text)
+    return shown.replace("$", r"\$")
+
+
+@lru_cache
+def _list_characters() -> frozenset[int]:
+    """The characters that the font of the pictures has."""
+    return frozenset(get_font(findfont(FontProperties(family=["sans-serif"]))).get_charmap())
+
+
+def scale_axis(axes: Axes, which: str = "y", most: int = 7) -> None:
+    """Few ticks; small and large numbers with a common power of ten, digits that all have in common set apart."""
+    axes.ticklabel_format(axis=which, style="sci", scilimits=(-3, 4))
+    axes.locator_params(axis=which, nbins=most)
+
+
+def scale_plane(axes: Axes, results: Results, most: int = 6) -> None:
+    """Equal scales, and the axes' names and ticks (about `most` at most) of a picture of the plane."""
+    axes.set_aspect("equal")
+    for which in ("x", "y"):
+        scale_axis(axes, which, most)
+    axes.set_xlabel(label("$x$", results.units.length))
+    axes.set_ylabel(label("$y$", results.units.length))
 
 
 def describe_step(results: Results, step: int) -> str:
     """Title and load step (its place in the file)."""
     steps = results.steps
-    stage = steps.stage_names[int(steps.stage[step])]
-    return f"{results.title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g})"
+    stage = escape(steps.stage_names[int(steps.stage[step])])
+    title = "\n".join(textwrap.wrap(escape(results.title), TITLE_WIDTH))
+    return f"{title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g})".strip()
+
+
+def choose_magnification(displacement: Real, size: float) -> float:
+    """1, 2 or 5 times a power of ten that brings the largest displacement to about 7 % of the size; at least 1."""
+    largest = float(np.abs(displacement).max(initial=0.0))
+    if largest == 0.0:
+        return 1.0
+    wanted = 0.07 * size / largest
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return max(1.0, float(power * max(digit for digit in (1, 2, 5) if digit * power <= wanted * (1 + 1e-12))))

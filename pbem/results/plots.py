@@ -3,186 +3,164 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.path import Path as OutlinePath
-from scipy.spatial import cKDTree
 
 from pbem.arrays import Real
+from pbem.results.body_plot import draw_body
+from pbem.results.curve_plot import LINE_STYLES, draw_profile, finish_axes
+from pbem.results.curve_profile import check_abscissa, read_profile
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
-from pbem.results.outline import Outline, find_tips, trace_outlines
-from pbem.results.plot_style import MODES, TIP, choose_shades, describe_step, label, scale_axis, style
+from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, widen_box, write_around
+from pbem.results.plot_style import MODES, choose_magnification, describe_step, escape, label, style
 from pbem.results.reader import Results
+from pbem.results.trace_names import find_names
 
-__all__ = ["draw_results", "plot_model", "plot_results"]
+__all__ = ["BodyOptions", "BodyPicture", "draw_results", "plot_model", "plot_results"]
 
 MOST_PANELS = 4
-MOST_MARKS = 300
+# The panels of an interface: the quantities, each with what the legend calls its line.
+PANELS = (("traction", ("traction_n", "traction_s")), ("opening, slip", ("opening", "slip")))
+LINES = ("normal traction $t_n$; opening", "shear traction $t_s$; slip")
 
 
-def plot_results(results: Results, path: str | os.PathLike[str], step: int = -1, magnify: float | None = None) -> None:
+@dataclass(frozen=True)
+class BodyOptions:
+    """magnify: of the displacements, None: visible. box: x0, y0, x1, y1, None: the model. abscissa: arc_length, angle,
+    x or y. interfaces: names or traces that are drawn below the body, None: those where most happens. labels: names
+    written in the body, None: those drawn below."""
+
+    magnify: float | None = None
+    box: tuple[float, float, float, float] | None = None
+    abscissa: str = "arc_length"
+    interfaces: Sequence[str] | None = None
+    labels: Sequence[str] | None = None
+    page: Page = field(default_factory=Page)
+
+
+def plot_results(
+    results: Results, path: str | os.PathLike[str], step: int = -1, magnify: float | None = None,
+    options: BodyOptions | None = None,
+) -> None:
     """Write the picture of one stored step (its place in the file); the ending of `path` says the format.
 
-    magnify: scale of the displacements; by default one that makes them visible. Raises IndexError for no such step.
+    magnify: scale of the displacements; by default one that makes them visible. Raises IndexError for no such step,
+    ValueError for wrong options.
     """
+    chosen = options or BodyOptions(magnify=magnify)
     with style():
-        draw_results(results, step, magnify).savefig(path, dpi=200)
+        save(draw_results(results, step, chosen.magnify, chosen), path, chosen.page)
 
 
-def draw_results(results: Results, step: int = -1, magnify: float | None = None) -> Figure:
-    """The figure of `plot_results`: the displaced body, and two panels for each of the longest interfaces."""
+def draw_results(
+    results: Results, step: int = -1, magnify: float | None = None, options: BodyOptions | None = None
+) -> Figure:
+    """The figure of `plot_results`: the displaced body, and two panels for each interface where most happens."""
     at = None if len(results.steps) == 0 and step == -1 else range(len(results.steps))[step]
-    shown = choose_interfaces(results) if at is not None else []
-    rows = len(shown)
-    height = 4.2 if len(results.contact) <= MOST_PANELS else 6.0
-    figure = Figure(figsize=(7.2, height + 2.1 * rows), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(1 + rows, 2, height_ratios=[height, *[2.1] * rows])
-    _draw_body(figure.add_subplot(grid[0, :]), results, at, magnify, shown)
-    if at is None:
+    return BodyPicture(results, options or BodyOptions(magnify=magnify), [] if at is None else [at]).draw(at)
+
+
+class BodyPicture:
+    """The body at some stored steps, in pictures of the same magnification and limits."""
+
+    def __init__(self, results: Results, options: BodyOptions, steps: Sequence[int]) -> None:
+        self._results, self._options, self._steps = results, options, list(steps)
+        check_abscissa(options.abscissa)
+        self._box = choose_box(results, options.box)
+        self._asked = options.interfaces is not None
+        names = list(results.contact)
+        if options.interfaces is None:
+            self._names = choose_interfaces(results, self._steps)
+        else:
+            found = find_names(options.interfaces, names).values()
+            self._names = list(dict.fromkeys(name for each in found for name in each))
+        if options.labels is None:
+            self._labels = {name: [name] for name in self._names}
+        else:
+            self._labels = find_names(options.labels, names)
+        size = float(np.ptp(results.nodes.position, axis=0).max())
+        moved = [results.displacement_at(at) for at in self._steps]
+        largest = max(moved, key=lambda each: float(np.abs(each).max(initial=0.0)), default=np.zeros((1, 2)))
+        self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+        places = [results.nodes.position, *(results.nodes.position + self._magnify * each for each in moved)]
+        self._frame = widen_box(self._box, places, 0.04)
+        self._profiles = {
+            (name, quantity, at): read_profile(results, name, quantity, at, options.abscissa)
+            for name in self._names for _, quantities in PANELS for quantity in quantities for at in self._steps
+        }
+
+    def draw(self, step: int | None) -> Figure:
+        """The picture of one of the steps; None: the body as it was."""
+        results, page = self._results, self._options.page
+        rows = len(self._names) if step is not None else 0
+        width = page.width or 17.8
+        body = max(4.0, min(self._frame.height(width - 2.0), 12.0 if rows else 17.0)) + 1.6
+        each, legend = 4.8, 1.9 if page.is_narrow else 1.0
+        figure = page.make_figure(body + legend + each * rows + 1.2)
+        grid = figure.add_gridspec(2 + rows, 2, height_ratios=[body, legend, *[each] * rows])
+        axes = figure.add_subplot(grid[0, :])
+        handles = draw_body(axes, results, step, self._magnify, self._labels, self._box, page, self._frame)
+        notes = [describe_box(self._box)]
+        if step is None:
+            write_around(figure, f"{escape(results.title)}\nno step stored".strip(), notes)
+        else:
+            for row, name in enumerate(self._names, start=2):
+                left = figure.add_subplot(grid[row, 0])
+                pair = left, figure.add_subplot(grid[row, 1], sharex=left)
+                handles += self._draw_panels(pair, results.contact[name], step)
+            if rows:
+                handles += [Line2D([], [], color="0.35", linewidth=0.9, linestyle=line, label=text)
+                            for line, text in zip(LINE_STYLES, LINES, strict=False)]
+            write_around(figure, f"{describe_step(results, step)}, displacements × {self._magnify:g}",
+                         [*notes, self._say_left_out()])
+        # One for all axes, between the body and the lines.
+        add_legend_row(figure, grid[1, :], handles, page)
         return figure
-    for row, contact in enumerate(shown, start=1):
-        left = figure.add_subplot(grid[row, 0])
-        right = figure.add_subplot(grid[row, 1], sharex=left)
-        _draw_along(left, contact, at, {"traction_n": "normal $t_n$", "traction_s": "tangential $t_s$"})
-        _draw_along(right, contact, at, {"opening": "opening", "slip": "slip"})
-        left.set_ylabel(label("traction", results.units.stress))
-        right.set_ylabel(label("opening, slip", results.units.length))
-        left.set_title(contact.name, loc="left")
-        for axes in (left, right):
-            axes.set_xlabel(label("arc length", results.units.length))
-    left_out = len(results.contact) - len(shown)
-    if left_out:
-        figure.supxlabel(f"{left_out} of {len(results.contact)} interfaces are left out, the shorter ones", fontsize=8)
-    return figure
+
+    def _draw_panels(self, pair: tuple[Axes, Axes], contact: Contact, step: int) -> list[Line2D]:
+        results, abscissa = self._results, self._options.abscissa
+        units = (results.units.stress, results.units.length)
+        used: set[int] = set()
+        for axes, (title, quantities), unit in zip(pair, PANELS, units, strict=True):
+            profiles = [self._profiles[contact.name, quantity, step] for quantity in quantities]
+            for profile, line in zip(profiles, LINE_STYLES, strict=False):
+                draw_profile(axes, profile, line=line)
+                used |= set() if profile.mode is None else {int(which) for which in np.unique(profile.mode)}
+            every = [self._profiles[contact.name, quantity, at] for quantity in quantities for at in self._steps]
+            finish_axes(axes, profiles, abscissa, results.units.length, label(title, unit), among=every)
+        pair[0].set_title(escape(contact.name), loc="left")
+        return [Line2D([], [], linestyle="none", label=how.name, **how.line)
+                for which, how in MODES.items() if int(which) in used and len(results.pairs.interface) <= 300]
+
+    def _say_left_out(self) -> str:
+        left_out = len(self._results.contact) - len(self._names)
+        if not left_out or self._asked:
+            return ""
+        return (f"{left_out} of {len(self._results.contact)} interfaces are left out, where less slips and opens "
+                "(--curve NAME draws others)")
 
 
-def choose_interfaces(results: Results) -> list[Contact]:
-    """The longest interfaces, bonded ones last, in the order of the file."""
+def choose_interfaces(results: Results, steps: Iterable[int]) -> list[str]:
+    """The interfaces where most slips and opens along their length in the steps, else the longest, bonded ones last; in
+    the order of the file."""
     pairs = results.pairs
-    if not pairs.names:
+    steps = list(steps)
+    if not pairs.names or not steps:
         return []
     begins = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
     lengths = pairs.arc_length[begins[1:] - 1] - pairs.arc_length[begins[:-1]]
-    order = sorted(range(len(lengths)), key=lambda i: (pairs.laws[i] != "bonded", lengths[i]), reverse=True)
-    return [results.contact[pairs.names[number]] for number in sorted(order[:MOST_PANELS])]
-
-
-def choose_magnification(displacement: Real, size: float) -> float:
-    """1, 2 or 5 times a power of ten that brings the largest displacement to about 7 % of the size; at least 1."""
-    largest = float(np.abs(displacement).max(initial=0.0))
-    if largest == 0.0:
-        return 1.0
-    wanted = 0.07 * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return max(1.0, float(power * max(digit for digit in (1, 2, 5) if digit * power <= wanted * (1 + 1e-12))))
-
-
-def _draw_body(axes: Axes, results: Results, step: int | None, magnify: float | None, named: list[Contact]) -> None:
-    none = np.zeros_like(results.nodes.position)
-    displacement = none if step is None else results.displacement_at(step)
-    size = float(np.ptp(results.nodes.position, axis=0).max())
-    if magnify is None:
-        magnify = choose_magnification(displacement, size)
-    outlines = trace_outlines(results.nodes, results.elements, displacement)
-    _fill_regions(axes, choose_shades(results.nodes.region_names, results.groups), outlines, magnify)
-    axes.add_collection(LineCollection([each.position for each in outlines], colors="0.7", linewidths=0.6, zorder=1))
-    lines = [each.position + magnify * each.displacement for each in outlines]
-    axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.8, zorder=3))
-    marks = _mark_modes(axes, results, step, displacement, magnify) if step is not None else []
-    marks += _mark_tips(axes, results, outlines, magnify)
-    for contact in named:
-        place = contact.position[contact.pairs // 3]
-        axes.annotate(contact.name, place, xytext=(4, -9), textcoords="offset points", fontsize=7, zorder=6)
-    axes.set_aspect("equal")
-    axes.autoscale_view()
-    axes.margins(0.05)
-    axes.set_xlabel(label("$x$", results.units.length))
-    axes.set_ylabel(label("$y$", results.units.length))
-    title = f"{results.title}: no step stored"
-    if step is not None:
-        title = f"{describe_step(results, step)}, displacements × {magnify:g}"
-    axes.set_title(title, loc="left", fontsize=9)
-    handles = [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
-               Line2D([], [], color="0.7", linewidth=0.6, label="as it was")]
-    axes.legend(handles=handles + marks, loc="center left", bbox_to_anchor=(1.01, 0.5))
-
-
-def _fill_regions(axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float) -> None:
-    """Shade the regions; the holes stay free since inner loops run the other way round. Cavities of infinite regions
-    are left white in a shaded plane."""
-    loops: list[list[Real]] = [[] for _ in shade]
-    for each in outlines:
-        if not each.crack:
-            loops[each.region].append(each.position + magnify * each.displacement)
-    bodies, shades, cavities = [], [], []
-    for region, shapes in enumerate(loops):
-        if any(_area(shape) > 0 for shape in shapes):
-            bodies.append(OutlinePath.make_compound_path(*(OutlinePath(shape, closed=True) for shape in shapes)))
-            shades.append(shade[region])
-        else:
-            axes.set_facecolor(shade[region])
-            cavities += [OutlinePath(shape) for shape in shapes]
-    axes.add_collection(PathCollection(cavities, facecolors="white", edgecolors="none", zorder=0))
-    axes.add_collection(PathCollection(bodies, facecolors=shades, edgecolors="none", zorder=0.5))
-
-
-def _area(shape: Real) -> float:
-    x, y = shape.T
-    return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
-
-
-def _mark_modes(axes: Axes, results: Results, step: int, displacement: Real, magnify: float) -> list[Line2D]:
-    """Mark every contact pair on its displaced first side, by lines where there are many; returns legend handles."""
-    pairs = results.pairs
-    if not pairs.names:
-        return []
-    position, normal, mode = pairs.position, pairs.normal, pairs.at("mode", step)
-    # Nodes of both sides lie at the same place; their normals tell which one is on the first side.
-    size = float(np.ptp(results.nodes.position, axis=0).max())
-    tree = cKDTree(np.hstack([results.nodes.position, size * results.nodes.normal]))
-    _, nodes = tree.query(np.hstack([position, size * normal]))
-    places = results.nodes.position[nodes] + magnify * displacement[nodes]
-    used = [which for which in MODES if (mode == which).any()]
-    if len(mode) <= MOST_MARKS:
-        for which in used:
-            axes.scatter(*places[mode == which].T, s=14.0, zorder=4, **MODES[which].marks)
-        return [Line2D([], [], linestyle="none", label=MODES[which].name, **MODES[which].line) for which in used]
-    begins = np.flatnonzero(pairs.interface[1:] == pairs.interface[:-1])
-    segments = np.stack([places[begins], places[begins + 1]], axis=1)
-    for which in used:
-        there = segments[mode[begins] == which]
-        axes.add_collection(LineCollection(there, colors=MODES[which].stroke, linewidths=1.6, zorder=4))
-    return [Line2D([], [], color=MODES[which].stroke, linewidth=1.6, label=MODES[which].name) for which in used]
-
-
-def _mark_tips(axes: Axes, results: Results, outlines: Sequence[Outline], magnify: float) -> list[Line2D]:
-    """A dot at every tip, where it is now; returns its legend handle."""
-    tips = find_tips(results.elements, results.nodes.curve_names, results.tips)
-    places = [face.position[end] + magnify * face.displacement[end]
-              for face in outlines if face.crack for end in (0, -1) if tuple(face.position[end]) in tips]
-    if not places:
-        return []
-    axes.plot(*np.transpose(places), ".", color=TIP, markersize=4.0 if len(places) < 20 else 2.0, zorder=5)
-    return [Line2D([], [], linestyle="none", marker=".", color=TIP, markersize=4.0, label="crack tip")]
-
-
-def _draw_along(axes: Axes, contact: Contact, step: int, quantities: dict[str, str]) -> None:
-    """Curves of two quantities along an interface, a mark of its mode at every pair."""
-    mode = contact.mode[step]
-    for (quantity, name), line in zip(quantities.items(), ("-", "--"), strict=True):
-        values = getattr(contact, quantity)[step]
-        axes.plot(contact.arc_length, values, line, color="0.35", linewidth=0.9, label=name, zorder=2)
-        for which, how in MODES.items():
-            there = mode == which
-            axes.scatter(contact.arc_length[there], values[there], s=9, zorder=3, **how.marks)
-    axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=1)
-    axes.legend(loc="best")
-    scale_axis(axes)
+    share: Real = lengths / np.maximum(np.diff(begins), 1)
+    moved = np.zeros(len(pairs.names))
+    for at in steps:
+        jump = np.abs(pairs.at("slip", at)) + np.abs(pairs.at("opening", at))
+        moved = np.maximum(moved, share * np.bincount(pairs.interface, jump, len(moved)))
+    # What is moved by rounding alone does not move.
+    moved = np.where(moved > 1e-9 * moved.max(initial=0.0), moved, 0.0)
+    order = sorted(range(len(lengths)), key=lambda i: (pairs.laws[i] != "bonded", moved[i], lengths[i]), reverse=True)
+    return [pairs.names[number] for number in sorted(order[:MOST_PANELS])]

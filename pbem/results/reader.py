@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pbem.arrays import Integer, Real
 from pbem.description.generation import GeneratedGroup
@@ -21,6 +22,7 @@ from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
 from pbem.results.contents import Balances, Elements, Energies, Errors, Linearities, Nodes, Steps, Tips, Units
+from pbem.results.evaluation import Evaluation, Evaluator, Side
 from pbem.results.journal import is_being_written
 from pbem.results.layout import ENERGIES, TIP_DATASETS, count_steps, read_fractions
 from pbem.results.lazy import (
@@ -34,13 +36,14 @@ from pbem.results.lazy import (
     refuse_damage,
 )
 from pbem.results.linearity import read_linearity
+from pbem.results.outline import find_tips
 from pbem.results.trial import check_contents
 
 STATUSES = ("running", "finished", "failed", "stopped")
 ATTEMPTS = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Results:
     """What a result file holds. k stored steps, n nodes.
 
@@ -110,6 +113,83 @@ class Results:
         with open_quietly(self.path) as file:
             return file["fields/displacement"][range(len(self.steps))[step]]
 
+    def evaluate(
+        self, points: ArrayLike, steps: int | Sequence[int] | None = None, *, side: Side = "first"
+    ) -> Evaluation:
+        """Displacement, stress and region at any points (q, 2): `.displacement` (k, q, 2), `.stress` (k, q, 3).
+
+        steps: places of k stored steps, negative from the end; all by default. Stress is sxx, syy, sxy. Outside of all
+        regions the values are NaN and `.region` is "". On an outer boundary they are the limits from inside; on a crack
+        or interface those of its first side, or of its second with side="second". At a crack's tip stress is NaN: it is
+        infinite there. Needs the result file alone.
+
+        Raises ValueError for points of another shape or another side, IndexError for no such step, ResultFileError for
+        files of earlier versions.
+        """
+        if side not in get_args(Side):
+            raise ValueError(f"side: found {side!r}; expected one of {', '.join(get_args(Side))}")
+        tips = find_tips(self.elements, self.nodes.curve_names, self.tips)
+        places = np.array([complex(*tip) for tip in sorted(tips)], dtype=complex)
+        return self._evaluator.evaluate(points, self.choose_steps(steps), places, side)
+
+    @cached_property
+    def _evaluator(self) -> Evaluator:
+        return Evaluator(self.path, self.nodes, self.elements, self.steps, self.configuration)
+
+    def choose_steps(self, steps: int | Sequence[int] | None = None) -> list[int]:
+        """Places, counted from 0, of stored steps that are given by places, negative from the end; None: all.
+
+        Raises IndexError for one that is not stored.
+        """
+        count = len(self.steps)
+        if steps is None:
+            return list(range(count))
+        chosen = np.atleast_1d(np.asarray(steps))
+        if chosen.ndim != 1 or (chosen.size and chosen.dtype.kind not in "iu"):
+            raise ValueError(f"steps: found {steps!r}; expected places of stored steps, such as [-1]")
+        for each in chosen:
+            if not -count <= each < count:
+                raise IndexError(f"steps: there is no stored step at place {each}; {count} are stored")
+        return [int(each) % count for each in chosen]
+
+    def to_dataframe(self, what: str) -> Any:
+        """A pandas.DataFrame: of an interface, crack or contact by its name, a row for each stored step and pair.
+
+        Also "steps", "reactions", "tips", "interior", and "contact" for all interfaces together; an interface with one
+        of these names is "contact.NAME". Columns are called as in the file.
+
+        Raises ImportError if pandas is not installed, ResultFileError if the file has nothing of this name.
+        """
+        return _load_module("tables").make_dataframe(self, what)
+
+    def plot(self, **options: Any) -> Any:
+        """A matplotlib Figure: the displaced bodies; with curve= quantities along curves; with field= alone a map.
+
+        curve: a name, or several. field: what is drawn, or a list of it along curves. step: place of a stored step,
+        by default the last. x: "arc_length", "angle", "x" or "y". xlim, ylim: of the axes. ax: axes to draw into.
+        All options and errors: `pbem.results.drawing.plot`.
+        """
+        return _load_module("drawing").plot(self, **options)
+
+    def __repr__(self) -> str:
+        return _load_module("summary").summarise(self)
+
+    def _repr_html_(self) -> str:
+        return _load_module("summary").summarise_html(self)
+
+    def find_curve_ends(self, name: str) -> Real:
+        """(2, 2): where a curve starts and ends; NaN in files of earlier versions."""
+        stored = self._configured
+        if name not in stored.get("curves", {}):
+            return np.full((2, 2), np.nan)
+        legs = stored["curves"][name]["legs"]
+        return np.array([legs[0]["start"], legs[-1]["end"]]) + np.array(stored["origin"])
+
+    @cached_property
+    def _configured(self) -> Mapping[str, Any]:
+        """The configuration in force."""
+        return json.loads(self.configuration) if self.configuration else {}
+
     def find_step(self, number: int) -> int:
         """Where the load step of this number is stored. Raises ResultFileError if it is not."""
         found = np.flatnonzero(self.steps.number == number)
@@ -121,6 +201,11 @@ class Results:
     def _load(self, name: str) -> Real:
         with open_quietly(self.path) as file:
             return freeze(file[name][: len(self.steps)])
+
+
+def _load_module(name: str) -> Any:
+    """A module that itself needs Results."""
+    return import_module(f"pbem.results.{name}")
 
 
 def open_results(path: str | os.PathLike[str]) -> Results:

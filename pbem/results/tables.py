@@ -1,57 +1,173 @@
-"""Sections and aligned tables of short texts."""
+"""Results as tables: columns of equal length, for pandas and for CSV files."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import csv
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
-MOST_ROWS = 40
+import numpy as np
+from numpy.typing import NDArray
 
+from pbem.errors import ResultFileError
+from pbem.results.reader import Results
+from pbem.wording import list_names, suggest
 
-def section(title: str, lines: Iterable[str]) -> str:
-    """A title with its lines below; nothing without lines."""
-    listed = list(lines)
-    return "\n".join([title, *(f"  {line}" for line in listed)]) if listed else ""
-
-
-def table(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Aligned lines, numbers to the right; at most MOST_ROWS of them."""
-    if not rows:
-        return []
-    shown = [titles, *rows[:MOST_ROWS]]
-    widths = [max(len(row[i]) for row in shown) for i in range(len(titles))]
-    right = [all(_is_number(row[i]) for row in rows) for i in range(len(titles))]
-    lines = ["  ".join(cell.rjust(width) if flush else cell.ljust(width)
-                       for cell, width, flush in zip(row, widths, right, strict=True)).rstrip() for row in shown]
-    return lines + ([f"... and {len(rows) - MOST_ROWS} more"] if len(rows) > MOST_ROWS else [])
+Table = dict[str, NDArray[Any]]
+PREFIX = "contact."
+FIXED = ("position", "normal", "arc_length")
 
 
-def shorten(texts: Sequence[str], most: int = MOST_ROWS) -> list[str]:
-    """The first texts, and how many there are more."""
-    return [*texts[:most], *([f"... and {len(texts) - most} more"] if len(texts) > most else [])]
+def make_table(results: Results, what: str) -> Table:
+    """The columns of a table: `steps`, `reactions`, `tips`, `interior`, or the contact of an interface.
+
+    That is named as contact.NAME, or by NAME alone if it is none of the others; "contact" is all of them. One row for
+    each stored step and pair, curve, tip or point. Raises ResultFileError for what the file does not hold.
+    """
+    known = list_tables(results)
+    if what in known and not what.startswith(PREFIX):
+        return KINDS[what](results)
+    name = what.removeprefix(PREFIX)
+    if name in results.contact:
+        return _tabulate_contact(results, name)
+    hint = suggest(name, [*known, *results.contact]) or ";"
+    raise ResultFileError(str(results.path), f"has no table '{what}'{hint} it has {list_names(known)}")
 
 
-def _is_number(text: str) -> bool:
+def choose_table(results: Results) -> str:
+    """What is written where nothing was asked for: the contact of all interfaces. Raises ResultFileError without any.
+    """
+    if len(results.contact):
+        return "contact"
+    known = list_names(list_tables(results))
+    raise ResultFileError(str(results.path), f"has no interfaces; --what chooses among {known}")
+
+
+def list_tables(results: Results) -> list[str]:
+    """The names of all tables that the file holds."""
+    there = {"steps": True, "reactions": bool(results.reactions), "tips": bool(results.tips),
+             "interior": results.interior is not None, "contact": bool(len(results.contact))}
+    return [*(name for name in KINDS if there[name]), *(PREFIX + name for name in results.contact)]
+
+
+def write_csv(table: Mapping[str, NDArray[Any]], path: Path) -> None:
+    """Comma-separated, a line of titles first; numbers with all their digits, NaN as an empty field.
+
+    Raises ResultFileError if the file cannot be written.
+    """
     try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(table)
+            writer.writerows(zip(*(_spell(column) for column in table.values()), strict=True))
+    except OSError as error:
+        raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
 
 
-def format_number(value: float) -> str:
-    """Five digits."""
-    return f"{value:.5g}"
+def _spell(column: NDArray[Any]) -> list[str]:
+    if column.dtype.kind == "f":
+        return ["" if value != value else repr(value) for value in column.tolist()]
+    return [str(int(value) if isinstance(value, bool) else value) for value in column.tolist()]
 
 
-def count(number: int, noun: str) -> str:
-    """So many of a thing: "1 step", "2 steps"."""
-    return f"{number} {noun}{'s' * (number != 1)}"
+def _tabulate_steps(results: Results) -> Table:
+    steps = results.steps
+    energy = {f"energy_{name}": values for name, values in vars(results.energy).items()}
+    return {**_name_steps(results, 1), "iterations": steps.iterations, "residual": steps.residual, **energy}
 
 
-def format_bytes(size: float) -> str:
-    """Three digits with a unit: B, kB, MB, GB, TB of powers of 1000."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if size < 1000:
-            return f"{size:.3g} {unit}"
-        size /= 1000
-    return f"{size:.3g} TB"
+def _name_steps(results: Results, rows: int) -> Table:
+    """Number, stage and factor of the step of every row; rows of each step."""
+    steps = results.steps
+    stages = np.array(steps.stage_names, dtype=object)[steps.stage] if len(steps) else np.zeros(0, dtype=object)
+    columns: Table = {"step": steps.number, "stage": stages, "factor": steps.factor}
+    return {name: np.repeat(values, rows) for name, values in columns.items()}
+
+
+def _repeat(results: Results, values: Any) -> NDArray[Any]:
+    """The same at every step."""
+    return np.tile(np.asarray(values), len(results.steps))
+
+
+def _tabulate_reactions(results: Results) -> Table:
+    names = np.array(list(results.reactions), dtype=object)
+    forces = np.stack(list(results.reactions.values()), axis=1).reshape(-1, 2) if len(names) else np.zeros((0, 2))
+    return {**_name_steps(results, len(names)), "curve": _repeat(results, names), "x": forces[:, 0], "y": forces[:, 1]}
+
+
+def _tabulate_tips(results: Results) -> Table:
+    """Ends of cracks that are tips at any step."""
+    names, k = list(results.tips), len(results.steps)
+    kinds = ("KI", "KII", "J", "T")
+    values = {kind: np.stack([getattr(tips, kind) for tips in results.tips.values()], axis=1).reshape(k, -1)
+              for kind in kinds}
+    there = ~np.all([np.isnan(each).all(axis=0) for each in (values["KI"], values["J"])], axis=0)
+    places = np.array([results.find_curve_ends(name) for name in names]).reshape(-1, 2)[there]
+    crack = np.repeat(np.array(names, dtype=object), 2)[there]
+    end = np.tile(np.array(["start", "end"], dtype=object), len(names))[there]
+    return {
+        **_name_steps(results, int(there.sum())), "crack": _repeat(results, crack), "end": _repeat(results, end),
+        "x": _repeat(results, places[:, 0]), "y": _repeat(results, places[:, 1]),
+        **{kind: each[:, there].ravel() for kind, each in values.items()},
+    }
+
+
+def _tabulate_interior(results: Results) -> Table:
+    interior = results.interior
+    assert interior is not None
+    names = np.array([*results.nodes.region_names, ""], dtype=object)
+    moved, stress = interior.displacement.reshape(-1, 2), interior.stress.reshape(-1, 3)
+    return {
+        **_name_steps(results, len(interior.position)), "x": _repeat(results, interior.position[:, 0]),
+        "y": _repeat(results, interior.position[:, 1]), "region": _repeat(results, names[interior.region]),
+        "ux": moved[:, 0], "uy": moved[:, 1], **{name: stress[:, i] for i, name in enumerate(("sxx", "syy", "sxy"))},
+    }
+
+
+def _tabulate_contact(results: Results, name: str) -> Table:
+    contact = results.contact[name]
+    fixed: Table = {
+        "pair": np.arange(contact.pairs), "x": contact.position[:, 0], "y": contact.position[:, 1],
+        "arc_length": contact.arc_length, "normal_x": contact.normal[:, 0], "normal_y": contact.normal[:, 1],
+    }
+    shown = ("mode", "opening", "slip", "traction_n", "traction_s")
+    growing = {each: getattr(contact, each) for each in shown} | dict(contact.internal)
+    return {
+        **_name_steps(results, contact.pairs), **{each: _repeat(results, values) for each, values in fixed.items()},
+        **{each: values.ravel() for each, values in growing.items()},
+    }
+
+
+def _tabulate_contacts(results: Results) -> Table:
+    """All interfaces together, with what they have in common."""
+    pairs = results.pairs
+    names = np.array(pairs.names, dtype=object)[pairs.interface]
+    fixed: Table = {
+        "interface": names, "x": pairs.position[:, 0], "y": pairs.position[:, 1], "arc_length": pairs.arc_length,
+        "normal_x": pairs.normal[:, 0], "normal_y": pairs.normal[:, 1],
+    }
+    shown = ("mode", "opening", "slip", "traction_n", "traction_s")
+    growing = {
+        each: np.concatenate([np.zeros(0), *(pairs.at(each, at) for at in range(len(results.steps)))]) for each in shown
+    }
+    growing["mode"] = growing["mode"].astype(np.int8)
+    return {**_name_steps(results, pairs.count), **{each: _repeat(results, v) for each, v in fixed.items()}, **growing}
+
+
+KINDS: Mapping[str, Callable[[Results], Table]] = {
+    "steps": _tabulate_steps, "reactions": _tabulate_reactions, "tips": _tabulate_tips, "interior": _tabulate_interior,
+    "contact": _tabulate_contacts,
+}
+
+
+def make_dataframe(results: Results, what: str) -> Any:
+    """The table as a pandas.DataFrame. Raises ImportError, which names the package, if pandas is not installed."""
+    try:
+        import pandas
+    except ImportError as error:
+        raise ImportError(
+            "to_dataframe needs the package pandas, which is not installed: pip install pandas, or on Debian and "
+            "Ubuntu apt-get install python3-pandas"
+        ) from error
+    return pandas.DataFrame(make_table(results, what))

@@ -9,10 +9,11 @@ import sys
 import tomllib
 from pathlib import Path
 
+import h5py
 import pytest
 
 import pbem
-from pbem.cli import make_parser
+from pbem.cli import main, make_parser
 from pbem.pages import TOPICS, read_page
 
 ROOT = Path(__file__).parents[2]
@@ -117,7 +118,7 @@ def test_the_readme_shows_the_picture_and_is_short() -> None:
 def test_commands_are_those_of_the_program(line: str) -> None:
     words = shlex.split(line, comments=True)
     options = make_parser().parse_args(words[words.index("pbem") + 1 :])
-    assert options.command in ("check", "run", "sweep", "info", "plot", "make", "help")
+    assert options.command in ("check", "run", "sweep", "info", "plot", "export", "make", "help")
     for name in ("case", "file"):
         path = getattr(options, name, "")
         assert Path(path).stem in ("", "first", "field"), f"{path} is not shown"
@@ -129,3 +130,18 @@ def test_scripts_that_are_named_exist() -> None:
     modules = {name for text in TEXTS for name in re.findall(r"-m (scripts\.\w+|pbem\.[\w.]+)", text)}
     assert len(modules) >= 2
     assert [name for name in modules if not (ROOT / (name.replace(".", "/") + ".py")).is_file()] == []
+
+
+def test_exported_results_are_read_as_the_page_says(folder: Path) -> None:
+    results = pbem.run("first.toml")
+    assert main(["export", "first.h5"]) == 0
+    seat = results.contact["seat"]
+    (line,) = run_python(find_snippet("import h5py", "first.vtkhdf"), folder)
+    assert line == f"seat {seat.slip[-1].min()} {seat.slip[-1].max()}"
+    # PyVista is none of the project's libraries: its snippet has to be Python, and to name what is there.
+    text = find_snippet("import pyvista")
+    compile(text, "paraview.md", "exec")
+    with h5py.File("first.vtkhdf") as file:
+        arrays = file["VTKHDF/faces/PointData"]
+        named = [*re.findall(r'scalars="(\w+)"', text), *re.findall(r'warp_by_vector\("(\w+)"', text)]
+        assert len(named) == 2 and set(named) <= set(arrays) and arrays["displacement"].shape[1] == 3

@@ -13,8 +13,8 @@ from pathlib import Path
 # The package itself comes last: it offers what they define.
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "solve", "results", "progress",
-    "driver", "sweeps", "bundled", "terminal", "make_command", "check_command", "run_command", "sweep_command", "pages",
-    "cli", "__main__", "__init__",
+    "driver", "sweeps", "bundled", "terminal", "make_command", "check_command", "run_command", "sweep_command",
+    "export_command", "info_command", "plot_command", "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock")

@@ -1,123 +1,236 @@
-"""Maps of fields at interior points: what they show, and where a grid is found."""
+"""Pictures of fields: triangles that fill the regions and cross nothing, values that are the field's."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-import pbem.cli
+import pbem.plot_command
+from pbem.bem.location import locate_points
 from pbem.errors import ResultFileError
-from pbem.results.field_plot import FIELDS, draw_field, evaluate_field, find_grid, plot_field
+from pbem.results.field_formulas import FIELDS
+from pbem.results.field_plot import FieldOptions, FieldPicture, draw_field, plot_field
+from pbem.results.outline import to_columns
+from pbem.results.page import choose_box
+from pbem.results.picture_limits import CUT, format_number, limit_field
+from pbem.results.plot_style import style
 from pbem.results.reader import Results, open_results
+from pbem.results.region_points import View
+from pbem.results.region_triangles import Triangles, triangulate
 from pbem.results.writer import ResultWriter
-from pbem.solve.problem.step import Interior
 from tests.unit.results_sample import make_mesh, make_model, make_steps
+from tests.verification.planes import make_plane, make_straight, solve
 
 Real = NDArray[np.float64]
 
-X, Y = np.meshgrid(np.linspace(0, 2, 5), np.linspace(0.1, 1.9, 4))
-GRID = np.column_stack([X.ravel(), Y.ravel()])
-POINTS = np.concatenate([GRID, [[0.7, 0.3], [0.2, 0.2]]])
-REGION = np.where(POINTS[:, 1] > 1, 1, 0)
-REGION[3] = -1
+MODEL = make_model()
+MESH = make_mesh(MODEL)
+FINITE = np.zeros(2, dtype=bool)
 
 
-def write_results(path: Path, points: Real = POINTS) -> Results:
-    """Invented fields: u = (y, x^2), sxx = x, syy = 1 - y, sxy = 2; nothing at the fourth point."""
-    model = replace(make_model(), interior_points=tuple(points @ np.array([1, 1j])))
-    mesh = make_mesh(model)
-    x, y = np.where(np.arange(len(points)) == 3, np.nan, points.T)
-    field = Interior(y + 1j * x**2, np.column_stack([x, 1 - y, 2 + 0 * x]))
-    with ResultWriter(path, model, mesh, 1, "", (), REGION[: len(points)]) as writer:
-        writer.append(replace(make_steps(model, mesh)[-1], interior=field))
+def write_results(path: Path, steps: int = 6) -> Results:
+    with ResultWriter(path, MODEL, MESH, 1, "") as writer:
+        for step in make_steps(MODEL, MESH)[:steps]:
+            writer.append(step)
     return open_results(path)
 
 
-def test_fields_follow_from_displacement_and_stress(tmp_path: Path) -> None:
-    results = write_results(tmp_path / "a.h5")
-    x, y = POINTS.T
-    syy = 1 - y
-    # Eigenvalues of the tensor; materials of the sample: Poisson's ratio 0.3 below, 0.2 above, plane strain.
-    lateral = np.where(REGION == 1, 0.2, 0.3)
-    tensor = np.array([[[a, 2, 0], [2, b, 0], [0, 0, n * (a + b)]] for a, b, n in zip(x, syy, lateral, strict=True)])
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """Two blocks, a hole, a crack; invented fields."""
+    return write_results(tmp_path_factory.mktemp("sample") / "a.h5")
+
+
+@pytest.fixture(scope="module")
+def griffith(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """A crack of half-length 1 in an infinite plane under unit tension across it, solved."""
+    path = tmp_path_factory.mktemp("griffith") / "a.h5"
+    model = make_plane((0.0, 1.0, 0.0), {"crack": [make_straight(-1.0, 1.0, 8)]})
+    mesh, steps = solve(model)
+    with ResultWriter(path, model, mesh, 1, "") as writer:
+        writer.append(steps[-1])
+    return open_results(path)
+
+
+def make_view(results: Results, across: int = 30) -> View:
+    box = choose_box(results)
+    spacing = float(box.size.max()) / across
+    return View(box.low, box.high, spacing, spacing / 6)
+
+
+def list_notes(figure: Figure) -> str:
+    said = [figure._suptitle, figure._supxlabel, *figure.axes[0].texts]  # type: ignore[attr-defined]
+    return "\n".join(each.get_text() for each in said if each)
+
+
+def test_triangles_fill_the_regions_and_nothing_else(sample: Results) -> None:
+    found = triangulate(sample.elements, FINITE, make_view(sample))
+    assert found.areas.min() > 0
+    region = found.region[found.corners]
+    assert (region == region[:, :1]).all()
+    areas = np.bincount(region[:, 0], found.areas)
+    np.testing.assert_allclose(areas, [2.0, 2.0 - np.pi * 0.04], rtol=1e-3)
+    # By the winding numbers of the exact boundary, arcs included.
+    location = locate_points(MESH, [False, False], found.position[found.corners].mean(axis=1))
+    np.testing.assert_array_equal(location.region, region[:, 0])
+    np.testing.assert_allclose(found.weights.sum(), found.areas.sum(), rtol=1e-12)
+
+
+def test_vertices_on_the_boundary_are_where_their_faces_are(sample: Results) -> None:
+    found = triangulate(sample.elements, FINITE, make_view(sample))
+    on = found.face[:, 0] >= 0
+    assert on.sum() > 100
+    for side in (0, 1):
+        places = sample.elements.geometry.select(found.face[on, side]).place(found.s[on, side, None])[:, 0]
+        np.testing.assert_allclose(places, found.position[on], atol=1e-9)
+        np.testing.assert_array_equal(sample.elements.region[found.face[on, side]], found.region[on])
+
+
+def list_pairs_on_crack(triangles: Triangles, crack: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Vertices at the same place that are on faces of cracks."""
+    on = np.flatnonzero((triangles.face[:, 0] >= 0) & crack[triangles.face[:, 0]])
+    place = np.round(triangles.position[on], 9)
+    return [on[place == each] for each in np.unique(place)]
+
+
+def test_no_triangle_crosses_a_crack_and_both_sides_have_vertices(sample: Results) -> None:
+    found = triangulate(sample.elements, FINITE, make_view(sample))
+    start, end = 0.3 + 0.3j, 1.5 + 0.6j
+    along = (found.position[found.corners] - start) / (end - start)
+    beside = (along.real > 1e-6) & (along.real < 1 - 1e-6) & (np.abs(along.imag) > 1e-9)
+    for low, high in ((0, 1), (1, 2), (2, 0)):
+        crosses = (along.imag[:, low] * along.imag[:, high] < 0) & beside[:, low] & beside[:, high]
+        assert not crosses.any()
+    places = list_pairs_on_crack(found, sample.elements.crack)
+    tips = np.flatnonzero(found.find_tips(sample.elements))
+    np.testing.assert_allclose(np.sort_complex(found.position[tips]), [start, end], atol=1e-12)
+    assert sorted(len(each) for each in places) == [1, 1] + [2] * (len(places) - 2)
+    assert len(places) >= 13
+
+
+def test_a_touching_crack_and_a_hole_in_an_infinite_plane(griffith: Results) -> None:
+    found = triangulate(griffith.elements, np.array([True]), make_view(griffith))
+    box = choose_box(griffith)
+    places = to_columns(found.position)
+    assert (places.min(axis=0) <= box.low).all() and (places.max(axis=0) >= box.high).all()
+    np.testing.assert_allclose(found.areas.sum(), np.ptp(places, axis=0).prod(), rtol=1e-12)
+
+
+def test_both_sides_of_a_crack_have_their_own_values(griffith: Results) -> None:
+    picture = FieldPicture(griffith, "uy", FieldOptions(), [0])
+    values, triangles = picture.values(0), picture.triangles
+    # Opening of Griffith's crack: 4/E' sqrt(a^2 - x^2) under unit stress.
+    plane_modulus = griffith.tips["crack"].plane_modulus
+    for both in list_pairs_on_crack(triangles, griffith.elements.crack):
+        x = triangles.position[both[0]].real
+        opening = 4 / plane_modulus * np.sqrt(max(1 - x**2, 0.0))
+        assert np.ptp(values[both]) == pytest.approx(opening, abs=0.02 * 4 / plane_modulus)
+        assert len(both) == (1 if abs(x) == 1 else 2)
+
+
+def test_values_are_those_of_the_field_and_the_extremes_are_marked(griffith: Results) -> None:
+    picture = FieldPicture(griffith, "syy", FieldOptions(), [0])
+    triangles, values = picture.triangles, picture.values(0)
+    inside = np.flatnonzero(triangles.face[:, 0] < 0)[::7]
+    expected = griffith.evaluate(to_columns(triangles.position[inside])).stress[0, :, 1]
+    np.testing.assert_allclose(values[inside], expected, rtol=1e-10, atol=1e-12)
+    box = choose_box(griffith)
+    shown = box.contains(to_columns(triangles.position)) & ~triangles.find_tips(griffith.elements)
+    figure = picture.draw(0)
+    said = list_notes(figure)
+    assert f"max {format_number(float(values[shown].max()))}" in said
+    assert f"min {format_number(float(values[shown].min()))}" in said
+    marks = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    for name, which in (("_max", np.argmax), ("_min", np.argmin)):
+        place = triangles.position[shown][which(values[shown])]
+        assert complex(marks[name].get_xdata()[0], marks[name].get_ydata()[0]) == place
+    assert "max at a crack tip, where stress may be infinite" in said
+    # The colours end before the values, and the picture says so.
+    high = figure.axes[0].collections[0].get_clim()[1]
+    assert high < values[shown].max()
+    assert "colours end before the values" in said
+    assert format_number(float(values[shown].max())) in said.split("colours end")[1]
+
+
+def test_formulas_of_fields() -> None:
+    random = np.random.default_rng(5)
+    u, s = random.normal(size=(9, 2)), random.normal(size=(9, 4))
+    tensor = np.array([[[xx, xy, 0], [xy, yy, 0], [0, 0, zz]] for xx, yy, xy, zz in s])
     plane = np.linalg.eigvalsh(tensor[:, :2, :2])
     deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     expected = {
-        "ux": y, "uy": x**2, "u": np.hypot(y, x**2), "sxx": x, "syy": syy, "sxy": 2 + 0 * x,
+        "ux": u[:, 0], "uy": u[:, 1], "u": np.hypot(*u.T), "sxx": s[:, 0], "syy": s[:, 1], "sxy": s[:, 2],
         "s1": plane[:, 1], "s2": plane[:, 0], "shear": 0.5 * (plane[:, 1] - plane[:, 0]),
         "mises": np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2))),
     }  # fmt: skip
-    assert set(expected) == set(FIELDS) == set(pbem.cli.FIELDS)
-    there = REGION >= 0
+    assert set(expected) == set(FIELDS) == set(pbem.plot_command.FIELDS)
     for name, values in expected.items():
-        found = evaluate_field(results, name, 0)
-        assert np.isnan(found[~there]).all()
-        np.testing.assert_allclose(found[there], values[there], rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(FIELDS[name][2](u, s), values, rtol=1e-12)
 
 
-def test_a_grid_becomes_a_map_and_the_rest_dots(tmp_path: Path) -> None:
-    figure = draw_field(write_results(tmp_path / "a.h5"), "uy")
-    axes = figure.axes[0]
-    (image,) = [each for each in axes.collections if isinstance(each, QuadMesh)]
-    values = np.ma.getdata(image.get_array()).reshape(4, 5)
-    hidden = np.ma.getmaskarray(image.get_array()).reshape(4, 5)
-    np.testing.assert_allclose(values[~hidden], (X**2)[~hidden])
-    assert np.argwhere(hidden).tolist() == [[0, 3]]
-    (dots,) = [each for each in axes.collections if isinstance(each, PathCollection)]
-    np.testing.assert_allclose(dots.get_offsets(), POINTS[-2:])
-    np.testing.assert_allclose(dots.get_array(), POINTS[-2:, 0] ** 2)
-    assert figure.axes[1].get_ylabel() == "$u_y$ (m)"
-    assert axes.get_title(loc="left") == "Made-up blocks\nstep 6 (shear, factor 1)"
+def test_colours_are_cut_for_singular_values_only() -> None:
+    values = np.concatenate([np.linspace(0, 1, 1000), [1.6]])
+    weights = np.ones(len(values))
+    regular, singular = (limit_field(values, weights, lambda number, told=told: told) for told in (False, True))
+    assert (regular.low, regular.high) == (0.0, 1.6)
+    assert regular.describe_cut("x") == ""
+    assert singular.high == pytest.approx(1 - CUT, abs=2e-3)
+    assert singular.describe_cut("x") == "cut off: x reaches 1.6"
+    # Far beyond all the rest, it is left out wherever it is.
+    assert limit_field(np.append(values, 50.0), np.ones(len(values) + 1), lambda number: False).high < 2
+    constant = limit_field(np.full(5, 3.0), np.ones(5), lambda number: True)
+    assert (constant.low, constant.high) == (3.0, 3.0)
 
 
-def test_signed_fields_have_white_at_zero(tmp_path: Path) -> None:
-    results = write_results(tmp_path / "a.h5")
-    found = {}
-    for field in ("sxx", "syy"):
-        image = next(each for each in draw_field(results, field).axes[0].collections if isinstance(each, QuadMesh))
-        found[field] = image.get_cmap().name, image.get_clim()
-    assert found["sxx"][0] == "viridis"
-    name, (low, high) = found["syy"]
-    assert name == "RdBu_r"
-    assert low == -high < -0.8
+def test_displaced_pictures_and_parts(griffith: Results) -> None:
+    figure = draw_field(griffith, "uy", options=FieldOptions(displaced=True, magnify=100.0))
+    assert "displacements × 100" in list_notes(figure)
+    picture = FieldPicture(griffith, "uy", FieldOptions(box=(0.5, -0.25, 1.5, 0.25)), [0])
+    figure = picture.draw(0)
+    assert figure.axes[0].get_xlim() == (0.5, 1.5) and figure.axes[0].get_ylim() == (-0.25, 0.25)
+    assert "part from (0.5, \N{MINUS SIGN}0.25) to (1.5, 0.25)" in list_notes(figure)
+    places = to_columns(picture.triangles.position[picture.triangles.corners])
+    assert (places.max(axis=1)[:, 0] >= 0.5).all() and (places.min(axis=1)[:, 0] <= 1.5).all()
+    fine = FieldPicture(griffith, "uy", FieldOptions(box=(0.5, -0.25, 1.5, 0.25), shape=(100, 50)), [0])
+    assert len(fine.triangles.corners) > 1.5 * len(picture.triangles.corners)
 
 
-def test_grids_are_found_at_the_beginning_of_the_points() -> None:
-    assert find_grid(POINTS) == (5, 4)
-    assert find_grid(GRID) == (5, 4)
-    assert find_grid(GRID[::-1]) == (5, 4)
-    assert find_grid(GRID[:7]) is None
-    assert find_grid(GRID[:10]) == (5, 2)
-    assert find_grid(np.random.default_rng(1).normal(size=(30, 2))) is None
-    assert find_grid(GRID[:5]) is None
-    assert find_grid(np.zeros((0, 2))) is None
+def test_wrong_fields_and_boxes(sample: Results, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"no field 'mise'; did you mean 'mises'\?; there are: ux"):
+        draw_field(sample, "mise")
+    with pytest.raises(ValueError, match="shows nothing: the model reaches from x 0 to 2 and from y 0 to 2"):
+        draw_field(sample, "ux", options=FieldOptions(box=(5, 5, 6, 6)))
+    with pytest.raises(ValueError, match="has no size"):
+        draw_field(sample, "ux", options=FieldOptions(box=(0, 0, 0, 1)))
+    with pytest.raises(ResultFileError, match="holds no load step"):
+        draw_field(write_results(tmp_path / "b.h5", steps=0), "ux")
+    with pytest.raises(IndexError):
+        draw_field(sample, "ux", step=6)
 
 
-@pytest.mark.parametrize("ending", ["png", "pdf"])
-def test_maps_are_written(tmp_path: Path, ending: str) -> None:
-    results = write_results(tmp_path / "a.h5", POINTS[-2:])
-    plot_field(results, "mises", tmp_path / f"a.{ending}")
+@pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
+def test_maps_are_written(griffith: Results, tmp_path: Path, ending: str) -> None:
+    plot_field(griffith, "mises", tmp_path / f"a.{ending}", options=FieldOptions(shape=(12, 12)))
     assert (tmp_path / f"a.{ending}").stat().st_size > 5000
 
 
-def test_the_command_line_draws_fields(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_results(tmp_path / "a.h5")
-    assert pbem.cli.main(["plot", str(tmp_path / "a.h5"), "--field", "syy"]) == 0
-    assert (tmp_path / "a_syy.png").stat().st_size > 5000
-    assert pbem.cli.main(["plot", str(tmp_path / "a.h5"), "--field", "szz"]) == 2
-    assert "invalid choice: 'szz'" in capsys.readouterr().err
-
-
-def test_a_file_without_interior_points_says_how_to_get_them(tmp_path: Path) -> None:
-    model = make_model()
-    with ResultWriter(tmp_path / "a.h5", model, make_mesh(model), 1, "") as writer:
-        writer.append(make_steps(model, make_mesh(model))[0])
-    results = open_results(tmp_path / "a.h5")
-    assert results.interior is None
-    with pytest.raises(ResultFileError, match="interior = "):
-        draw_field(results, "sxx")
+def test_units_from_small_to_large_have_few_ticks(tmp_path: Path) -> None:
+    for scale in (1e-9, 1e9):
+        model = make_plane((0.0, 1.0, 0.0), {"crack": [make_straight(-scale, scale, 4)]})
+        mesh, steps = solve(model)
+        with ResultWriter(tmp_path / f"{scale}.h5", replace(model, units_length="m"), mesh, 1, "") as writer:
+            writer.append(steps[-1])
+        with style():
+            figure = draw_field(open_results(tmp_path / f"{scale}.h5"), "syy", options=FieldOptions(shape=(12, 12)))
+            figure.canvas.draw()
+        axes = figure.axes[0]
+        for axis in (axes.xaxis, axes.yaxis):
+            texts = [re.sub(r"[^0-9.]", "", each.get_text()) for each in axis.get_ticklabels()]
+            assert 3 <= len(texts) <= 9 and max(map(len, texts)) <= 5
+            assert r"10" in axis.get_offset_text().get_text()

@@ -1,0 +1,81 @@
+"""`results.plot`: a picture of any kind as a matplotlib Figure, or drawn into axes that the caller has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pbem.errors import ResultFileError
+from pbem.results.curve_picture import CurveOptions, CurvePicture, find_curves
+from pbem.results.curve_plot import LINE_STYLES, draw_quantity
+from pbem.results.field_plot import draw_field
+from pbem.results.plot_style import style
+from pbem.results.plots import draw_results
+from pbem.results.reader import Results
+
+ABSCISSAE = ("arc_length", "angle", "x", "y")
+
+
+def plot(
+    results: Results, *, curve: str | Sequence[str] | None = None, field: str | Sequence[str] | None = None,
+    step: int = -1, x: str = "arc_length", xlim: tuple[float, float] | None = None,
+    ylim: tuple[float, float] | None = None, ax: Axes | None = None, **how: Any,
+) -> Figure:
+    """Without options the bodies; field alone: a map of it; curve: quantities along an interface, crack or outer curve.
+
+    curve: a name, or several. field: of a map ux, uy, u, sxx, syy, sxy, s1, s2, shear or mises; along a curve opening,
+    slip, traction_n, traction_s, a variable of the law, or of the nodes ux, uy, u, tx, ty, normal, shear, hoop; several
+    as a list. step: place of a stored step, negative from the end. x: arc_length, angle (about a circle's centre), x or
+    y. xlim, ylim: of the axes. ax: axes to draw into, of which the figure is returned. how: of the lines along a curve
+    in given axes, as `pbem.results.curve_plot.draw_quantity` takes them (line, color, marks, text).
+
+    Raises ValueError for no such curve, field or x, IndexError for no such step, ResultFileError if none is stored.
+    """
+    if not len(results.steps):
+        raise ResultFileError(str(results.path), "holds no load step yet")
+    at = results.choose_steps(step)[0]
+    if x not in ABSCISSAE:
+        raise ValueError(f"x: found {x!r}; expected one of {', '.join(ABSCISSAE)}")
+    if ax is not None and not isinstance(ax, Axes):
+        raise ValueError(f"ax: found an object of type {type(ax).__name__}; expected axes of matplotlib")
+    _refuse_unused(curve, ax, xlim, ylim, x, how)
+    with style():
+        if curve is not None:
+            names = [curve] if isinstance(curve, str) else list(curve)
+            fields = [field] if isinstance(field, str) else None if field is None else list(field)
+            return _plot_curves(results, find_curves(results, names), fields, at, x, xlim, ylim, ax, how)
+        if isinstance(field, str):
+            return draw_field(results, field, at, axes=ax)
+        if field is not None:
+            raise ValueError("field: found a list; a map shows one field, with curve= several quantities are drawn")
+        if ax is not None:
+            raise ValueError("ax: the picture of the bodies has axes of its own; give curve=, field= or both")
+        return draw_results(results, at)
+
+
+def _refuse_unused(curve: Any, ax: Any, xlim: Any, ylim: Any, x: str, how: dict[str, Any]) -> None:
+    """Raise ValueError for options that would not do anything."""
+    if curve is None:
+        given = {"xlim": xlim is not None, "ylim": ylim is not None, "x": x != "arc_length"} | dict.fromkeys(how, True)
+    else:
+        given = dict.fromkeys(how, True) if ax is None else {}
+    unused = [name for name, there in given.items() if there]
+    if unused:
+        need = "curve=" if curve is None else "ax="
+        raise ValueError(f"{', '.join(unused)}: only together with {need}")
+
+
+def _plot_curves(
+    results: Results, names: list[str], fields: list[str] | None, at: int, x: str,
+    xlim: tuple[float, float] | None, ylim: tuple[float, float] | None, ax: Axes | None, how: dict[str, Any],
+) -> Figure:
+    if ax is None:
+        return CurvePicture(results, names, CurveOptions(fields, x, xlim, ylim), [at]).draw(at)
+    drawn = [(name, each) for name in names for each in fields or ["slip" if name in results.contact else "u"]]
+    for number, (name, each) in enumerate(drawn):
+        words = {"text": f"{name}: {each}" if len(names) > 1 else "", "line": LINE_STYLES[number % len(LINE_STYLES)]}
+        draw_quantity(ax, results, name, each, at, x, xlim=xlim, ylim=ylim, **(words | how))
+    return ax.figure

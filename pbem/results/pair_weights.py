@@ -1,0 +1,45 @@
+"""What integrates quantities of contact pairs along their curves: the quadrature of the elements that carry them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pbem.arrays import Real
+from pbem.mesh.shape_functions import integrate_shapes, tip_shapes
+from pbem.results.contents import Elements
+
+# Jumps, which vanish at the tips of cracks like the root of the distance.
+JUMPS = ("opening", "slip")
+
+
+def weigh_pairs(elements: Elements, position: Real, order: int, pairs: Real) -> tuple[Real, Real]:
+    """Weights (m,) of tractions and of jumps at the pairs' places (m, 2): lengths.
+
+    position (n, 2): of the nodes, element after element. A pair lies on a node of either of its sides. Beside the tip
+    of a crack jumps have the square-root shape.
+    """
+    if not len(pairs):
+        return np.zeros(0), np.zeros(0)
+    plain, rooted = _weigh_nodes(elements, position, order)
+    _, node = cKDTree(position).query(pairs)
+    return plain[node], rooted[node]
+
+
+def _weigh_nodes(elements: Elements, position: Real, order: int) -> tuple[Real, Real]:
+    count = len(elements.vertices)
+    places = (position @ np.array([1, 1j])).reshape(count, order + 1)
+    local = elements.geometry.preimage(places).real
+    kinds, kind = np.unique(np.round(local, 6), axis=0, return_inverse=True)
+    stretch = elements.geometry.stretch(local)
+    plain, rooted = np.empty_like(stretch), np.empty_like(stretch)
+    integrals = 1 / (np.arange(order + 1) + 1.5)
+    length = elements.geometry.lengths
+    for number, nodes in enumerate(kinds):
+        own = kind.ravel() == number
+        plain[own] = stretch[own] * integrate_shapes(nodes)
+        rooted[own] = plain[own]
+        for end, shapes in enumerate(tip_shapes(tuple(nodes)) if elements.tip[own].any() else ()):
+            there = own & (elements.tip == end + 1)
+            rooted[there] = length[there, None] * (integrals @ shapes)
+    return plain.ravel(), rooted.ravel()

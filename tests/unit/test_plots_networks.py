@@ -1,0 +1,116 @@
+"""Networks: traces coloured by what they do, their orientations, names of traces and pieces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+from pbem.results.animation import animate
+from pbem.results.page import Page
+from pbem.results.plots import BodyOptions, BodyPicture
+from pbem.results.reader import Results, open_results
+from pbem.results.trace_names import find_names, name_trace
+from pbem.results.trace_plot import (
+    BINS,
+    TRACES,
+    RosePicture,
+    TraceOptions,
+    TracePicture,
+    list_segments,
+    plot_traces,
+    sum_orientations,
+)
+from pbem.results.writer import ResultWriter
+from tests.unit.results_sample import make_mesh, make_model, make_steps
+
+MODEL = make_model(cracks=7)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    path = tmp_path_factory.mktemp("network") / "a.h5"
+    mesh = make_mesh(MODEL)
+    with ResultWriter(path, MODEL, mesh, 1, "") as writer:
+        for step in make_steps(MODEL, mesh):
+            writer.append(step)
+    return open_results(path)
+
+
+def test_segments_are_as_long_as_the_curves(results: Results) -> None:
+    segments, lengths = list_segments(results)
+    owner = results.pairs.interface
+    for number, name in enumerate(results.pairs.names):
+        assert lengths[owner == number].sum() == pytest.approx(MODEL.curves[name].length, rel=1e-9)
+        own = segments[owner == number]
+        np.testing.assert_allclose(own[1:, 0], own[:-1, 2], atol=1e-14)
+        ends = np.array([MODEL.curves[name].start, MODEL.curves[name].end])
+        np.testing.assert_allclose(own[[0, -1], [0, 2]] @ [1, 1j], ends, atol=1e-12)
+
+
+@pytest.mark.parametrize("quantity", TRACES)
+def test_traces_have_the_values_of_their_pairs(results: Results, quantity: str, tmp_path: Path) -> None:
+    figure = TracePicture(results, quantity, TraceOptions(labels=["crack3"]), [5]).draw(5)
+    lines = [each for each in figure.axes[0].collections if isinstance(each, LineCollection)][1:]
+    assert [text.get_text() for text in figure.axes[0].texts] == ["crack3"]
+    if quantity == "status":
+        counts = [(results.pairs.at("mode", 5) == which).sum() for which in (0, 1, 2)]
+        assert sorted(len(each.get_segments()) for each in lines) == sorted(count for count in counts if count)
+        return
+    values = results.pairs.at(quantity, 5)
+    expected = np.abs(values) if quantity in ("slip", "traction_s") else values
+    np.testing.assert_allclose(np.sort(lines[0].get_array()), np.sort(expected))
+    assert lines[0].get_array().shape == (results.pairs.count,)
+
+
+def test_a_picture_of_traces_is_written(results: Results, tmp_path: Path) -> None:
+    plot_traces(results, "slip", str(tmp_path / "a.pdf"))
+    assert (tmp_path / "a.pdf").stat().st_size > 5000
+    with pytest.raises(ValueError, match="no traces by 'slipp'; did you mean 'slip'"):
+        plot_traces(results, "slipp", str(tmp_path / "a.pdf"))
+
+
+def test_orientations_sum_up_to_all(results: Results) -> None:
+    found = sum_orientations(results, 5)
+    _, lengths = list_segments(results)
+    assert found.length.sum() == pytest.approx(lengths.sum())
+    assert found.slip.sum() == pytest.approx((lengths * np.abs(results.pairs.at("slip", 5))).sum())
+    expected = np.zeros(BINS)
+    for name in results.contact:
+        along = MODEL.curves[name].end - MODEL.curves[name].start
+        expected[int(np.degrees(np.angle(along)) % 180 // (180 / BINS))] += MODEL.curves[name].length
+    assert (expected > 0).sum() == 2
+    np.testing.assert_allclose(found.length, expected, rtol=1e-9, atol=1e-12)
+    figure = RosePicture(results, Page(), [5]).draw(5)
+    bars = figure.axes[1].patches[:BINS]
+    np.testing.assert_allclose([bar.get_height() for bar in bars], found.slip)
+
+
+def test_names_stand_for_traces_pieces_and_patterns() -> None:
+    known = ["t1", "t12.1", "t12.2", "t2.5a", "seat"]
+    assert [name_trace(name) for name in known] == ["t1", "t12", "t12", "t2.5a", "seat"]
+    assert find_names(["t12", "t1", "t12.2", "s*"], known) == {
+        "t12": ["t12.1", "t12.2"], "t1": ["t1"], "t12.2": ["t12.2"], "s*": ["seat"],
+    }  # fmt: skip
+    with pytest.raises(ValueError, match=r"'t13'; did you mean .*; there is no .* 'seet'; did you mean"):
+        find_names(["t13", "seet"], known)
+
+
+def test_animations_have_a_frame_for_each_step(results: Results, tmp_path: Path) -> None:
+    from PIL import Image
+
+    steps = list(range(len(results.steps)))
+    page = Page(width=8.6, dpi=40)
+    animate(TracePicture(results, "slip", TraceOptions(page=page), steps), steps, tmp_path / "a.gif", page)
+    with Image.open(tmp_path / "a.gif") as movie:
+        assert movie.n_frames == len(steps) == 6
+        assert movie.info["duration"] == 500
+
+
+def test_all_frames_have_the_same_limits(results: Results) -> None:
+    picture = BodyPicture(results, BodyOptions(interfaces=["joint"]), [1, 5])
+    frames = [picture.draw(step) for step in (1, 5)]
+    for first, last in zip(*(figure.axes for figure in frames), strict=True):
+        assert first.get_xlim() == last.get_xlim() and first.get_ylim() == last.get_ylim()

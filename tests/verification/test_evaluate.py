@@ -1,0 +1,190 @@
+"""Fields evaluated after a run, against closed-form fields; where points lie; what needs the result file alone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pbem
+import pbem.results.evaluation
+from pbem.exact import griffith_field, kirsch_field
+from pbem.results.reader import Results, open_results
+from tests.cli.cli_sample import BLOCKS
+from tests.verification.planes import ROCK
+
+Real = NDArray[np.float64]
+MATERIALS = {"rock": {"young": ROCK.young, "poisson": ROCK.poisson}}
+
+
+def run(path: Path, **tables: object) -> Results:
+    return pbem.run({"materials": MATERIALS, "analysis": {"steps": 1}, **tables}, path)
+
+
+@pytest.fixture(scope="module")
+def kirsch(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    return run(
+        tmp_path_factory.mktemp("kirsch") / "kirsch.h5",
+        curves={"hole": {"center": [300.0, -100.0], "radius": 2.0, "elements": 16}},
+        regions={"plane": {"material": "rock", "infinite": True, "boundary": ["hole"]}}, remote={"sxx": 1.0},
+    )
+
+
+@pytest.fixture(scope="module")
+def griffith(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    return run(
+        tmp_path_factory.mktemp("griffith") / "griffith.h5",
+        curves={"crack": {"points": [[-1, 0], [1, 0]], "elements": 8}},
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}}, remote={"syy": 1.0},
+    )
+
+
+@pytest.fixture(scope="module")
+def blocks(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """Two blocks on a joint that slips."""
+    folder = tmp_path_factory.mktemp("blocks")
+    (folder / "blocks.toml").write_text(BLOCKS)
+    return pbem.run(folder / "blocks.toml", folder / "blocks.h5")
+
+
+def to_points(places: NDArray[np.complex128]) -> Real:
+    return np.column_stack([places.real, places.imag])
+
+
+@pytest.mark.parametrize("distance", [0.05, 0.3, 0.0])
+def test_stress_beside_a_hole(kirsch: Results, distance: float) -> None:
+    around = np.exp(1j * np.linspace(0, 2 * np.pi, 301))
+    places = (1 + distance * 2 * np.pi / 16) * around
+    found = kirsch.evaluate(to_points(300 - 100j + 2 * places))
+    exact = kirsch_field(ROCK.kappa, ROCK.shear_modulus, 1.0, 1.0)
+    stress = exact.stress(places).T
+    # On the hole itself it is that of the nodes' values, which are not as good.
+    tolerance = 1e-3 if distance else 3e-3
+    assert np.abs(found.stress[0] - stress).max() < tolerance * np.abs(stress).max()
+    assert (found.region == "plane").all() and found.on_boundary.all() == (distance == 0)
+    moved = found.displacement[0] @ [1, 1j] / 2
+    shift = (moved - exact.displacement(places)).mean()  # the hole's middle does not move
+    assert np.abs(moved - shift - exact.displacement(places)).max() < 1e-3 * np.abs(moved).max()
+
+
+def test_stress_beside_a_crack(griffith: Results) -> None:
+    start, end = griffith.elements.vertices[:8, 0, 0], griffith.elements.vertices[:8, 1, 0]
+    s = np.linspace(0, 1, 41)[:, None]
+    beside = start + s * (end - start) + 0.05j * (end - start)
+    places = np.concatenate([beside, np.conj(beside)]).ravel()
+    found = griffith.evaluate(to_points(places), steps=[-1])
+    exact = griffith_field(ROCK.kappa, ROCK.shear_modulus, 1.0, 1.0)
+    stress = exact.stress(places).T
+    assert np.abs(found.stress[0] - stress).max() < 1e-3 * np.abs(stress).max()
+    moved = found.displacement[0] @ [1, 1j]
+    assert np.abs(moved - exact.displacement(places)).max() < 1e-3 * np.abs(moved).max()
+
+
+def test_tips_and_sides_of_a_crack(griffith: Results) -> None:
+    points = [[-1.0, 0.0], [1.0, 0.0], [0.3, 0.0]]
+    first, second = (griffith.evaluate(points, side=side) for side in ("first", "second"))
+    assert np.isnan(first.stress[0, :2]).all() and np.isfinite(first.displacement).all()
+    np.testing.assert_allclose(first.stress[0, 2], [-1, 0, 0], atol=5e-3)
+    opening = first.displacement[0, 2, 1] - second.displacement[0, 2, 1]  # the first face is the one above
+    expected = 4 / ROCK.plane_modulus * np.sqrt(1 - 0.3**2)
+    assert opening == pytest.approx(expected, rel=1e-3)
+    np.testing.assert_allclose(first.displacement[0, :2], second.displacement[0, :2], atol=1e-3 * expected)
+
+
+def test_points_outside_are_named_nothing(kirsch: Results) -> None:
+    found = kirsch.evaluate([[300.0, -100.0], [np.nan, 0.0], [310.0, -100.0]])
+    assert found.region.tolist() == ["", "", "plane"]
+    assert np.isnan(found.displacement[0, :2]).all() and np.isnan(found.stress[0, :2]).all()
+    assert np.isfinite(found.stress[0, 2]).all()
+    none = kirsch.evaluate(np.zeros((0, 2)))
+    assert none.displacement.shape == (1, 0, 2) and none.stress.shape == (1, 0, 3)
+
+
+def test_both_sides_of_an_interface(blocks: Results) -> None:
+    seat = blocks.contact["joint"]
+    at = int(np.argmax(np.abs(seat.slip[-1])))
+    first, second = (blocks.evaluate(seat.position[at], [-1], side=side) for side in ("first", "second"))
+    assert {first.region[0], second.region[0]} == {seat.first, seat.second} and first.region[0] == seat.first
+    s = seat.normal[at] @ [[0, 1], [-1, 0]]
+    jump = second.displacement[0, 0] - first.displacement[0, 0]
+    assert jump @ s == pytest.approx(seat.slip[-1, at], rel=1e-9)
+    pressed = np.array([[first.stress[0, 0, 0], first.stress[0, 0, 2]], [first.stress[0, 0, 2], first.stress[0, 0, 1]]])
+    assert seat.normal[at] @ pressed @ seat.normal[at] == pytest.approx(seat.traction_n[-1, at], rel=1e-9)
+
+
+def test_evaluated_as_during_the_run(tmp_path: Path) -> None:
+    # Weight, in-situ stress, several steps, far from the origin; the run's own interior points are the other way.
+    results = pbem.run(
+        {
+            "materials": {"rock": MATERIALS["rock"] | {"density": 2.0}},
+            "curves": {name: {"points": [[x0 + 4e4, y0], [x1 + 4e4, y1]], "elements": 8} for name, x0, y0, x1, y1 in
+                       (("bottom", 0, 0, 2, 0), ("right", 2, 0, 2, 1), ("top", 2, 1, 0, 1), ("left", 0, 1, 0, 0))},
+            "regions": {"body": {"material": "rock", "boundary": ["bottom", "right", "top", "left"]}},
+            "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"ty": -1.0}},
+            "initial_stress": {"rock": {"sxx": -0.3, "syy": -0.2}}, "gravity": {"gy": -0.5},
+            "analysis": {"steps": 3},
+            "output": {"points": [[4e4 + 0.4, 0.5], [4e4 + 1.3, 0.7], [4e4 + 1.0, 1.0], [3e4, 0.0]]},
+        },
+        tmp_path / "body.h5",
+    )
+    assert results.interior is not None
+    found = results.evaluate(results.interior.position)
+    inner = [0, 1]
+    for ours, stored in ((found.stress, results.interior.stress), (found.displacement, results.interior.displacement)):
+        largest = np.nanmax(np.abs(stored))
+        np.testing.assert_allclose(ours[:, inner], stored[:, inner], atol=2e-4 * largest)
+        np.testing.assert_allclose(ours[:, 2:], stored[:, 2:], atol=1e-8 * largest)
+    chosen = results.evaluate(results.interior.position, steps=[2, 0])
+    assert chosen.steps.tolist() == [3, 1]
+    np.testing.assert_array_equal(chosen.stress, found.stress[[2, 0]])
+
+
+def test_trees_give_what_every_element_gives(griffith: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-2, 2, (300, 2))
+    direct = griffith.evaluate(points)
+    monkeypatch.setattr(pbem.results.evaluation, "DIRECT", 0)
+    trees = griffith.evaluate(points)
+    assert np.abs(trees.stress - direct.stress).max() < 1e-6 * np.abs(direct.stress).max()
+    assert np.abs(trees.displacement - direct.displacement).max() < 1e-6 * np.abs(direct.displacement).max()
+
+
+def test_needs_the_file_alone_and_no_mpi(griffith: Results, tmp_path: Path) -> None:
+    copy = tmp_path / "alone.h5"
+    copy.write_bytes(griffith.path.read_bytes())
+    code = (
+        "import sys, pbem; r = pbem.open_results(sys.argv[1]); print(*r.evaluate([[0, 2.0]]).stress[0, 0]);"
+        "assert not {'mpi4py', 'petsc4py'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(copy)], capture_output=True, text=True, timeout=60,
+                          cwd=Path(__file__).resolve().parents[2])
+    assert done.returncode == 0, done.stderr
+    expected = griffith_field(ROCK.kappa, ROCK.shear_modulus, 1.0, 1.0).stress(np.array([2j])).T[0]
+    np.testing.assert_allclose([float(word) for word in done.stdout.split()], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(("points", "options", "kind", "said"), [
+    ([1.0, 2.0, 3.0], {}, ValueError, r"expected shape \(q, 2\)"),
+    ("here", {}, ValueError, "expected numbers"),
+    ([[0, 2.0]], {"steps": [4]}, IndexError, "no stored step at place 4; 1 are stored"),
+    ([[0, 2.0]], {"steps": "last"}, ValueError, "expected places of stored steps"),
+    ([[0, 2.0]], {"side": "third"}, ValueError, "expected one of first, second"),
+])  # fmt: skip
+def test_wrong_arguments_are_named(griffith: Results, points: object, options: dict, kind: type, said: str) -> None:
+    with pytest.raises(kind, match=said):
+        griffith.evaluate(points, **options)  # type: ignore[arg-type]
+
+
+def test_files_without_configuration_are_refused(griffith: Results, tmp_path: Path) -> None:
+    import h5py
+
+    old = tmp_path / "old.h5"
+    old.write_bytes(griffith.path.read_bytes())
+    with h5py.File(old, "a") as file:
+        del file.attrs["configuration"]
+    with pytest.raises(pbem.ResultFileError, match="older version"):
+        open_results(old).evaluate([[0, 2.0]])

@@ -118,7 +118,8 @@ def _read_model(stored: Mapping[str, Any]) -> Model:
 def _read_stress(stored: Any) -> LinearStress:
     if isinstance(stored, list):  # of earlier versions, uniform
         return LinearStress((stored[0], stored[1], stored[2]))
-    return LinearStress(*(tuple(stored[key]) for key in ("value", "by_x", "by_y")), _read_point(stored["center"]))
+    value, by_x, by_y = (tuple(stored[key]) for key in ("value", "by_x", "by_y"))
+    return LinearStress(value, by_x, by_y, _read_point(stored["center"]))
 
 
 def _read_swelling(stored: Mapping[str, Any]) -> Swelling:

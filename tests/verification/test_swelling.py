@@ -46,6 +46,9 @@ def test_heated_inclusion(center: complex, radius: float, order: int, operator: 
     np.testing.assert_allclose(stress[-1][0], [-pressure, -pressure, 0], atol=accuracy)
     np.testing.assert_allclose(stress[-1][1], [pressure / 4, -pressure / 4, 0], atol=accuracy)
     np.testing.assert_allclose(stress[0], 0.5 * stress[1], atol=1e-6 * pressure)
+    after = results.evaluate(results.interior.position)
+    np.testing.assert_allclose(after.stress, stress, atol=accuracy)
+    np.testing.assert_allclose(after.displacement, results.interior.displacement, atol=1e-3 * strain * radius)
     # What swelling does against the pressure is stored, by half of p times the misfit along the circle.
     stored = np.pi * radius**2 * pressure * strain
     assert results.energy.elastic[-1] == pytest.approx(stored, rel=1e-2 if order == 1 else 1e-4)

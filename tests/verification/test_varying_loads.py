@@ -167,6 +167,8 @@ def test_ground_at_rest_does_not_move(origin: complex, unit: float, tmp_path: Pa
     np.testing.assert_allclose(results.interior.stress[-1][0], [0.6 * vertical, vertical, 0.0],
                                atol=1e-8 * abs(vertical))
     assert (results.contact["fault"].mode[-1] == 0).all()
+    after = results.evaluate(results.interior.position)
+    np.testing.assert_allclose(after.stress, results.interior.stress, atol=1e-8 * abs(vertical))
 
 
 def test_ground_that_loses_its_wall_has_the_energy_of_its_field(tmp_path: Path) -> None:

@@ -19,12 +19,14 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
 # Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps.
-STARTED, EVERYWHERE = 145e6, 2300.0
+STARTED, EVERYWHERE = 142e6, 2300.0
 # Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
 # pair changes, and where some do; and how their number grows with that of the ranks.
 AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
 # Of the hierarchical operator near blocks, and groups' inverses, to what is counted; of MUMPS' factors likewise.
 NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
+# Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
+SCATTERED = 1.2
 
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
 # step of the first stage, in which loads grow in proportion; of a step of a further stage.
@@ -112,7 +114,7 @@ def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
         return {"operator": 8 * NEAR_MEMORY * work.entries, "preconditioner": 8 * INVERSES * work.factored,
                 "mesh and vectors": EVERYWHERE * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
-    factors = SPARSE_FACTORS * work.factored if work.sparse else 0.0
+    factors = (SPARSE_FACTORS if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
     copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
     return {
         "operator": 8 * (work.entries + work.besides),

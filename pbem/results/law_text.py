@@ -93,7 +93,7 @@ def name_many(names: Sequence[str], kind: str = "curve") -> str:
         traces.setdefault(find_trace(name), []).append(name)
     traces = {pieces[0] if len(pieces) == 1 else trace: pieces for trace, pieces in traces.items()}
     runs = _join_runs(traces)
-    text = ", ".join(runs[:MOST_NAMES]) + (", ..." if len(runs) > MOST_NAMES else "")
+    text = ", ".join(runs) if len(runs) <= MOST_NAMES else f"{runs[0]}, {runs[1]}, ..."
     pieces = len(names) - len(traces)
     if len(names) == 1 or (len(runs) == len(traces) <= MOST_NAMES and not pieces):
         return text

@@ -18,7 +18,7 @@ from pbem.results.text_tables import count, format_bytes, format_number, section
 
 def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -> str:
     """What `pbem check` prints: bodies, curves with their grading, conditions, interfaces, contacts, laws, loads, size,
-    forecast, notes, and what is probably not meant."""
+    forecast, notes, of which what is probably not meant comes first."""
     made = {name for group in model.groups for name in group.members}
     parts = [
         model.title,
@@ -38,8 +38,8 @@ def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -
         section("load", _describe_loads(model)),
         section("size", [describe_size(model, mesh)]),
         section("forecast", [] if forecast is None else describe_forecast(forecast)),
-        section("notes", shorten([*model.notes, *mesh.notes])),
-        section("probably not meant", shorten(list_doubts(model, mesh))),
+        section("notes", shorten([*(f"Probably not meant: {text}" for text in list_doubts(model, mesh)), *model.notes,
+                                  *mesh.notes])),
     ]
     return "\n\n".join(part for part in parts if part)
 

@@ -209,8 +209,9 @@ def test_resuming_a_file_without_steps_starts_at_the_beginning(tmp_path: Path) -
 
 def test_resuming_refuses_another_case_and_another_mesh(tmp_path: Path) -> None:
     write(tmp_path / "a.h5").finish()
-    with pytest.raises(ResultFileError, match="another case"):
-        ResultWriter.resume(tmp_path / "a.h5", make_model(source="title = 'x'"), MESH, 1, "3.18.5")
+    other = replace(MODEL, source="title = 'x'", output_every=MODEL.output_every + 1)
+    with pytest.raises(ResultFileError, match=r"another case, .*: output_every was \d+ and is \d+;"):
+        ResultWriter.resume(tmp_path / "a.h5", other, MESH, 1, "3.18.5")
     moved = replace(MESH, position=MESH.position + 1e-6)
     with pytest.raises(ResultFileError, match="another mesh"):
         ResultWriter.resume(tmp_path / "a.h5", MODEL, moved, 1, "3.18.5")

@@ -112,8 +112,9 @@ class FieldPicture:
             self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
         # The same for all steps.
         places = [to_columns(self._triangles.position) + self._magnify * each for each in self._values.displacement]
+        # Of an infinite region there is no outline that could be displaced out of the box.
         infinite = bool(read_infinite(results).any())
-        self._frame = widen_box(self._box, places, 0.0 if infinite else 0.03)
+        self._frame = self._box if infinite else widen_box(self._box, places, 0.03)
 
     @property
     def triangles(self) -> Triangles:

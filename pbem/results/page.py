@@ -63,6 +63,8 @@ class Page:
         chosen = self.height or min(height, MOST_HEIGHT)
         figure = Figure(figsize=(width / INCH + NUDGE, chosen / INCH + NUDGE), layout="constrained")
         FigureCanvasAgg(figure)
+        # Powers of ten beside the axes reach a little beyond what the layout knows of.
+        figure.get_layout_engine().set(w_pad=0.06, h_pad=0.08)
         return figure
 
 

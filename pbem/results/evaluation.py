@@ -31,6 +31,8 @@ Side = Literal["first", "second"]
 # More products of points and elements than this are summed by cluster trees, to this relative error.
 DIRECT = 1_000_000
 TOLERANCE = 1e-6
+# Squares of distances to points beyond would be no numbers any more.
+FARTHEST = 1e100
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,9 @@ class Evaluator:
         run, given = self._run, read_points(points)
         mesh, model = run.mesh, run.model
         own = given - model.origin
-        finite = np.isfinite(given)
+        finite = np.abs(given) < FARTHEST
         infinite = np.array([region.infinite for region in model.regions])
-        reach = max(np.abs(given[finite]).max(initial=0.0), abs(model.origin) + run.faces.extent)
+        reach = np.maximum(np.where(finite, np.abs(given), 0.0), abs(model.origin) + run.faces.extent)
         where = find_points(mesh, run.faces, infinite, np.where(finite, own, 0), reach, side == "second")
         where.region[~finite], where.face[~finite] = -1, -1
         location = Location(where.region, where.face, where.s)

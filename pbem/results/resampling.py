@@ -3,7 +3,6 @@
 A run has a polynomial of its own on each element. Where two of them meet they differ a little, and close to a face the
 stress would be that of a dislocation there: the difference over the distance. Between elements of a smooth curve the
 value is read from the nodes of both; each element is then read from its own nodes and the values at its ends.
-(theory, 3)
 """
 
 from __future__ import annotations

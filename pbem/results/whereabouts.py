@@ -36,9 +36,9 @@ class Whereabouts:
 
 
 def find_points(
-    mesh: Mesh, faces: Elements, infinite: Bool, points: Complex, reach: float, second: bool
+    mesh: Mesh, faces: Elements, infinite: Bool, points: Complex, reach: Real, second: bool
 ) -> Whereabouts:
-    """Where points (q,) lie; reach: the largest coordinate that they were given with, which rounds them.
+    """Where points (q,) lie; reach (q,): the largest number in their coordinates, which rounds them.
 
     second: a point on a crack or interface belongs to the second of its sides, else to the first.
     """
@@ -47,7 +47,7 @@ def find_points(
     s = faces.select(face).preimage(points[point, None])[:, 0] if len(face) else np.zeros(0, dtype=complex)
     off = np.maximum(np.abs(s.imag), np.abs(s.real) - 1)
     half = 0.5 * faces.lengths[face]
-    tolerance = np.maximum(TOUCHING, ROUNDINGS * np.finfo(float).eps * reach / half)
+    tolerance = np.maximum(TOUCHING, ROUNDINGS * np.finfo(float).eps * reach[point] / half)
     on = np.full(len(points), -1)
     where = np.zeros(len(points))
     # Sides of the same place: regions by their numbers, of a crack the first face before the second.

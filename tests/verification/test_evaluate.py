@@ -96,8 +96,8 @@ def test_tips_and_sides_of_a_crack(griffith: Results) -> None:
 
 
 def test_points_outside_are_named_nothing(kirsch: Results) -> None:
-    found = kirsch.evaluate([[300.0, -100.0], [np.nan, 0.0], [310.0, -100.0]])
-    assert found.region.tolist() == ["", "", "plane"]
+    found = kirsch.evaluate([[300.0, -100.0], [np.nan, 0.0], [310.0, -100.0], [np.inf, 0.0], [1e300, 0.0], [1e9, 0.0]])
+    assert found.region.tolist() == ["", "", "plane", "", "", "plane"]
     assert np.isnan(found.displacement[0, :2]).all() and np.isnan(found.stress[0, :2]).all()
     assert np.isfinite(found.stress[0, 2]).all()
     none = kirsch.evaluate(np.zeros((0, 2)))

@@ -13,10 +13,10 @@ from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
-    check_closing,
     check_inside,
     check_near_misses,
     check_tip_elements,
+    describe_closing,
     describe_near_misses,
     find_tips,
 )
@@ -133,9 +133,7 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
         faults += find_coincidences(curves, loops, roles)
-        closing, cuts = check_closing(curves, cracks, loops)
-        faults += closing
-        notes += cuts
+        notes += describe_closing(curves, cracks, loops)
     if not faults:
         written = {name for name in curves if case.curves[name].expression}
         seats = split_opposite_ends(curves, loops, roles.contacts, written)

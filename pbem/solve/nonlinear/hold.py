@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
-from pbem.contact.cut_parts import describe_cut_motions
-from pbem.contact.free_motions import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, stick_creeping
+from pbem.contact.free_motions import (
+    CLOSED_AT_LEAST,
+    close_nearest_beside,
+    close_nearest_pairs,
+    stick_calmest_pairs,
+)
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
@@ -85,6 +90,10 @@ class Hold:
         return held
 
     def _choose(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        held = self._hold_bodies(modes, opening, slip, before)
+        return self._hold_parts(held, opening, slip, before)
+
+    def _hold_bodies(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
         if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
@@ -95,18 +104,42 @@ class Hold:
                 return closed
         if before is None or self.count >= MOST_HELD:
             return closed
-        # Pairs that stuck until now and are overloaded say in which sense the body goes on to move.
+        joint = np.where(mesh.pairs.crack, -1, mesh.pairs.interface)
+        overloaded = self._find_overloaded(before, modes)
+        return self._stick(joint, closed, slip, overloaded, lambda trial: not self.find_free(trial))
+
+    def _find_overloaded(self, before: ModeState, modes: ModeState) -> Integer:
+        """Pairs that held a body until now and are overloaded: they say in which sense it goes on to move."""
         overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
-        overloaded = np.intersect1d(overloaded, self.pairs)
+        return np.intersect1d(overloaded, self.pairs)
+
+    def _stick(
+        self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]
+    ) -> ModeState:
         for passed_over in (overloaded, overloaded[:0]):
-            held, pairs = stick_calmest_pairs(
-                mesh, laws, closed, slip, passed_over, lambda trial: not self.find_free(trial)
-            )
+            held, pairs = stick_calmest_pairs(joint, self.problem.laws, modes, slip, passed_over, holds)
             if len(pairs):
                 break
         self.count += 1
         self.pairs = np.union1d(self.pairs, pairs)
         return held
+
+    def _hold_parts(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        """The modes, with pairs sticking or closed where parts that cracks cut off would be free.
+
+        Parts are held one pair at a time, as every one that is closed to hold them can pull at them.
+        """
+        problem, motions = self.problem, self.problem.find_cut_motions(modes)
+        if motions and before is not None and self.count < MOST_HELD:
+            beside = problem.cut.find_beside(motions)
+            overloaded = np.intersect1d(self._find_overloaded(before, modes), np.flatnonzero(beside >= 0))
+            modes = self._stick(beside, modes, slip, overloaded, lambda trial: not problem.find_cut_motions(trial))
+        for _ in range(CLOSED_AT_LEAST):
+            motions = problem.find_cut_motions(modes)
+            if not motions:
+                break
+            modes = close_nearest_beside(problem.laws, modes, opening, problem.cut.find_beside(motions))
+        return modes
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of pairs that hold a body in the end."""
@@ -115,7 +148,7 @@ class Hold:
             return ()
         released = ModeState(modes.mode.copy(), modes.sign)
         released.mode[held] = SLIP
-        free = self.find_free(released)
+        free = self.find_free(released) or "; ".join(each.text for each in self.problem.find_cut_motions(released))
         if not free:
             return ()
         mesh = self.problem.mesh
@@ -131,23 +164,23 @@ class Hold:
         support = self.problem.find_free_motions(modes)
         return (support.text or None) if self.driven else support.unheld
 
-    def _find_cut_motion(self, modes: ModeState) -> str | None:
-        """The motions of parts that cracks cut off, for which there are no anchors."""
-        problem = self.problem
-        if not problem.parts.cut.any():
-            return None
-        modes = stick_creeping(problem.laws, modes)
-        return describe_cut_motions(problem.model, problem.mesh, problem.outer, problem.parts, modes)
+    def leaves_free(self, modes: ModeState) -> bool:
+        """Whether neither pairs nor anchors hold some body, or part of one, in given modes."""
+        return bool(self.find_free(modes) or self.problem.find_cut_motions(modes))
 
     def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:
         """The error that names what can move freely in the present contact; None if nothing can."""
-        free, advice = self.find_free(modes), "hold it by a condition, or use shorter elements where it touches"
-        if not free:
-            free, advice = self._find_cut_motion(modes), "hold it by a condition"
-        if not free:
+        free = self.find_free(modes)
+        if free:
+            advice = "hold it by a condition, or use shorter elements where it touches"
+            return ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; {advice}")
+        motions = self.problem.find_cut_motions(modes)
+        if not motions:
             return None
-        detail = f"nothing in the present contact prevents a {free}; {advice}"
-        return ConvergenceError("free motion", detail)
+        advice = "hold it by a condition"
+        if any(self.problem.parts.block[each.moving].any() for each in motions):
+            advice = "let it touch, or be joined, somewhere: bonds, joints of finite stiffness, other loads"
+        return ConvergenceError("free motion", f"{self.problem.cut.describe(motions)}; {advice}")
 
     def describe_collapse(self, modes: ModeState) -> str:
         """The motions that friction alone prevents in some modes, as the end of a sentence; "" if it prevents none."""

@@ -237,7 +237,7 @@ def _pivot(
             return settle_parts(subset, response, search.proposal.modes, group, judge)
         return settle_subset(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
-            lambda own: not hold.find_free(complete(own)),
+            lambda own: not hold.leaves_free(complete(own)),
         )
 
     found: Settled = problem.decide(settle)

@@ -27,6 +27,8 @@ from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
 
 # Parts move apart if their motions differ by more than this part of a unit motion.
 APART = 1e-6
+# Places nearer to an axis than this part of the part's extent are on it.
+ROUNDED = 1e-9
 # So many motions are named.
 MOST_NAMED = 6
 
@@ -35,8 +37,7 @@ MOST_NAMED = 6
 class CutMotion:
     """A rigid motion in which parts of one region move against each other.
 
-    moving: the parts that move against another part of their region, the one with the most elements left out; text: the
-    motion in words.
+    moving: the parts that move against the largest one of their region that is no block; text: the motion in words.
     """
 
     moving: tuple[int, ...]
@@ -96,12 +97,20 @@ class CutParts:
         beside = np.where(which[self.first] >= 0, which[self.first], which[self.second])
         return np.where(self.mesh.pairs.crack & (self.first != self.second), beside, -1)
 
+    def find_around(self, body: int) -> tuple[Integer, Complex]:
+        """The cracks' pairs (k,) around a part, and the normals into it (k,): along which it moves to open them."""
+        pairs = self.mesh.pairs
+        own = np.flatnonzero(pairs.crack & ((self.first == body) != (self.second == body)))
+        # The normal is outward of the first face, and an opening is the motion of the second one along it.
+        return own, np.where(self.second[own] == body, 1.0, -1.0) * pairs.normal[own]
+
     def _find_moving(self, motion: dict[int, Real]) -> tuple[int, ...]:
-        """The parts that move (3,) against the largest of the other parts of their region."""
+        """The parts that move (3,) against the largest one of their region that is no block."""
         parts, rest, moving = self.parts, np.zeros(3), []
         for region in {int(parts.region[body]) for body in motion if parts.cut[body]}:
             others = np.flatnonzero(parts.region == region)
-            largest = motion.get(int(others[np.argmax(self.size[others])]), rest)
+            outer = others[~parts.block[others]] if not parts.block[others].all() else others
+            largest = motion.get(int(outer[np.argmax(self.size[outer])]), rest)
             moving += [int(body) for body in others if np.abs(motion.get(int(body), rest) - largest).max() > APART]
         return tuple(sorted(moving))
 
@@ -146,8 +155,10 @@ def name_block(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
 
 def _place(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
     own = (parts.first == body) | (parts.second == body)
-    middle = complex(0.5 * (mesh.start[own] + mesh.end[own]).mean()) + origin
-    return f"({middle.real:.4g}, {middle.imag:.4g})"
+    middles = 0.5 * (mesh.start[own] + mesh.end[own])
+    middle, least = complex(middles.mean()) + origin, ROUNDED * np.abs(middles - middles[0]).max()
+    x, y = (0.0 if abs(part) < least else part for part in (middle.real, middle.imag))
+    return f"({x:.4g}, {y:.4g})"
 
 
 def _move(points: Complex, directions: Complex, center: complex, scale: float) -> Real:

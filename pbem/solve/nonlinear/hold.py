@@ -9,13 +9,15 @@ import numpy as np
 
 from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
+from pbem.contact.cut_parts import CutMotion
+from pbem.contact.floating import measure_space
 from pbem.contact.free_motions import (
     CLOSED_AT_LEAST,
     close_nearest_beside,
     close_nearest_pairs,
     stick_calmest_pairs,
 )
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
@@ -29,6 +31,8 @@ MOST_HELD = 12
 UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
+# Pairs around a block that carry less than this part of the mean of all pairs carry nothing.
+FAINT = 1e-2
 SHARES = (0.0, 0.3, 1.0)
 
 
@@ -129,7 +133,10 @@ class Hold:
 
         Parts are held one pair at a time, as every one that is closed to hold them can pull at them.
         """
-        problem, motions = self.problem, self.problem.find_cut_motions(modes)
+        problem = self.problem
+        for body in {body for motion in problem.find_cut_motions(modes) for body in motion.moving}:
+            modes = self._place_block(body, modes, opening, before) if problem.parts.block[body] else modes
+        motions = problem.find_cut_motions(modes)
         if motions and before is not None and self.count < MOST_HELD:
             beside = problem.cut.find_beside(motions)
             overloaded = np.intersect1d(self._find_overloaded(before, modes), np.flatnonzero(beside >= 0))
@@ -140,6 +147,42 @@ class Hold:
                 break
             modes = close_nearest_beside(problem.laws, modes, opening, problem.cut.find_beside(motions))
         return modes
+
+    def _place_block(self, body: int, modes: ModeState, opening: Real, before: ModeState | None) -> ModeState:
+        """The modes, with the pairs closed on which a block comes to rest all of whose pairs are open.
+
+        One that does not touch anything in some place stays where pairs held it until now.
+        """
+        problem = self.problem
+        own, normal = problem.cut.find_around(body)
+        if (modes.mode[own] != OPEN).any():
+            return modes
+        space = measure_space(problem.mesh.pairs.position[own], normal, opening[own])
+        mode = modes.mode.copy()
+        if before is not None and space.is_wide and (before.mode[own] != OPEN).any():
+            mode[own] = before.mode[own]
+        else:
+            nearest = own[space.nearest]
+            nearest = nearest[~problem.laws.parted[nearest]]
+            mode[nearest] = np.where(resists_slip(problem.laws)[nearest], STICK, SLIP)
+        return follow_leaders(problem.laws, ModeState(mode, modes.sign))
+
+    def find_floating(self, modes: ModeState, state: PairState, pressure: Real) -> tuple[CutMotion, ...]:
+        """Free motions of blocks that touch what is around them by chance: the pairs carry next to nothing, and there
+        are places where nothing touches."""
+        problem, pairs = self.problem, self.problem.mesh.pairs
+        carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
+        usual = float(pairs.weight @ np.hypot(state.p_n, state.p_s)) / float(pairs.weight.sum())
+        mode = modes.mode.copy()
+        for body in np.flatnonzero(problem.parts.block):
+            own, normal = problem.cut.find_around(int(body))
+            weight = pairs.weight[own]
+            if weight @ carried[own] > FAINT * usual * weight.sum():
+                continue
+            loose = ~(problem.laws.bonded | (problem.laws.tensile_strength > 0))[own]
+            if measure_space(pairs.position[own], normal, state.g_n[own]).is_wide:
+                mode[own[loose]] = OPEN
+        return problem.find_cut_motions(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else ()
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of pairs that hold a body in the end."""
@@ -174,7 +217,9 @@ class Hold:
         if free:
             advice = "hold it by a condition, or use shorter elements where it touches"
             return ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; {advice}")
-        motions = self.problem.find_cut_motions(modes)
+        return self._describe_cut(self.problem.find_cut_motions(modes))
+
+    def _describe_cut(self, motions: tuple[CutMotion, ...]) -> ConvergenceError | None:
         if not motions:
             return None
         advice = "hold it by a condition"
@@ -188,9 +233,16 @@ class Hold:
         free = self.find_free(ModeState(np.where(gives_way, SLIP, modes.mode).astype(np.int8), modes.sign))
         return f"; nothing but friction prevents a {free}" if free else ""
 
-    def refuse_free_motion(self, modes: ModeState) -> None:
-        """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
+    def refuse_free_motion(
+        self, modes: ModeState, state: PairState | None = None, pressure: Real | None = None
+    ) -> None:
+        """Raise ConvergenceError if a body can move freely in the present contact, where any position would do.
+
+        state: of all pairs in a solution, with the pressure of fluids on them (m,).
+        """
         error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
+        if error is None and state is not None and pressure is not None:
+            error = self._describe_cut(self.find_floating(modes, state, pressure))
         if error:
             raise error
 

@@ -149,7 +149,7 @@ def _search_modes(
         if driven:
             search.restart()
         elif outcome.settled and not fails:
-            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))

@@ -31,7 +31,8 @@ MOST_HELD = 12
 UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
-# Pairs around a block that carry less than this part of the mean of all pairs carry nothing.
+# Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
+# length of the model) carry nothing.
 FAINT = 1e-2
 SHARES = (0.0, 0.3, 1.0)
 
@@ -172,7 +173,8 @@ class Hold:
         are places where nothing touches."""
         problem, pairs = self.problem, self.problem.mesh.pairs
         carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
-        usual = float(pairs.weight @ np.hypot(state.p_n, state.p_s)) / float(pairs.weight.sum())
+        jumps = problem.traction_scale * np.hypot(state.g_n, state.g_s)
+        usual = float(pairs.weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(pairs.weight.sum())
         mode = modes.mode.copy()
         for body in np.flatnonzero(problem.parts.block):
             own, normal = problem.cut.find_around(int(body))

@@ -45,6 +45,8 @@ def cut_at_nodes(
     """Cut the strands' legs at all crossings, and at the nodes that are no further from them than `snap`, through which
     they are bent. Returns the places of the nodes, those of crossings added."""
     fresh = [[True] * len(strand.legs) for strand in strands]
+    for strand in strands:
+        strand.barred = [frozenset()] * len(strand.legs)
     known = 0
     for _ in range(MOST_ROUNDS):
         edges = _collect(strands, fresh)
@@ -53,9 +55,11 @@ def cut_at_nodes(
         known = len(points)
         edge, places = _find_crossings(edges, rounding)
         points, crossed = _number_crossings(points, used, places, snap)
+        points, crossed = _keep_off_barred(strands, edges, edge, points, crossed, places)
         all_edges = np.concatenate([passed[0], edge[:, 0], edge[:, 1]])
         all_nodes = np.concatenate([passed[1], crossed, crossed])
         inner = (edges.first[all_edges] != all_nodes) & (edges.second[all_edges] != all_nodes)
+        inner &= ~_find_barred(strands, edges, all_edges, all_nodes)
         cuts = np.unique(np.stack([all_edges[inner], all_nodes[inner]], axis=1), axis=0)
         fresh = [[False] * len(strand.legs) for strand in strands]
         if not _apply(strands, edges, points, cuts, fresh, rounding, log):
@@ -159,6 +163,24 @@ def _number_crossings(points: Complex, used: Integer, places: Complex, snap: flo
     return points, nodes
 
 
+def _find_barred(strands: list[Strand], edges: _Edges, edge: Integer, node: Integer) -> Bool:
+    """Which edges must not be bent through these nodes."""
+    owner, number = edges.owner[edge].tolist(), edges.number[edge].tolist()
+    return np.array([
+        each in strands[i].barred[j] for i, j, each in zip(owner, number, node.tolist(), strict=True)
+    ], dtype=bool)
+
+
+def _keep_off_barred(
+    strands: list[Strand], edges: _Edges, pairs: Integer, points: Complex, nodes: Integer, places: Complex
+) -> tuple[Complex, Integer]:
+    """Crossings next to a node that one of the edges must not be bent through get one of their own."""
+    both = _find_barred(strands, edges, pairs[:, 0], nodes) | _find_barred(strands, edges, pairs[:, 1], nodes)
+    alone = np.flatnonzero(both)
+    nodes[alone] = len(points) + np.arange(len(alone))
+    return np.concatenate([points, places[alone]]), nodes
+
+
 def _apply(
     strands: list[Strand], edges: _Edges, points: Complex, cuts: Integer, fresh: list[list[bool]], rounding: float,
     log: Log,
@@ -210,10 +232,13 @@ def _insert(
     legs: list[Leg] = []
     nodes: list[int] = [strand.nodes[0]]
     flags: list[bool] = []
+    barred: list[frozenset[int]] = []
     for number, leg in enumerate(strand.legs):
         new_legs, new_nodes = parts.get(number, ([leg], []))
         legs += new_legs
         nodes += [*new_nodes, strand.nodes[number + 1]]
         flags += [number in parts] * len(new_legs)
-    strand.legs, strand.nodes, fresh[owner] = legs, nodes, flags
+        behind = frozenset(() if number not in parts else (strand.nodes[number], *new_nodes, strand.nodes[number + 1]))
+        barred += [strand.barred[number] | behind] * len(new_legs)
+    strand.legs, strand.nodes, strand.barred, fresh[owner] = legs, nodes, barred, flags
     strand.touched = True

@@ -27,13 +27,15 @@ FAR = 4.0
 class Strand:
     """A trace on its way: its legs, each between two nodes (numbers).
 
-    touched: whether anything was done to it, so that its curve is not the given one any more.
+    touched: whether anything was done to it, so that its curve is not the given one any more. barred: nodes that its
+    legs, of which there are as many, must not be bent through, as what they are parts of has been there.
     """
 
     name: str
     legs: list[Leg]
     nodes: list[int] = field(default_factory=list)
     touched: bool = False
+    barred: list[frozenset[int]] = field(default_factory=list)
 
     @property
     def closed(self) -> bool:

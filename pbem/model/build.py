@@ -18,6 +18,7 @@ from pbem.model.crack import (
     check_tip_elements,
     describe_closing,
     describe_near_misses,
+    divide_for_tips,
     find_tips,
 )
 from pbem.model.fitting import fit_curves
@@ -140,6 +141,7 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
         curves, opposite = seats.curves, seats.opposite
         notes += seats.notes
     tips = find_tips(curves, cracks)
+    curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
     return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,18 @@ def find_tips(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> dict[st
     """Per crack whether its start and its end are tips: points that no other leg reaches."""
     visits = count_leg_ends(curves)
     return {name: (visits[curves[name].start] == 1, visits[curves[name].end] == 1) for name in cracks}
+
+
+def divide_for_tips(
+    case: Case, curves: Mapping[str, Curve], tips: Mapping[str, tuple[bool, bool]]
+) -> dict[str, Curve]:
+    """The curves, with two elements on cracks of one with two tips, where a size is given, which they do not exceed."""
+    result = dict(curves)
+    for name, ends in tips.items():
+        legs, sized = curves[name].legs, case.curves[name].size is not None
+        if case.analysis.tips and all(ends) and sized and sum(leg.elements for leg in legs) < 2:
+            result[name] = Curve(name, (replace(legs[0], elements=2), *legs[1:]))
+    return result
 
 
 def check_tip_elements(

@@ -110,6 +110,21 @@ def find_crossings(
     return list(found.values())
 
 
+def find_crossing_cracks(cracks: Mapping[str, Curve], tolerance: Tolerance) -> set[str]:
+    """Names of the cracks that cross or touch another one, or themselves, elsewhere than with their ends."""
+    legs = [(name, leg) for name, curve in cracks.items() for leg in curve.legs]
+    if not legs:
+        return set()
+    found: set[str] = set()
+    boxes = Boxes.around_legs([leg for _, leg in legs], tolerance.largest)
+    for i, j in _pair(boxes.find_pairs()):
+        (name, leg), (other, other_leg) = legs[i], legs[j]
+        if not {name, other} <= found and meeting_points(leg, other_leg, tolerance.between(name, other)):
+            found |= {name, other}
+    region = dict.fromkeys(cracks, "")
+    return found.union(*_meeting_vertices(cracks, region))
+
+
 def _touching_ends(first: Leg, second: Leg, tolerance: float) -> list[complex]:
     """Ends of one leg in the interior of the other."""
     points = []

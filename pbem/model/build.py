@@ -21,6 +21,7 @@ from pbem.model.crack import (
     divide_for_tips,
     find_tips,
 )
+from pbem.model.cutting import Cut, cut_cracks
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
@@ -79,18 +80,21 @@ def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
 
 def examine(case: Case, conditions_known: bool = True) -> tuple[Model | None, list[Fault]]:
     """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged."""
-    model, faults = _examine(case, conditions_known)
+    model, case, faults = _examine(case, conditions_known)
     return model, [case.trace(fault) for fault in faults]
 
 
-def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:
+def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, list[Fault]]:
+    """As above, with the case in which cracks that cross are cut."""
     roles = resolve_roles(case)
+    cut = cut_cracks(case, roles, shape_curves(case, roles))
+    case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
-    topology = _find_topology(case, roles)
+    topology = _find_topology(cut)
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
-        return None, faults
+        return None, case, faults
     model, faults = _compose(case, roles, loading, topology)
     model = replace(model, interior_points=interior)
     faults += [*check_turning(case, model.curves), *check_facing(model)]
@@ -109,11 +113,11 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         wrong, notes = _check_support(model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
-    return model, faults
+    return model, case, faults
 
 
-def _find_topology(case: Case, roles: Roles) -> _Topology:
-    shapes = shape_curves(case, roles)
+def _find_topology(cut: Cut) -> _Topology:
+    case, roles, shapes = cut.case, cut.roles, cut.shapes
     split = split_at_junctions(shapes.curves, shapes.tolerance)
     curves = split.curves
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
@@ -126,8 +130,8 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     boundaries = {name: table.boundary for name, table in case.regions.items()}
     infinite = {name for name, table in case.regions.items() if table.infinite}
     loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
-    faults = [*shapes.faults, *crossings, *wrong]
-    notes = list(split.notes)
+    faults = [*shapes.faults, *cut.faults, *crossings, *wrong]
+    notes = [*cut.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)

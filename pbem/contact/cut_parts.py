@@ -58,7 +58,7 @@ class CutParts:
         self.size = np.bincount(np.concatenate([parts.first, parts.second[mesh.crack]]), minlength=len(parts.region))
 
     def find_motions(self, modes: ModeState) -> tuple[CutMotion, ...]:
-        """The free motions in which parts of one region move against each other."""
+        """The free motions in which parts of one region move against each other (theory, 84)."""
         parts = self.parts
         label, bodies = self._tie_sticking(modes)
         links = [(int(label[body]), GROUND, rows) for body, _, rows in self._grounded]
@@ -162,7 +162,7 @@ def _place(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
 
 
 def _move(points: Complex, directions: Complex, center: complex, scale: float) -> Real:
-    """Components (k, 3) along directions of the unit motions along x, along y, and about the center."""
+    """Components (k, 3) along directions of the unit motions along x, along y, and about the center (theory, 83)."""
     motions = np.stack([np.ones_like(points), np.full_like(points, 1j), 1j * (points - center) / scale], axis=1)
     return np.asarray((motions * np.conj(directions)[:, None]).real)
 

@@ -37,7 +37,7 @@ class Space:
 
 
 def measure_space(position: Complex, normal: Complex, opening: Real) -> Space:
-    """Of pairs (k,) around a block; normal: into which it would move to open them (theory, 84).
+    """Of pairs (k,) around a block; normal: into which it would move to open them (theory, 85).
 
     A linear programme in the motion's three numbers, bounded by the largest opening: beyond it motions are no longer
     small, and a block that may turn in its place would turn without end.

@@ -119,7 +119,13 @@ def find_crossing_cracks(cracks: Mapping[str, Curve], tolerance: Tolerance) -> s
     boxes = Boxes.around_legs([leg for _, leg in legs], tolerance.largest)
     for i, j in _pair(boxes.find_pairs()):
         (name, leg), (other, other_leg) = legs[i], legs[j]
-        if not {name, other} <= found and meeting_points(leg, other_leg, tolerance.between(name, other)):
+        same = tolerance.between(name, other)
+        if {name, other} <= found:
+            continue
+        touching = {*_touching_ends(leg, other_leg, same)} - {
+            end for curve in (cracks[name], cracks[other]) if not curve.closed for end in (curve.start, curve.end)
+        }
+        if touching or meeting_points(leg, other_leg, same):
             found |= {name, other}
     region = dict.fromkeys(cracks, "")
     return found.union(*_meeting_vertices(cracks, region))

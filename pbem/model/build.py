@@ -126,11 +126,11 @@ def _find_topology(cut: Cut) -> _Topology:
     touching = {
         frozenset(pair) for pair in roles.contacts.values() if roles.outer[pair[0]] != roles.outer[pair[1]]
     }
-    crossings = find_crossings(curves, cracks, shapes.tolerance, touching)
+    crossings = [*cut.faults] or find_crossings(curves, cracks, shapes.tolerance, touching)
     boundaries = {name: table.boundary for name, table in case.regions.items()}
     infinite = {name for name, table in case.regions.items() if table.infinite}
     loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
-    faults = [*shapes.faults, *cut.faults, *crossings, *wrong]
+    faults = [*shapes.faults, *crossings, *wrong]
     notes = [*cut.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)

@@ -20,6 +20,10 @@ T = TypeVar("T")
 
 # Cracks that are cut, and are listed one by one.
 MOST_NOTES = 6
+# Degrees that the elements of an arc turn by on average, so that none turns too far when they are refined at both ends.
+WIDEST = 15.0
+# Numbers of elements are known to this.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -88,13 +92,16 @@ def _find_overlaps(network: Network) -> list[Fault]:
 
 
 def _count_elements(table: CurveTable, curve: Curve) -> Curve:
-    """The piece, with the elements that a size asks for on each leg; a number is divided where the crack is cut."""
-    if table.size is None:
-        return curve
-    counts = [max(1, math.ceil(leg.length / table.size - 1e-9)) for leg in curve.legs]
-    return replace(curve, legs=tuple(
-        replace(leg, elements=count) for leg, count in zip(curve.legs, counts, strict=True)
-    ))
+    """The piece, with the elements that a size asks for on each leg; a number is divided where the crack is cut.
+
+    Arcs have as many as they need when they are refined towards the cuts.
+    """
+    legs = []
+    for leg in curve.legs:
+        count = leg.elements if table.size is None else math.ceil(leg.length / table.size - ROUNDING)
+        least = math.ceil(math.degrees(abs(leg.turn)) / WIDEST - ROUNDING)
+        legs.append(replace(leg, elements=max(1, count, least)))
+    return replace(curve, legs=tuple(legs))
 
 
 def _write_table(table: CurveTable, piece: Curve) -> CurveTable:

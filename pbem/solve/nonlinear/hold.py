@@ -55,6 +55,9 @@ class Hold:
         self.count = 0
         self.driven = False
         self.repeated = 0
+        # Blocks that pairs were closed to hold, and the last state of all pairs that was found.
+        self.placed: set[int] = set()
+        self.state: PairState | None = None
         # Only violations of this share of the largest change modes, once those that hold a body came back: many changes
         # at a time free a body whose contact only wants to move on around it.
         self.share = 0.0
@@ -158,6 +161,7 @@ class Hold:
         own, normal = problem.cut.find_around(body)
         if (modes.mode[own] != OPEN).any():
             return modes
+        self.placed.add(body)
         space = measure_space(problem.mesh.pairs.position[own], normal, opening[own])
         mode = modes.mode.copy()
         if before is not None and space.is_wide and (before.mode[own] != OPEN).any():
@@ -220,6 +224,19 @@ class Hold:
             advice = "hold it by a condition, or use shorter elements where it touches"
             return ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; {advice}")
         return self._describe_cut(self.problem.find_cut_motions(modes))
+
+    def describe_floating(self, modes: ModeState) -> ConvergenceError | None:
+        """The error of a search that found no end as blocks were held that touch nothing in some place; None if none.
+        """
+        if self.state is None:
+            return None
+        mode = modes.mode.copy()
+        for body in self.placed:
+            own, normal = self.problem.cut.find_around(body)
+            if measure_space(self.problem.mesh.pairs.position[own], normal, self.state.g_n[own]).is_wide:
+                mode[own] = OPEN
+        free = ModeState(mode, modes.sign)
+        return self._describe_cut(self.problem.find_cut_motions(free)) if (mode != modes.mode).any() else None
 
     def _describe_cut(self, motions: tuple[CutMotion, ...]) -> ConvergenceError | None:
         if not motions:

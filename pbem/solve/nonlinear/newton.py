@@ -133,6 +133,7 @@ def _search_modes(
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
+        hold.state = pairs
         fails, cascade = outcome.settled and bool(outcome.failing.any()), None
         if fails:
             floor = _find_floor(problem, solved)
@@ -195,6 +196,7 @@ def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> Converg
     search.unsettled = reason != "no admissible modes"
     return hold.problem.decide(lambda: (
         hold.describe_free_motion(proposal.modes)
+        or hold.describe_floating(proposal.modes)
         or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))
 
 

@@ -16,7 +16,7 @@ from pbem.make_command import read_finite
 NOTES = """\
 FILE: .geojson, .csv (rows x1,y1,x2,y2 or id,x,y), .dxf: traces, which become cracks of the whole plane, cut where they
 cross or meet; .msh of gmsh (2.2 or 4.1): physical surfaces become regions, physical lines curves.
-All that is joined, cut, dropped or moved is listed, and kept in the first comment of the case. See `pbem help import`"""
+All that is joined, cut, dropped or moved is listed, and kept in the first comment of the case: `pbem help import`"""
 
 
 def add_import_options(parser: argparse.ArgumentParser) -> None:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
-from pbem.description.families import find_families, spread_laws, spread_stage
+from pbem.description.families import find_families, spread_conditions, spread_laws, spread_stage
 from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
@@ -46,9 +46,10 @@ class Case:
         Case(materials={"rock": {"young": 1000.0, "poisson": 0.2}}, curves={...}, regions={...})
 
     Curves, regions and laws of the tables [[generate]] are among the others, after them; groups: what each table made.
-    A law that is given by the name of a trace, t12, is that of each of its pieces, t12.1, t12.2, ...; families: the
-    traces that laws or stages name, with their pieces. given: the tables as they were given, without what was generated
-    and without defaults; source: the file's path, as it was given. What follows from the geometry is checked by `pbem.model.build.build_model`.
+    A law or condition that is given by the name of a trace, t12, is that of each of its pieces, t12.1, t12.2, ...;
+    families: the traces that laws, conditions or stages name, with their pieces. given: the tables as they were given,
+    without what was generated and without defaults; source: the file's path, as it was given. What follows from the
+    geometry is checked by `pbem.model.build.build_model`.
     """
 
     title: str
@@ -91,9 +92,11 @@ class Case:
         values |= {"given": given, "source": source, "groups": (), "origin": {}}
         if expansion is not None:
             values |= {field.name: getattr(expansion, field.name) for field in fields(Expansion)}
-        named = [*values["interfaces"], *(name for stage in values["stages"] for name in stage.interfaces)]
+        named = [*values["interfaces"], *values["boundary"]]
+        named += [name for stage in values["stages"] for name in (*stage.interfaces, *stage.boundary)]
         families = find_families(named, values["curves"])
         if families:
+            values["boundary"] = spread_conditions(values["boundary"], families)
             values["interfaces"] = spread_laws(values["interfaces"], families)
             values["stages"] = tuple(spread_stage(stage, families) for stage in values["stages"])
         values["families"] = families
@@ -115,23 +118,23 @@ class Case:
         return f"<Case {self.title!r}: {', '.join(counts)}>"
 
     def trace(self, fault: Fault) -> Fault:
-        """The fault at what was given: of a curve, region or law that was generated, at the key it was made from; of the
-        law of a piece, where it is said of its trace."""
+        """The fault at what was given: of a curve, region or law that was generated, at the key it was made from; of
+        the law of a piece, where it is said of its trace."""
         path = self._find_family(self._find_given(fault.path))
         return fault if path == fault.path else Fault.at(path, fault.found, fault.expected)
 
     def _find_family(self, path: KeyPath) -> KeyPath:
         at = path[2:] if len(path) > 2 and path[0] == "stages" else path
-        if len(at) < 2 or at[0] != "interfaces":
+        if len(at) < 2 or at[0] not in ("interfaces", "boundary"):
             return path
         given: Any = self.given
-        for part in (*path[: len(path) - len(at)], "interfaces"):
+        for part in (*path[: len(path) - len(at)], at[0]):
             given = given[part] if isinstance(part, int) else given.get(part, {})
         if at[1] in given and (len(at) == 2 or at[2] in given[at[1]]):
             return path
         families = (name for name, members in self.families.items() if at[1] in members and name in given)
         family = next(families, None)
-        return path if family is None else (*path[: len(path) - len(at)], "interfaces", family, *at[2:])
+        return path if family is None else (*path[: len(path) - len(at)], at[0], family, *at[2:])
 
     def _find_given(self, path: KeyPath) -> KeyPath:
         if len(path) == 4 and path[0] == "regions" and isinstance(path[3], int):  # a name in a list

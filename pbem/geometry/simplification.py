@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from pbem.arrays import Bool, Complex
@@ -19,7 +21,7 @@ def choose_vertices(points: Complex, distance: float) -> Bool:
         side[[0, far, -1]] = -1.0
         corners = [0, *sorted({far, int(np.argmax(side))}), len(points) - 1]
         kept[corners] = True
-        stack = list(zip(corners, corners[1:], strict=False))
+        stack = list(itertools.pairwise(corners))
     while stack:
         first, last = stack.pop()
         if last - first < 2:

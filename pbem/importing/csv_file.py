@@ -140,7 +140,7 @@ def _read_vertices(rows: list[tuple[int, list[str]]], columns: dict[str, int], r
             continue
         if name != last:
             if name in parts:
-                reading.notes.append(f"Line {line}: '{name}' comes back after another trace; it is a further part of it.")
+                reading.notes.append(f"Line {line}: '{name}' comes back after another trace, as a further part of it.")
             parts.setdefault(name, []).append((line, []))
         parts[name][-1][1].append(complex(x, y))
         last = name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 import warnings
 from collections import Counter
@@ -36,7 +37,7 @@ def read_dxf(path: Path) -> Reading:
         try:
             legs, lifted = _read_entity(entity, kind)
         except (ValueError, ArithmeticError, TypeError, AttributeError, KeyError) as error:
-            reading.blame(place, str(error) or type(error).__name__, "a line, polyline, arc or circle that can be drawn")
+            reading.blame(place, str(error) or type(error).__name__, "a line, polyline, arc or circle")
             continue
         if legs is None:
             reading.left_out.append(f"{place}: drawn in a plane other than that of x and y")
@@ -139,7 +140,7 @@ def _list_vertices(entity: Any, kind: str) -> list[tuple[complex, float]]:
 
 def _chain(vertices: Sequence[tuple[complex, float]]) -> list[Leg]:
     legs = []
-    for (start, bulge), (end, _) in zip(vertices, vertices[1:], strict=False):
+    for (start, bulge), (end, _) in itertools.pairwise(vertices):
         turn = 4 * math.atan(bulge)
         if start == end:
             continue

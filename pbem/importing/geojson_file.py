@@ -146,8 +146,8 @@ def _tell_system(data: Mapping[str, Any], reading: Reading) -> None:
     degrees = "CRS84" in name or "CRS:84" in name or (code is not None and int(code.group(1)) in GEOGRAPHIC)
     if degrees:
         reading.notes.append(
-            f"The coordinates are degrees of longitude and latitude ({show(name)}), which are taken as lengths: project "
-            "the map to a system in metres first (for example with ogr2ogr -t_srs)."
+            f"The coordinates are degrees of longitude and latitude ({show(name)}), which are taken as lengths: "
+            "project the map to a system in metres first (for example with ogr2ogr -t_srs)."
         )
         return
     points = [end for trace in reading.traces for part in trace.parts for leg in part for end in (leg.start, leg.end)]

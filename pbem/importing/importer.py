@@ -62,7 +62,8 @@ def read_text(path: Path) -> str:
         at = text.index("\0")
         break
     line = data[:at].count(b"\n") + 1
-    raise fail(path, [Fault(f"line {line}", f"the byte 0x{data[min(at, len(data) - 1)]:02x}, which is no text", "a text")])
+    found = f"the byte 0x{data[min(at, len(data) - 1)]:02x}, which is no text"
+    raise fail(path, [Fault(f"line {line}", found, "a text")])
 
 
 def _check(path: Path, imported: Imported) -> None:

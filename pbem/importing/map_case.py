@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -122,7 +123,7 @@ def _simplify_legs(legs: Sequence[Leg], distance: float) -> tuple[Leg, ...]:
         if each.center is None:
             points = np.array(each.points)
             kept = points[choose_vertices(points, distance)].tolist()
-            own = [Leg(a, b, 1) for a, b in zip(kept, kept[1:], strict=False)]
+            own = [Leg(a, b, 1) for a, b in itertools.pairwise(kept)]
         result += own
     return tuple(result)
 
@@ -179,7 +180,7 @@ def _make_tables(
         length = sum(abs(b - a) for a, b in zip(part.points, part.points[1:], strict=False))
         # A crack with two tips needs an element for each of them.
         division = {"elements": 2} if tips and part.center is None and length <= scale.size else {"size": scale.size}
-        curves[name] = {**_write_shape(part), **division}
+        curves[name] = {**write_shape(part), **division}
     friction = FRICTION if options.friction is None else options.friction
     stress = {"sxx": options.sxx, "syy": options.syy, "sxy": options.sxy}
     if all(value is None for value in stress.values()):
@@ -198,7 +199,8 @@ def _make_tables(
     }
 
 
-def _write_shape(part: Outline) -> dict[str, Any]:
+def write_shape(part: Outline) -> dict[str, Any]:
+    """The keys of a curve that say its shape."""
     if part.center is None:
         return {"points": [[point.real, point.imag] for point in part.points]}
     circle: dict[str, Any] = {"center": [part.center.real, part.center.imag], "radius": part.radius}

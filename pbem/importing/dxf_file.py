@@ -45,7 +45,7 @@ def read_dxf(path: Path) -> Reading:
         heights |= lifted
         wrong = [value for leg in legs for value in _list_numbers(leg) if reading.read_number(value, place) is None]
         if not legs:
-            reading.left_out.append(f"{place}: a line of one point or none")
+            reading.left_out.append(f"{place}: one point or none")
         elif not wrong:
             reading.traces.append(Trace(f"t{len(reading.traces) + 1}", place, (tuple(legs),)))
     if heights:
@@ -115,6 +115,8 @@ def _list_vertices(entity: Any, kind: str) -> list[tuple[complex, float]]:
     """Points, each with the bulge to the next one: the tangent of a quarter of the angle that the arc turns through."""
     if kind in ("ARC", "CIRCLE"):
         center, radius = complex(entity.dxf.center.x, entity.dxf.center.y), float(entity.dxf.radius)
+        if radius == 0:
+            return []
         if not radius > 0:
             raise ValueError(f"a radius of {radius:g}")
         first = float(entity.dxf.start_angle) if kind == "ARC" else 0.0

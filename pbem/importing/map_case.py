@@ -26,6 +26,9 @@ from pbem.importing.reading import Reading, Trace, fail
 
 # Of the median length of the traces.
 SNAP, SIZE = 1e-3, 0.25
+# What misses a trace by less than this part of the longest leg is refused as a slip of the pen, whatever the snap
+# distance (twice `NEAR_MISS` of pbem.model.crack).
+LEAST_SNAP = 2e-6
 # Traces shorter than so many roundings of the map's coordinates say nothing.
 COARSEST = 1e3
 
@@ -92,8 +95,9 @@ def _measure(path: Path, reading: Reading, options: Options) -> _Scale:
             found, expected = f"{len(lengths)} traces of length 0", "one trace with a length at least"
         raise fail(path, [Fault("the map", found, expected)])
     snap = SNAP * median if options.snap is None else options.snap
+    snap = max(snap, rounding, LEAST_SNAP * float(shapes.lengths.max()))
     size = SIZE * median if options.size is None else options.size
-    return _Scale(median, max(snap, rounding), size, rounding)
+    return _Scale(median, snap, size, rounding)
 
 
 def _simplify(traces: Sequence[Trace], distance: float | None, scale: _Scale) -> tuple[list[Trace], list[str]]:
@@ -140,7 +144,7 @@ def _find_touching(traces: Sequence[Trace], snap: float) -> set[tuple[str, int, 
     low, high = shapes.bounds()
     points = np.array([end[-1] for end in ends])
     at, leg = Boxes(low - snap, high + snap).find_around(points)
-    other = np.array([end[0] for end in ends])[at] != owner[leg]
+    other = (np.array([end[0] for end in ends])[at] != owner[leg]) & (shapes.lengths[leg] > 0)
     at, leg = at[other], leg[other]
     near = shapes.select(leg).distances(points[at][:, None])[:, 0] <= snap if len(at) else np.zeros(0, dtype=bool)
     return {ends[number][1:4] for number in at[near].tolist()}
@@ -179,7 +183,8 @@ def _make_tables(
         tips = all(reached[end] == 1 and end not in inner for end in (part.points[0], part.points[-1]))
         length = sum(abs(b - a) for a, b in zip(part.points, part.points[1:], strict=False))
         # A crack with two tips needs an element for each of them.
-        division = {"elements": 2} if tips and part.center is None and length <= scale.size else {"size": scale.size}
+        single = tips and len(part.points) == 2 and part.center is None and length <= scale.size
+        division = {"elements": 2} if single else {"size": scale.size}
         curves[name] = {**write_shape(part), **division}
     friction = FRICTION if options.friction is None else options.friction
     stress = {"sxx": options.sxx, "syy": options.syy, "sxy": options.sxy}
@@ -234,7 +239,7 @@ def _tell_defaults(options: Options, scale: _Scale) -> list[str]:
     told = []
     if options.size is None:
         told.append(f"--size {scale.size:.4g} (a quarter of the traces' median length, {scale.median:.4g})")
-    if options.snap is None:
+    if options.snap is None and scale.snap <= SNAP * scale.median:
         told.append(f"--snap {scale.snap:.4g} (a thousandth of it)")
     told += [
         f"--{key} {value:g}" for key, value in (("friction", FRICTION), ("young", YOUNG), ("poisson", POISSON))
@@ -242,7 +247,10 @@ def _tell_defaults(options: Options, scale: _Scale) -> list[str]:
     ]
     if options.sxx is options.syy is options.sxy is None:
         told.append("--syy -1")
-    return ["Taken as nothing else was asked for: " + ", ".join(told) + "."] if told else []
+    notes = ["Taken as nothing else was asked for: " + ", ".join(told) + "."] if told else []
+    if scale.snap > (SNAP * scale.median if options.snap is None else options.snap):
+        notes.append(f"--snap {scale.snap:.4g} is the least for these lengths and coordinates.")
+    return notes
 
 
 def _list_left_out(reading: Reading) -> list[tuple[str, tuple[str, ...]]]:

@@ -26,9 +26,9 @@ from pbem.importing.reading import Reading, Trace, fail
 
 # Of the median length of the traces.
 SNAP, SIZE = 1e-3, 0.25
-# What misses a trace by less than this part of the longest leg is refused as a slip of the pen, whatever the snap
-# distance (twice `NEAR_MISS` of pbem.model.crack).
-LEAST_SNAP = 2e-6
+# Faces nearer to each other than half of this part of their legs are refused by `pbem check` as meant to be one,
+# whatever the snap distance (`COINCIDENT` of pbem.model.coincidence; ends that miss a leg by a tenth of that as well).
+LEAST_SNAP = 2e-5
 # Traces shorter than so many roundings of the map's coordinates say nothing.
 COARSEST = 1e3
 

@@ -1,4 +1,4 @@
-"""Seeded mutants of maps and meshes: `pbem import` must give a case that `pbem check` accepts, or a message with a place.
+"""Seeded mutants of maps and meshes: `pbem import` gives a case that `pbem check` accepts, or a message with a place.
 
     python scripts/fuzz_import.py [--count N] [--seed S] [--keep FOLDER]
 
@@ -11,6 +11,7 @@ import argparse
 import cmath
 import contextlib
 import io
+import itertools
 import json
 import math
 import random
@@ -190,7 +191,7 @@ def write_csv(r: random.Random, lines: list[Line]) -> str:
     rows: list[list[object]] = []
     if r.random() < 0.5:
         rows += [["x1", "y1", "x2", "y2"]] if r.random() < 0.5 else []
-        rows += [[*a[:2], *b[:2]] for line in lines for a, b in zip(line, line[1:], strict=False)]
+        rows += [[*a[:2], *b[:2]] for line in lines for a, b in itertools.pairwise(line)]
     else:
         rows += [["id", "x", "y"]] if r.random() < 0.5 else []
         rows += [[number, *point[:2]] for number, line in enumerate(lines) for point in line]
@@ -212,7 +213,7 @@ def write_dxf(r: random.Random, lines: list[Line]) -> str:
     for line in lines:
         kind = r.choice(("LINE", "POLY", "ARC", "CIRCLE", "TEXT"))
         if kind == "LINE":
-            for a, b in zip(line, line[1:], strict=False):
+            for a, b in itertools.pairwise(line):
                 add(0, "LINE", 8, "0", 10, a[0], 20, a[1], 11, b[0], 21, b[1])
         elif kind == "POLY":
             add(0, "POLYLINE", 8, "0", 66, 1, 70, r.choice((0, 1)))

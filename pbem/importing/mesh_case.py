@@ -175,9 +175,11 @@ def _make_curves(
     points = [grid.nodes[node] for node in counts]
     extent = max(max(z.real for z in points) - min(z.real for z in points),
                  max(z.imag for z in points) - min(z.imag for z in points))
+    # In the order of the groups' numbers, and edges without one last.
+    order = sorted(sides, key=lambda side: (not side.group, side.group))
     return [
         (side, fit_legs(chain, grid.nodes, corners, extent))
-        for side, edges in sides.items() for chain in link(edges, entities, corners)
+        for side in order for chain in link(sides[side], entities, corners)
     ]
 
 

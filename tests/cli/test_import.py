@@ -320,15 +320,24 @@ def test_a_block_of_two_materials(version: str, capsys: Capture) -> None:
 def test_a_plate_with_holes(version: str, capsys: Capture) -> None:
     holes = [0j, 4 + 0j]
     tables = bring_in("plate.msh", WRITERS[version](make_plate(4, 2.0, holes, 0.5)))
-    shapes = {name: curve.get("points") or curve["center"] for name, curve in tables["curves"].items()}
-    assert shapes == {
-        "hole 1": [0.0, 0.0], "hole 2": [4.0, 0.0], "left": [[-2, 2], [-2, -2]], "right": [[6, -2], [6, 2]],
-        "top": [[-2, 2], [6, 2]], "bottom": [[-2, -2], [6, -2]],
-    } or {name: len(points) for name, points in shapes.items()} == dict.fromkeys(shapes, 2)
-    assert tables["curves"]["hole 2"]["radius"] == pytest.approx(0.5, abs=1e-12)
+    corners = {name: sorted(curve["points"]) for name, curve in tables["curves"].items() if "points" in curve}
+    assert corners == {
+        "left": [[-2, -2], [-2, 2]], "right": [[6, -2], [6, 2]], "top": [[-2, 2], [6, 2]], "bottom": [[-2, -2], [6, -2]],
+    }
+    circles = {name: curve["center"] for name, curve in tables["curves"].items() if "radius" in curve}
+    assert circles == {"hole 1": [0.0, 0.0], "hole 2": [4.0, 0.0]}
+    assert tables["curves"]["hole 2"]["radius"] == 0.5 and tables["curves"]["top"]["elements"] == 8
+    assert main(["check", "made.toml"]) == 0
+
+
+def test_a_wide_plate_with_a_hole_has_kirschs_stresses() -> None:
+    tables = bring_in("plate.msh", write_4(make_plate(6, 10.0, [0j], 0.5)))
     tables["boundary"] = {"left": {"ux": 0.0}, "bottom": {"uy": 0.0}, "right": {"tx": 1.0}}
+    tables["output"] = {"points": [[0.0, 0.75]]}
     pbem.run(tables, "plate.h5")
-    assert pbem.open_results("plate.h5").status == "finished"
+    ratio = 0.5 / 0.75
+    expected = 0.5 * (1 + ratio**2) + 0.5 * (1 + 3 * ratio**4)
+    assert pbem.open_results("plate.h5").interior.stress[-1][0][0] == pytest.approx(expected, rel=0.01)
 
 
 def test_a_polygon_stays_one(capsys: Capture) -> None:

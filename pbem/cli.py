@@ -1,4 +1,4 @@
-"""The command line: make, check, run, info, plot, help. Only `run` needs MPI and PETSc."""
+"""The command line: make, import, check, run, info, plot, help. Only `run` needs MPI and PETSc."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ from pbem.errors import (
     StorageError,
     printable,
 )
+from pbem.import_command import NOTES as IMPORT_NOTES
+from pbem.import_command import add_import_options, import_case
 from pbem.make_command import add_make_commands, make, read_finite
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
 from pbem.version import __version__
@@ -37,7 +39,7 @@ if TYPE_CHECKING:
 # threads has to be set before.
 
 UNEXPECTED, WRONG_INPUT, NOT_CONVERGED, INTERRUPTED = 1, 2, 3, 130
-COMMANDS = ("make", "check", "run", "info", "plot", "help")
+COMMANDS = ("make", "import", "check", "run", "info", "plot", "help")
 # Of `pbem plot --field`; defined in pbem.results.field_plot.
 FIELDS = ("ux", "uy", "u", "sxx", "syy", "sxy", "s1", "s2", "shear", "mises")
 # Of `pbem run --operator`; defined in pbem.model.model.
@@ -47,6 +49,7 @@ DESCRIPTION = """\
 Boundary elements for frictional contact in two-dimensional elasticity.
 
   pbem make cracks           write a case of random cracks; also inclusions
+  pbem import FILE -o CASE   a map of traces, or a mesh, as a case
   pbem check CASE            is the case right, and what will be computed?
   pbem run CASE              compute; `pbem CASE` does the same
   pbem info FILE.h5          what a result file holds
@@ -166,6 +169,7 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
+    add_import_options(add("import", _import, "write a case file of a map of traces or of a mesh", IMPORT_NOTES))
     check = add("check", _check, "validate a case and show what would be computed")
     check.add_argument("case", metavar="CASE")
     check.add_argument("--plot", metavar="FILE.png", help="draw the model with its elements and conditions")
@@ -212,6 +216,11 @@ def _make(options: argparse.Namespace) -> int:
     except (OSError, ValueError) as error:
         _say(f"pbem make: {error}", 0)
         return WRONG_INPUT
+    return 0
+
+
+def _import(options: argparse.Namespace) -> int:
+    _tell(import_case(options))
     return 0
 
 

@@ -12,6 +12,7 @@ system_packages=(
     gcc libc6-dev python3-dev python3-venv python3-pip python3-setuptools python3-wheel
     python3-numpy python3-scipy python3-matplotlib python3-pytest python3-pytest-xdist
     python3-mpi4py python3-petsc4py libpetsc-real-dev python3-h5py python3-h5py-mpi openmpi-bin libopenblas0-pthread
+    python3-meshio python3-ezdxf
 )
 # What the distributions lack or have too old.
 python_packages=("pydantic>=2.5" "tqdm>=4.64" "ruff>=0.4" "mypy>=1.8")

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
-from pbem.description.families import find_families, spread_laws, spread_stage
+from pbem.description.families import find_families, spread_conditions, spread_laws, spread_stage
 from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
@@ -92,9 +92,11 @@ class Case:
         values |= {"given": given, "source": source, "groups": (), "origin": {}}
         if expansion is not None:
             values |= {field.name: getattr(expansion, field.name) for field in fields(Expansion)}
-        named = [*values["interfaces"], *(name for stage in values["stages"] for name in stage.interfaces)]
+        named = [*values["interfaces"], *values["boundary"]]
+        named += [name for stage in values["stages"] for name in (*stage.interfaces, *stage.boundary)]
         families = find_families(named, values["curves"])
         if families:
+            values["boundary"] = spread_conditions(values["boundary"], families)
             values["interfaces"] = spread_laws(values["interfaces"], families)
             values["stages"] = tuple(spread_stage(stage, families) for stage in values["stages"])
         values["families"] = families
@@ -146,7 +148,7 @@ class Case:
     def _find_cut(self, path: KeyPath) -> KeyPath:
         """The path with the crack in place of its piece."""
         if len(path) == 4 and path[:1] + path[2:3] == ("regions", "cracks") and isinstance(path[3], int):
-            given, names = self.given["regions"][path[1]].get("cracks", ()), self.regions[str(path[1])].cracks
+            given, names = self.given["regions"].get(path[1], {}).get("cracks", ()), self.regions[str(path[1])].cracks
             whole = self._find_whole(names[path[3]]) if path[3] < len(names) else ""
             return (*path[:3], list(given).index(whole)) if whole in given else path
         return ("curves", self._find_whole(str(path[1])), *path[2:]) if len(path) > 1 and path[0] == "curves" else path
@@ -159,16 +161,16 @@ class Case:
 
     def _find_family(self, path: KeyPath) -> KeyPath:
         at = path[2:] if len(path) > 2 and path[0] == "stages" else path
-        if len(at) < 2 or at[0] != "interfaces":
+        if len(at) < 2 or at[0] not in ("interfaces", "boundary"):
             return path
         given: Any = self.given
-        for part in (*path[: len(path) - len(at)], "interfaces"):
+        for part in (*path[: len(path) - len(at)], at[0]):
             given = given[part] if isinstance(part, int) else given.get(part, {})
         if at[1] in given and (len(at) == 2 or at[2] in given[at[1]]):
             return path
         families = (name for name, members in self.families.items() if at[1] in members and name in given)
         family = next(families, None)
-        return path if family is None else (*path[: len(path) - len(at)], "interfaces", family, *at[2:])
+        return path if family is None else (*path[: len(path) - len(at)], at[0], family, *at[2:])
 
     def _find_given(self, path: KeyPath) -> KeyPath:
         if len(path) == 4 and path[0] == "regions" and isinstance(path[3], int):  # a name in a list

@@ -1,11 +1,14 @@
-"""Pieces of one trace, t12.1, t12.2, ..., and what is said of them all by its name."""
+"""Pieces of one trace, t12.1, t12.2, ..., or of one line of a mesh, and what is said of them all by its name."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 from pbem.description.effects import combine_laws
 from pbem.description.schema import LawTable, StageTable
+
+Condition = TypeVar("Condition")
 
 
 def find_families(names: Iterable[str], curves: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -29,11 +32,19 @@ def spread_laws(laws: Mapping[str, LawTable], families: Mapping[str, Sequence[st
     return spread
 
 
+def spread_conditions(
+    conditions: Mapping[str, Condition], families: Mapping[str, Sequence[str]]
+) -> dict[str, Condition]:
+    """The conditions, or changes, of single curves: what is said of a single one holds instead."""
+    spread = {member: conditions[name] for name in conditions if name in families for member in families[name]}
+    return {**spread, **{name: table for name, table in conditions.items() if name not in families}}
+
+
 def spread_stage(stage: StageTable, families: Mapping[str, Sequence[str]]) -> StageTable:
     """The stage with what it says of families said of their members, and what it says of a single one instead."""
-    told = [name for name in stage.interfaces if name in families]
-    if not told:
+    if not families.keys() & {*stage.interfaces, *stage.boundary}:
         return stage
-    spread = {member: stage.interfaces[name] for name in told for member in families[name]}
-    spread |= {name: table for name, table in stage.interfaces.items() if name not in told}
-    return stage.model_copy(update={"interfaces": spread})
+    return stage.model_copy(update={
+        "interfaces": spread_conditions(stage.interfaces, families),
+        "boundary": spread_conditions(stage.boundary, families),
+    })

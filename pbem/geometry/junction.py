@@ -147,7 +147,8 @@ def _meeting_vertices(curves: Mapping[str, Curve], cracks: Mapping[str, str]) ->
     """Pairs of curves that meet in a vertex where neither ends (a crack must end where it meets a boundary)."""
     at: dict[complex, list[tuple[str, bool]]] = defaultdict(list)
     for name, curve in curves.items():
-        ends = set() if curve.closed else {curve.start, curve.end}
+        # A closed crack, as a piece of one that crosses itself, ends where it begins.
+        ends = set() if curve.closed and name not in cracks else {curve.start, curve.end}
         for leg in curve.legs:
             at[leg.start].append((name, leg.start in ends))
         if not curve.closed:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -46,7 +45,7 @@ class Reading:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.blame(place, show(value), "a number")
             return None
-        if not math.isfinite(value) or abs(value) > LARGEST:
+        if not abs(value) <= LARGEST:
             self.blame(place, show(value), f"a finite number of at most {LARGEST:g}")
             return None
         return float(value)

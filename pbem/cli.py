@@ -121,7 +121,7 @@ def _discard_output() -> None:
 def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     if arguments and _names_a_case(arguments[0]):
         arguments = ["run", *arguments]
-    if len(arguments) == 2 and arguments[0] == "help" and arguments[1] in COMMANDS:
+    if len(arguments) == 2 and arguments[0] == "help" and arguments[1] in COMMANDS and not find_topic(arguments[1]):
         arguments = [arguments[1], "--help"]
     parser = make_parser()
     try:

@@ -175,9 +175,14 @@ class Outline:
 
     points: tuple[complex, ...]
     legs: int
-    center: complex | None = None
+    center: complex = 0j
     radius: float = 0.0
     angles: tuple[float, float] | None = None
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is a polyline."""
+        return self.radius == 0.0
 
 
 def outline(legs: Sequence[Leg], same: float) -> list[Outline]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from pbem.case.reader import add_lines, parse_draft
-from pbem.errors import CaseError, Fault, PbemError
+from pbem.errors import CaseError, PbemError
 from pbem.importing.csv_file import read_csv
 from pbem.importing.dxf_file import read_dxf
 from pbem.importing.geojson_file import read_geojson
 from pbem.importing.map_case import make_map_case
+from pbem.importing.mesh_case import make_mesh_case
+from pbem.importing.msh_file import read_mesh
 from pbem.importing.options import Imported, Options
-from pbem.importing.reading import Reading, fail
+from pbem.importing.reading import Reading, fail, read_text
 from pbem.model.build import examine
 from pbem.wording import list_names
 
@@ -27,9 +29,7 @@ def import_file(path: Path, options: Options, command: str) -> Imported:
         what = "a folder" if path.is_dir() else "no such file"
         raise PbemError(f"{path}: found {what}; expected a file of traces or a mesh")
     if kind == ".msh":
-        from pbem.importing.msh_file import import_mesh
-
-        imported = import_mesh(path, options, command)
+        imported = make_mesh_case(path, read_mesh(path), options, command)
     else:
         reading = _read(path, kind)
         imported = make_map_case(path, reading, options, command)
@@ -41,29 +41,6 @@ def _read(path: Path, kind: str) -> Reading:
     if kind == ".dxf":
         return read_dxf(path)
     return (read_csv if kind in (".csv", ".txt") else read_geojson)(path, read_text(path))
-
-
-def read_text(path: Path) -> str:
-    """The text of a file. Raises CaseError if it is empty or none."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise PbemError(f"{path}: {error.strerror or error}") from None
-    if not data.strip():
-        raise fail(path, [Fault("the file", "nothing in it", "traces")])
-    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "cp1252"):
-        try:
-            text = data.decode(encoding)
-        except UnicodeDecodeError as error:
-            at = error.start
-            continue
-        if "\0" not in text:
-            return text
-        at = text.index("\0")
-        break
-    line = data[:at].count(b"\n") + 1
-    found = f"the byte 0x{data[min(at, len(data) - 1)]:02x}, which is no text"
-    raise fail(path, [Fault(f"line {line}", found, "a text")])
 
 
 def _check(path: Path, imported: Imported) -> None:

@@ -113,7 +113,7 @@ def _simplify(traces: Sequence[Trace], distance: float | None, scale: _Scale) ->
     if touching:
         notes.append(
             f"{len(touching)} ends that lay on another trace now miss it or poke through it, by up to {distance:g}, as "
-            f"that one was simplified: --snap {distance:g} would join them."
+            "that one was simplified: a smaller --simplify or a larger --snap keeps more of them."
         )
     return simpler, notes
 
@@ -124,7 +124,7 @@ def _simplify_legs(legs: Sequence[Leg], distance: float) -> tuple[Leg, ...]:
     for each in outline(legs, 0.0):
         own = legs[done:done + each.legs]
         done += each.legs
-        if each.center is None:
+        if each.straight:
             points = np.array(each.points)
             kept = points[choose_vertices(points, distance)].tolist()
             own = [Leg(a, b, 1) for a, b in itertools.pairwise(kept)]
@@ -183,7 +183,7 @@ def _make_tables(
         tips = all(reached[end] == 1 and end not in inner for end in (part.points[0], part.points[-1]))
         length = sum(abs(b - a) for a, b in zip(part.points, part.points[1:], strict=False))
         # A crack with two tips needs an element for each of them.
-        single = tips and len(part.points) == 2 and part.center is None and length <= scale.size
+        single = tips and len(part.points) == 2 and part.straight and length <= scale.size
         division = {"elements": 2} if single else {"size": scale.size}
         curves[name] = {**write_shape(part), **division}
     friction = FRICTION if options.friction is None else options.friction
@@ -206,7 +206,7 @@ def _make_tables(
 
 def write_shape(part: Outline) -> dict[str, Any]:
     """The keys of a curve that say its shape."""
-    if part.center is None:
+    if part.straight:
         return {"points": [[point.real, point.imag] for point in part.points]}
     circle: dict[str, Any] = {"center": [part.center.real, part.center.imag], "radius": part.radius}
     return circle if part.angles is None else {**circle, "angles": list(part.angles)}

@@ -228,7 +228,7 @@ def _make_tables(
     }
     curves = {}
     for name, _, part, counts in names:
-        division: dict[str, Any] = {"elements": sum(counts) if part.center is not None else counts}
+        division: dict[str, Any] = {"elements": counts if part.straight else sum(counts)}
         if len(counts) == 1:
             division = {"elements": counts[0]}
         curves[name] = {**write_shape(part), **(division if options.size is None else {"size": options.size})}

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pbem.errors import CaseError, Fault, PbemError
-from pbem.importing.options import Imported, Options
-from pbem.importing.reading import Reading, fail
+from pbem.importing.reading import Reading, fail, read_text
 
 # Number of nodes of the kinds of elements, and of the corners, which come first.
 LINES = {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
@@ -53,17 +52,13 @@ class Grid:
             raise ValueError(f"an element of type {kind}; expected points, lines, triangles and quadrangles of a plane")
 
 
-def import_mesh(path: Path, options: Options, command: str) -> Imported:
-    """The case of a mesh. Raises PbemError with what is wrong with it."""
-    from pbem.importing.importer import read_text
-    from pbem.importing.mesh_case import make_mesh_case
-
+def read_mesh(path: Path) -> Grid:
+    """The mesh of a file, text or binary. Raises PbemError with what is wrong with it."""
     try:
         head = path.read_bytes()[:200]
     except OSError as error:
         raise PbemError(f"{path}: {error.strerror or error}") from None
-    grid = _read_by_meshio(path) if _is_binary(head) else read_grid(path, read_text(path))
-    return make_mesh_case(path, grid, options, command)
+    return _read_by_meshio(path) if _is_binary(head) else read_grid(path, read_text(path))
 
 
 def _is_binary(head: bytes) -> bool:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from pbem.errors import CaseError, Fault
+from pbem.errors import CaseError, Fault, PbemError
 from pbem.geometry.curve import Leg
 from pbem.geometry.shape import LARGEST
 from pbem.wording import show
@@ -46,7 +45,7 @@ class Reading:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.blame(place, show(value), "a number")
             return None
-        if not math.isfinite(value) or abs(value) > LARGEST:
+        if not abs(value) <= LARGEST:
             self.blame(place, show(value), f"a finite number of at most {LARGEST:g}")
             return None
         return float(value)
@@ -58,6 +57,29 @@ def fail(path: Path, faults: Sequence[Fault]) -> CaseError:
     if len(faults) > len(shown):
         shown.append(Fault("the file", f"{len(faults) - len(shown)} more of such faults", "none"))
     return CaseError(str(path), tuple(shown))
+
+
+def read_text(path: Path) -> str:
+    """The text of a file. Raises CaseError if it is empty or none."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise PbemError(f"{path}: {error.strerror or error}") from None
+    if not data.strip():
+        raise fail(path, [Fault("the file", "nothing in it", "traces")])
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "cp1252"):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError as error:
+            at = error.start
+            continue
+        if "\0" not in text:
+            return text
+        at = text.index("\0")
+        break
+    line = data[:at].count(b"\n") + 1
+    found = f"the byte 0x{data[min(at, len(data) - 1)]:02x}, which is no text"
+    raise fail(path, [Fault(f"line {line}", found, "a text")])
 
 
 def draw_line(points: Sequence[complex]) -> tuple[Leg, ...]:

@@ -322,7 +322,8 @@ def test_a_plate_with_holes(version: str, capsys: Capture) -> None:
     tables = bring_in("plate.msh", WRITERS[version](make_plate(4, 2.0, holes, 0.5)))
     corners = {name: sorted(curve["points"]) for name, curve in tables["curves"].items() if "points" in curve}
     assert corners == {
-        "left": [[-2, -2], [-2, 2]], "right": [[6, -2], [6, 2]], "top": [[-2, 2], [6, 2]], "bottom": [[-2, -2], [6, -2]],
+        "left": [[-2, -2], [-2, 2]], "right": [[6, -2], [6, 2]],
+        "top": [[-2, 2], [6, 2]], "bottom": [[-2, -2], [6, -2]],
     }
     circles = {name: curve["center"] for name, curve in tables["curves"].items() if "radius" in curve}
     assert circles == {"hole 1": [0.0, 0.0], "hole 2": [4.0, 0.0]}

@@ -1,4 +1,4 @@
-"""The command line: make, check, run, sweep, info, plot, help. Only `run` and `sweep` need MPI and PETSc."""
+"""The command line: it reads what is asked for and calls the commands. Only `run` and `sweep` need MPI and PETSc."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import PbemError, printable
 from pbem.export_command import NOTES as EXPORT_NOTES
 from pbem.export_command import add_export_arguments, export
+from pbem.import_command import NOTES as IMPORT_NOTES
+from pbem.import_command import add_import_options, import_case
 from pbem.info_command import add_info_arguments, describe
 from pbem.make_command import add_make_commands, make
 from pbem.pages import find_topic, lay_out, list_topics, read_page, suggest_topic
@@ -34,12 +36,13 @@ from pbem.wording import suggest
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.
 
-COMMANDS = ("make", "check", "run", "sweep", "info", "plot", "export", "help")
+COMMANDS = ("make", "import", "check", "run", "sweep", "info", "plot", "export", "help")
 
 DESCRIPTION = """\
 Boundary elements for frictional contact in two-dimensional elasticity.
 
   pbem make cracks           write a case of random cracks; also inclusions
+  pbem import FILE -o CASE   a map of traces, or a mesh, as a case
   pbem check CASE            is the case right, and what will be computed?
   pbem run CASE              compute; `pbem CASE` does the same
   pbem sweep CASE            compute it with several values of some keys: a table
@@ -99,7 +102,7 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
 def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     if arguments and _names_a_case(arguments[0]):
         arguments = ["run", *arguments]
-    if len(arguments) == 2 and arguments[0] == "help" and arguments[1] in COMMANDS:
+    if len(arguments) == 2 and arguments[0] == "help" and arguments[1] in COMMANDS and not find_topic(arguments[1]):
         arguments = [arguments[1], "--help"]
     parser = make_parser()
     try:
@@ -158,6 +161,7 @@ def make_parser() -> argparse.ArgumentParser:
         return command
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
+    add_import_options(add("import", _import, "write a case file of a map of traces or of a mesh", IMPORT_NOTES))
     check = add("check", _check, "validate a case, show what would be computed, and what that would take")
     add_check_options(check)
     add_set_option(check)
@@ -193,6 +197,11 @@ def _make(options: argparse.Namespace) -> int:
     except (OSError, ValueError) as error:
         say(f"pbem make: {error}", 0)
         return WRONG_INPUT
+    return 0
+
+
+def _import(options: argparse.Namespace) -> int:
+    tell(import_case(options))
     return 0
 
 

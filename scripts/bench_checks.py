@@ -35,7 +35,8 @@ MOST = 0.03
 # Of the model, when it is read; and after each step.
 CHECKS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "geometry": (build, ("find_crossings", "find_overlaps", "check_contacts", "check_inside", "check_near_misses",
-                         "find_coincidences", "check_closing", "check_tip_elements", "check_turning", "check_facing")),
+                         "find_coincidences", "describe_closing", "check_tip_elements", "check_turning",
+                         "check_facing")),
     "free motions": (build, ("_check_support",)),
     "parts": (problem, ("find_parts",)),
     "support": (problem.Problem, ("find_free_motions",)),

@@ -12,6 +12,7 @@ system_packages=(
     gcc libc6-dev python3-dev python3-venv python3-pip python3-setuptools python3-wheel
     python3-numpy python3-scipy python3-matplotlib python3-pandas python3-pytest python3-pytest-xdist
     python3-mpi4py python3-petsc4py libpetsc-real-dev python3-h5py python3-h5py-mpi openmpi-bin libopenblas0-pthread
+    python3-meshio python3-ezdxf
 )
 # Of these the ones of the distribution stay, whatever else is installed into .venv: wheels bring another MPI and HDF5.
 kept_packages=(numpy h5py mpi4py petsc4py)

@@ -40,7 +40,7 @@ class ParticularSolution:
         return not (any(self.remote) or self.force) and self.initial.is_zero and self.swelling.is_zero
 
     def displacement(self, point: Complex) -> Complex:
-        """Displacement (complex) at points: of remote strain about the center, gravity and swelling (theory, 5, 6, 83).
+        """Displacement (complex) at points: of remote strain about the center, gravity and swelling (theory, 5, 6, 86).
 
         Gravity's stress is isotropic, -(b . (x - center)), so that its displacement is an analytic function of x.
         """

@@ -9,7 +9,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.contact.anchor import Anchor, group_motions, see_motions
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, resists_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, follow_leaders, resists_slip
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import PairTie, RigidBodyMode, Tie, find_rigid_body_modes
@@ -150,27 +150,38 @@ def close_nearest_pairs(
     return ModeState(mode, modes.sign)
 
 
+def close_nearest_beside(laws: PairLaws, modes: ModeState, opening: Real, beside: Integer) -> ModeState:
+    """Modes with the nearest open pair beside every free part closed; beside (m,): the part of each pair, or -1."""
+    own = np.flatnonzero((beside >= 0) & (modes.mode == OPEN) & ~laws.parted & ~laws.follows)
+    own = own[np.lexsort((opening[own], beside[own]))]
+    nearest = own[np.unique(beside[own], return_index=True)[1]]
+    mode = modes.mode.copy()
+    mode[nearest] = np.where(resists_slip(laws)[nearest], STICK, SLIP)
+    return follow_leaders(laws, ModeState(mode, modes.sign))
+
+
 # Slips that differ by less than this part are those of a symmetric model.
 ALIKE = 1e-6
 
 
 def stick_calmest_pairs(
-    mesh: Mesh, laws: PairLaws, modes: ModeState, slip: Real, overloaded: Integer,
+    of: Integer, laws: PairLaws, modes: ModeState, slip: Real, overloaded: Integer,
     holds: Callable[[ModeState], bool],
 ) -> tuple[ModeState, Integer]:
-    """Modes with the calmest pairs of one interface after the other sticking until `holds` says enough, and the pairs.
+    """Modes with the calmest pairs of one joint after the other sticking until `holds` says enough, and the pairs.
 
-    Only of interfaces on which all closed pairs slip; there the pair of the least slip (m,), and those that are its
+    of (m,): the joint of every pair, an interface or the cracks around a part, -1 for those that are left as they are.
+    Only of joints on which all closed pairs slip; there the pair of the least slip (m,), and those that are its
     images in a symmetric model. overloaded: pairs that
-    stuck instead and could not carry what was left: on their interfaces only pairs that slip in the other sense come
+    stuck instead and could not carry what was left: on their joints only pairs that slip in the other sense come
     into question, as the body moves on in the sense of the overload. The same modes and none if nothing holds.
     """
     mode = modes.mode.copy()
-    sense = np.zeros(len(mesh.interface_names))
-    sense[mesh.pairs.interface[overloaded]] = modes.sign[overloaded]
-    of = mesh.pairs.interface
-    sticks = np.bincount(of[mode == STICK], minlength=len(sense)) > 0
-    may = (mode == SLIP) & ~mesh.pairs.crack & resists_slip(laws) & ~sticks[of] & (modes.sign * sense[of] <= 0)
+    sense = np.zeros(int(of.max(initial=-1)) + 2)  # the last one is that of pairs without a joint
+    sense[of[overloaded]] = modes.sign[overloaded]
+    sticks = np.zeros(len(sense), dtype=bool)
+    sticks[of[mode == STICK]] = True
+    may = (mode == SLIP) & (of >= 0) & resists_slip(laws) & ~sticks[of] & (modes.sign * sense[of] <= 0)
     may[overloaded] = False
     candidates = np.flatnonzero(may)
     candidates = candidates[np.argsort(np.abs(slip[candidates]), kind="stable")]

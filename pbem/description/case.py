@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
+from pbem.description.families import find_families, spread_conditions, spread_laws, spread_stage
 from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
@@ -49,8 +50,10 @@ class Case:
         Case(materials={"rock": {"young": 1000.0, "poisson": 0.2}}, curves={...}, regions={...})
 
     Curves, regions and laws of the tables [[generate]] are among the others, after them; groups: what each table made.
-    given: the tables as they were given, without what was generated and without defaults; source: the file's path, as
-    it was given. What follows from the geometry is checked by `pbem.model.build.build_model`.
+    A law that is given by the name of a trace, t12, is that of each of its pieces, t12.1, t12.2, ...; families: the
+    traces that laws or stages name, with their pieces. given: the tables as they were given, without what was generated
+    and without defaults; source: the file's path, as it was given. What follows from the geometry is checked by
+    `pbem.model.build.build_model`.
     """
 
     title: str
@@ -76,6 +79,7 @@ class Case:
     source: str
     groups: tuple[GeneratedGroup, ...]
     origin: Mapping[str, int]
+    families: Mapping[str, tuple[str, ...]]
 
     def __init__(self, /, **tables: Any) -> None:
         """Tables and keys of a case file; tuples and arrays may stand for lists, None for a key that is not given.
@@ -94,6 +98,14 @@ class Case:
         values |= {"given": given, "source": source, "groups": (), "origin": {}}
         if expansion is not None:
             values |= {field.name: getattr(expansion, field.name) for field in fields(Expansion)}
+        named = [*values["interfaces"], *values["boundary"]]
+        named += [name for stage in values["stages"] for name in (*stage.interfaces, *stage.boundary)]
+        families = find_families(named, values["curves"])
+        if families:
+            values["boundary"] = spread_conditions(values["boundary"], families)
+            values["interfaces"] = spread_laws(values["interfaces"], families)
+            values["stages"] = tuple(spread_stage(stage, families) for stage in values["stages"])
+        values["families"] = families
         case = cls.__new__(cls)
         case._take(values)
         return case
@@ -114,10 +126,60 @@ class Case:
         """For notebooks."""
         return print_case_as_html(self)
 
+    def put_pieces(self, members: Mapping[str, tuple[str, ...]], tables: Mapping[str, CurveTable]) -> Self:
+        """The case with the pieces (by the name of their crack) of cracks that are cut in their place; tables: of all.
+
+        Faults in it are still told at what was given.
+        """
+        def spread(names: Mapping[str, Any] | Sequence[str]) -> list[str]:
+            return [piece for name in names for piece in members.get(name, (name,))]
+
+        case = type(self).__new__(type(self))
+        laws = {name: pieces for name, pieces in members.items() if pieces != (name,)}
+        case._take(vars(self) | {
+            "curves": {name: tables[name] if name in tables else self.curves[name] for name in spread(self.curves)},
+            "regions": {
+                name: table.model_copy(update={"cracks": tuple(spread(table.cracks))})
+                for name, table in self.regions.items()
+            },
+            "interfaces": spread_laws(self.interfaces, laws),
+            "stages": tuple(spread_stage(stage, laws) for stage in self.stages),
+            "families": {**self.families, **laws},
+        })
+        return case
+
     def trace(self, fault: Fault) -> Fault:
-        """The fault at what was given: of a curve, region or law that was generated, at the key it was made from."""
-        path = self._find_given(fault.path)
+        """The fault at what was given: of a curve, region or law that was generated, at the key it was made from; of a
+        piece of a crack, at the crack; of its law, where it is said of its trace."""
+        path = self._find_family(self._find_given(self._find_cut(fault.path)))
         return fault if path == fault.path else Fault.at(path, fault.found, fault.expected)
+
+    def _find_cut(self, path: KeyPath) -> KeyPath:
+        """The path with the crack in place of its piece."""
+        if len(path) == 4 and path[:1] + path[2:3] == ("regions", "cracks") and isinstance(path[3], int):
+            given, names = self.given["regions"].get(path[1], {}).get("cracks", ()), self.regions[str(path[1])].cracks
+            whole = self._find_whole(names[path[3]]) if path[3] < len(names) else ""
+            return (*path[:3], list(given).index(whole)) if whole in given else path
+        return ("curves", self._find_whole(str(path[1])), *path[2:]) if len(path) > 1 and path[0] == "curves" else path
+
+    def _find_whole(self, name: str) -> str:
+        """The crack of which a curve is a piece, or the curve itself."""
+        if name in self.given.get("curves", ()):
+            return name
+        return next((whole for whole, pieces in self.families.items() if name in pieces), name)
+
+    def _find_family(self, path: KeyPath) -> KeyPath:
+        at = path[2:] if len(path) > 2 and path[0] == "stages" else path
+        if len(at) < 2 or at[0] not in ("interfaces", "boundary"):
+            return path
+        given: Any = self.given
+        for part in (*path[: len(path) - len(at)], at[0]):
+            given = given[part] if isinstance(part, int) else given.get(part, {})
+        if at[1] in given and (len(at) == 2 or at[2] in given[at[1]]):
+            return path
+        families = (name for name, members in self.families.items() if at[1] in members and name in given)
+        family = next(families, None)
+        return path if family is None else (*path[: len(path) - len(at)], at[0], family, *at[2:])
 
     def _find_given(self, path: KeyPath) -> KeyPath:
         if len(path) == 4 and path[0] == "regions" and isinstance(path[3], int):  # a name in a list

@@ -86,6 +86,12 @@ class Leg:
         piece = self.kind.cut(self, first, last)
         return replace(self, **piece._replace(start=start, end=end)._asdict(), elements=elements)
 
+    def tie(self, start: complex, end: complex) -> Leg:
+        """The leg with other ends, near to its own: itself if they are the same."""
+        if start == self.start and end == self.end:
+            return self
+        return replace(self, **self.kind.tie(self, start, end)._asdict())
+
     def element_fractions(self) -> Real:
         """The elements + 1 ends of the elements as fractions of the leg's length."""
         if self.fractions is not None:

@@ -110,6 +110,27 @@ def find_crossings(
     return list(found.values())
 
 
+def find_crossing_cracks(cracks: Mapping[str, Curve], tolerance: Tolerance) -> set[str]:
+    """Names of the cracks that cross or touch another one, or themselves, elsewhere than with their ends."""
+    legs = [(name, leg) for name, curve in cracks.items() for leg in curve.legs]
+    if not legs:
+        return set()
+    found: set[str] = set()
+    boxes = Boxes.around_legs([leg for _, leg in legs], tolerance.largest)
+    for i, j in _pair(boxes.find_pairs()):
+        (name, leg), (other, other_leg) = legs[i], legs[j]
+        same = tolerance.between(name, other)
+        if {name, other} <= found:
+            continue
+        touching = {*_touching_ends(leg, other_leg, same)} - {
+            end for curve in (cracks[name], cracks[other]) if not curve.closed for end in (curve.start, curve.end)
+        }
+        if touching or meeting_points(leg, other_leg, same):
+            found |= {name, other}
+    region = dict.fromkeys(cracks, "")
+    return found.union(*_meeting_vertices(cracks, region))
+
+
 def _touching_ends(first: Leg, second: Leg, tolerance: float) -> list[complex]:
     """Ends of one leg in the interior of the other."""
     points = []
@@ -126,7 +147,8 @@ def _meeting_vertices(curves: Mapping[str, Curve], cracks: Mapping[str, str]) ->
     """Pairs of curves that meet in a vertex where neither ends (a crack must end where it meets a boundary)."""
     at: dict[complex, list[tuple[str, bool]]] = defaultdict(list)
     for name, curve in curves.items():
-        ends = set() if curve.closed else {curve.start, curve.end}
+        # A closed crack, as a piece of one that crosses itself, ends where it begins.
+        ends = set() if curve.closed and name not in cracks else {curve.start, curve.end}
         for leg in curve.legs:
             at[leg.start].append((name, leg.start in ends))
         if not curve.closed:

@@ -164,3 +164,64 @@ def join_ends(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[s
             legs.append(replace(leg, start=start, end=end))
         result[name] = Curve(name, tuple(legs))
     return result, list({name: (name, index) for name, index in reversed(short)}.values())
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Legs as one curve of a case: the points of a polyline, or a circle, or an arc of it between angles (degrees).
+
+    legs: how many of the chain it stands for.
+    """
+
+    points: tuple[complex, ...]
+    legs: int
+    center: complex = 0j
+    radius: float = 0.0
+    angles: tuple[float, float] | None = None
+
+    @property
+    def straight(self) -> bool:
+        """Whether it is a polyline."""
+        return self.radius == 0.0
+
+
+def outline(legs: Sequence[Leg], same: float) -> list[Outline]:
+    """Chains of legs as curves that a case can have: straight ones together, and those of one circle together.
+
+    same: length up to which circles' centres and radii are the same.
+    """
+    outlines = []
+    first = 0
+    while first < len(legs):
+        leg = legs[first]
+        last = first + 1
+        if leg.sweep == 0:
+            while last < len(legs) and legs[last].sweep == 0:
+                last += 1
+            outlines.append(Outline((leg.start, *(each.end for each in legs[first:last])), last - first))
+        else:
+            turn = leg.sweep
+            while last < len(legs) and legs[last].sweep * leg.sweep > 0 and _share_circle(leg, legs[last], same) and (
+                abs(turn + legs[last].sweep) < 2 * math.pi + 1e-9
+            ):
+                turn += legs[last].sweep
+                last += 1
+            outlines.append(_outline_circle(leg, legs[last - 1], turn, last - first))
+        first = last
+    return outlines
+
+
+def _share_circle(one: Leg, other: Leg, same: float) -> bool:
+    assert one.center is not None and other.center is not None
+    radii = abs(one.start - one.center), abs(other.start - other.center)
+    return abs(one.center - other.center) <= same and abs(radii[0] - radii[1]) <= same
+
+
+def _outline_circle(first: Leg, last: Leg, turn: float, legs: int) -> Outline:
+    assert first.center is not None
+    center, radius = first.center, abs(first.start - first.center)
+    begin = math.degrees(cmath.phase(first.start - center))
+    # A full circle begins at the angle 0 in a case, which splits it where others meet it elsewhere.
+    if abs(turn) > 2 * math.pi - 1e-9 and first.start == last.end:
+        return Outline((first.start, last.end), legs, center, radius)
+    return Outline((first.start, last.end), legs, center, radius, (begin, begin + math.degrees(turn)))

@@ -35,22 +35,23 @@ class Parts:
     """first, second (e,): the part on the left of every element, and that of a crack's second face (first elsewhere).
 
     region (p,): of every part; the last one of an infinite region is that without a boundary. cut (p,): parts that
-    share their region with others.
+    share their region with others. block (p,): those of them that cracks alone bound.
     """
 
     first: Integer
     second: Integer
     region: Integer
     cut: Bool
+    block: Bool
 
 
 def find_parts(mesh: Mesh) -> Parts:
-    """The parts of all regions; one for each that no cracks cut."""
+    """The parts of all regions, which rigid motions move one by one; one for each that no cracks cut (theory, 83)."""
     first = mesh.region.astype(np.int64).copy()
-    second, region = first.copy(), list(range(len(mesh.region_names)))
+    second, region, unbounded = first.copy(), list(range(len(mesh.region_names))), set[int]()
     for number in np.unique(mesh.region[mesh.crack]):
         own = np.flatnonzero(mesh.region == number)
-        label, count = _divide_region(mesh, own)
+        label, count, infinite = _divide_region(mesh, own)
         if count < 2:
             continue
         numbers = np.array([number, *range(len(region), len(region) + count - 1)])
@@ -59,12 +60,18 @@ def find_parts(mesh: Mesh) -> Parts:
         second[own] = first[own]
         crack = mesh.crack[own]
         second[own[crack]] = numbers[label[len(own) :]]
+        if infinite:
+            unbounded.add(int(numbers[-1]))
     owner = np.array(region, dtype=np.int64)
-    return Parts(first, second, owner, np.bincount(owner)[owner] > 1)
+    cut = np.bincount(owner)[owner] > 1
+    block = cut.copy()
+    block[first[~mesh.crack]] = block[list(unbounded)] = False
+    return Parts(first, second, owner, cut, block)
 
 
-def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
-    """Part of every way along the elements of a region, cracks' second faces last, and the number of parts."""
+def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int, bool]:
+    """Part of every way along the elements of a region, cracks' second faces last, the number of parts, and whether the
+    last one has no boundary around it."""
     cracks = own[mesh.crack[own]]
     back = mesh.geometry.select(cracks).turn_back()
     ways = Elements.join([mesh.geometry.select(own), back])
@@ -84,16 +91,20 @@ def _divide_region(mesh: Mesh, own: Integer) -> tuple[Integer, int]:
     outer = np.flatnonzero(area > FLAT * around**2)
     outer = outer[np.argsort(area[outer], kind="stable")]
     if not len(outer):
-        return np.zeros(count, dtype=np.int64), 1
+        return np.zeros(count, dtype=np.int64), 1, False
     # Both sides of closed cracks cancel: what is left is the material's area, or that of the holes in a plane.
     bounded = float(area.sum()) > FLAT * np.abs(start - start.mean()).max() ** 2
     part = np.full(loops, 0 if bounded else len(outer), dtype=np.int64)
     part[outer] = np.arange(len(outer))
     inner = np.setdiff1d(np.arange(loops), outer)
+    ways_of = np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=loops))[:-1])
+    # What hangs together with an outline is around it or beside it, but not within.
+    graph = sparse.csr_matrix((np.ones(count), (vertex[:count], vertex[count:])), shape=(2 * count, 2 * count))
+    network = connected_components(graph, directed=False)[1][vertex[at]]
     for number in reversed(range(len(outer))):
-        edges = label == outer[number]
-        part[inner[_is_inside(start[at[inner]], start[edges], end[edges])]] = number
-    return part[label], len(outer) + (not bounded)
+        others = inner[network[inner] != network[outer[number]]]
+        part[others[_is_inside(start[at[others]], ways.select(ways_of[outer[number]]))]] = number
+    return part[label], len(outer) + (not bounded), not bounded
 
 
 def _measure_reach(mesh: Mesh, own: Integer, cracks: Integer) -> Real:
@@ -135,12 +146,11 @@ def _follow(leaves: Integer, reaches: Integer, leaving: Real, coming: Real) -> I
     return follower
 
 
-def _is_inside(points: Complex, start: Complex, end: Complex) -> Bool:
-    """Whether points lie inside of the polygon of edges: by crossings of a ray."""
-    inside = np.zeros(len(points), dtype=bool)
-    for number, point in enumerate(points):
-        crosses = (start.imag > point.imag) != (end.imag > point.imag)
-        a, b = start[crosses], end[crosses]
-        x = a.real + (point.imag - a.imag) / (b.imag - a.imag) * (b.real - a.real)
-        inside[number] = np.count_nonzero(x > point.real) % 2 == 1
+def _is_inside(points: Complex, outline: Elements) -> Bool:
+    """Whether points lie inside of a closed outline: by the angles under which they see its elements."""
+    corners, (low, high) = np.stack([points.real, points.imag], axis=1), outline.bounds()
+    inside = ((corners >= low.min(axis=0)) & (corners <= high.max(axis=0))).all(axis=1)
+    near = np.flatnonzero(inside)
+    if len(near):
+        inside[near] = np.rint(outline.subtend(points[near]).sum(axis=0) / (2 * np.pi)) != 0
     return inside

@@ -13,13 +13,15 @@ from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
-    check_closing,
     check_inside,
     check_near_misses,
     check_tip_elements,
+    describe_closing,
     describe_near_misses,
+    divide_for_tips,
     find_tips,
 )
+from pbem.model.cutting import Cut, cut_cracks
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
@@ -79,18 +81,21 @@ def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
 
 def examine(case: Case, conditions_known: bool = True) -> tuple[Model | None, list[Fault]]:
     """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged."""
-    model, faults = _examine(case, conditions_known)
+    model, case, faults = _examine(case, conditions_known)
     return model, [case.trace(fault) for fault in faults]
 
 
-def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fault]]:
+def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, list[Fault]]:
+    """As above, with the case in which cracks that cross are cut."""
     roles = resolve_roles(case)
+    cut = cut_cracks(case, roles, shape_curves(case, roles))
+    case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
-    topology = _find_topology(case, roles)
+    topology = _find_topology(cut)
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
-        return None, faults
+        return None, case, faults
     model, faults = _compose(case, roles, loading, topology)
     model = replace(model, interior_points=interior)
     faults += [*check_turning(case, model.curves), *check_facing(model)]
@@ -110,11 +115,11 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, list[Fau
         wrong, notes = _check_support(model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
-    return model, faults
+    return model, case, faults
 
 
-def _find_topology(case: Case, roles: Roles) -> _Topology:
-    shapes = shape_curves(case, roles)
+def _find_topology(cut: Cut) -> _Topology:
+    case, roles, shapes = cut.case, cut.roles, cut.shapes
     split = split_at_junctions(shapes.curves, shapes.tolerance)
     curves = split.curves
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
@@ -123,27 +128,26 @@ def _find_topology(case: Case, roles: Roles) -> _Topology:
     touching = {
         frozenset(pair) for pair in roles.contacts.values() if roles.outer[pair[0]] != roles.outer[pair[1]]
     }
-    crossings = find_crossings(curves, cracks, shapes.tolerance, touching)
+    crossings = [*cut.faults] or find_crossings(curves, cracks, shapes.tolerance, touching)
     boundaries = {name: table.boundary for name, table in case.regions.items()}
     infinite = {name for name, table in case.regions.items() if table.infinite}
     loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
     faults = [*shapes.faults, *crossings, *wrong]
-    notes = list(split.notes)
+    notes = [*cut.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
         faults += find_coincidences(curves, loops, roles)
-        closing, cuts = check_closing(curves, cracks, loops)
-        faults += closing
-        notes += cuts
+        notes += describe_closing(curves, cracks, loops)
     if not faults:
         written = {name for name in curves if case.curves[name].expression}
         seats = split_opposite_ends(curves, loops, roles.contacts, written)
         curves, opposite = seats.curves, seats.opposite
         notes += seats.notes
     tips = find_tips(curves, cracks)
+    curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
     return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))

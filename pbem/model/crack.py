@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,6 +46,18 @@ def find_tips(curves: Mapping[str, Curve], cracks: Mapping[str, str]) -> dict[st
     """Per crack whether its start and its end are tips: points that no other leg reaches."""
     visits = count_leg_ends(curves)
     return {name: (visits[curves[name].start] == 1, visits[curves[name].end] == 1) for name in cracks}
+
+
+def divide_for_tips(
+    case: Case, curves: Mapping[str, Curve], tips: Mapping[str, tuple[bool, bool]]
+) -> dict[str, Curve]:
+    """The curves, with two elements on cracks of one with two tips, where a size is given, which they do not exceed."""
+    result = dict(curves)
+    for name, ends in tips.items():
+        legs, sized = curves[name].legs, case.curves[name].size is not None
+        if case.analysis.tips and all(ends) and sized and sum(leg.elements for leg in legs) < 2:
+            result[name] = Curve(name, (replace(legs[0], elements=2), *legs[1:]))
+    return result
 
 
 def check_tip_elements(
@@ -166,40 +178,39 @@ def _group_by_region(cracks: Mapping[str, str]) -> dict[str, list[str]]:
     return groups
 
 
-def check_closing(
-    curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops
-) -> tuple[list[Fault], list[str]]:
-    """Faults for cracks that enclose a part of their region, notes for those that cut it together with its boundary.
+def describe_closing(curves: Mapping[str, Curve], cracks: Mapping[str, str], loops: Loops) -> list[str]:
+    """Notes for cracks that enclose blocks of their region, or cut it in two together with its boundary.
 
-    A part enclosed by cracks alone has no displacement equation of its own, so that its rigid motion would be
-    undetermined; a part cut off with a piece of the boundary has.
+    Nothing but what the cracks carry holds such parts: their own rigid motion makes no traction anywhere.
     """
-    faults, notes = [], []
-    closing: set[str] = set()
-    groups = _Groups()
-    for name, region in cracks.items():
-        joined = [groups.join(leg.start, leg.end) for leg in curves[name].legs]
-        if not all(joined):
-            closing.add(name)
-            found = f"crack '{name}' closing a ring of cracks, which cuts region '{region}' in two"
-            expected = "cracks that enclose nothing: make the enclosed part a region, and the ring its interface"
-            faults.append(Fault.at(("curves", name), found, expected))
-    of_region = _group_by_region(cracks)
-    for region in loops:
-        own = [name for name in of_region.get(region, []) if name not in closing]
-        if not own:
-            continue
-        cutting = _find_cutting(curves, own, loops[region])
-        notes += [
-            f"Crack '{name}' cuts region '{region}' in two; its parts are held together only by what the crack carries."
-            for name in cutting
-        ]
-    return faults, notes
+    notes = []
+    for region, names in _group_by_region(cracks).items():
+        rings = _count_closing(curves, names, ())
+        if sum(rings.values()) > MOST_NOTES:
+            notes.append(f"Cracks enclose {sum(rings.values())} blocks of region '{region}', each of them held only by "
+                         "what its cracks carry.")  # fmt: skip
+        else:
+            notes += [
+                f"Crack '{name}' closes a ring: the block of region '{region}' within is held only by what its cracks "
+                "carry." for name in rings
+            ]
+        own = [name for name in names if name not in rings]
+        cutting = _count_closing(curves, own, loops.get(region, ())) if loops.get(region) else {}
+        if len(cutting) > MOST_NOTES:
+            notes.append(f"{len(cutting)} cracks cut region '{region}' into parts, which are held together only by "
+                         "what the cracks carry.")  # fmt: skip
+        else:
+            notes += [
+                f"Crack '{name}' cuts region '{region}' in two; its parts are held together only by what the crack "
+                "carries." for name in cutting
+            ]
+    return notes
 
 
-def _find_cutting(curves: Mapping[str, Curve], cracks: list[str], loops: tuple[Loop, ...]) -> list[str]:
+def _count_closing(curves: Mapping[str, Curve], cracks: list[str], loops: tuple[Loop, ...]) -> dict[str, int]:
+    """Cracks that close rings of cracks and loops, each with the number of rings that it is the last one of."""
     groups = _Groups()
-    for loop in loops:
-        for leg in loop_legs(curves, (loop,)):
-            groups.join(leg.start, leg.end)
-    return [name for name in cracks if not all([groups.join(leg.start, leg.end) for leg in curves[name].legs])]
+    for leg in loop_legs(curves, loops):
+        groups.join(leg.start, leg.end)
+    closing = {name: sum(not groups.join(leg.start, leg.end) for leg in curves[name].legs) for name in cracks}
+    return {name: count for name, count in closing.items() if count}

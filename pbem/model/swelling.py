@@ -34,7 +34,7 @@ class Swelling:
         return not (any(self.strain) or self.growth)
 
     def displacement(self, point: Complex) -> Complex:
-        """Displacement (complex) at points, which leaves the region without stress (theory, 83)."""
+        """Displacement (complex) at points, which leaves the region without stress (theory, 86)."""
         mean, deviator = self._split()
         away = point - self.center
         return np.asarray(mean * away + deviator * np.conj(away) + 0.5 * np.conj(self.growth) * away**2)

@@ -18,6 +18,7 @@ TOPICS = {
     "commands": "commands, options, exit codes and messages",
     "cases": "how a case file describes bodies, cracks, contacts and loads",
     "keys": "all keys of the case file, with types, ranges and defaults",
+    "import": "maps of traces and meshes as cases",
     "laws": "friction laws, and how to write one",
     "signs": "signs and directions",
     "results": "the result file, and how to read it in Python",

@@ -78,6 +78,8 @@ def test_a_topic_that_is_like_nothing_is_not_guessed_at(capsys: Capture) -> None
 
 def test_help_on_a_command_is_that_of_the_command(capsys: Capture) -> None:
     for command in COMMANDS:
+        if find_topic(command):  # of `import` there is a page
+            continue
         assert main(["help", command]) == 0
         assert capsys.readouterr().out.startswith(f"usage: pbem {command} ")
 

@@ -12,9 +12,10 @@ from pathlib import Path
 # The path of the data: a part imports those before it, never those after it.
 # The package itself comes last: it offers what they define.
 ORDER = (
-    "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "solve", "results", "progress",
-    "driver", "sweeps", "bundled", "terminal", "make_command", "check_command", "run_command", "sweep_command",
-    "export_command", "info_command", "plot_command", "pages", "cli", "__main__", "__init__",
+    "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "importing", "solve", "results",
+    "progress", "driver", "sweeps", "bundled", "terminal", "make_command", "import_command", "check_command",
+    "run_command", "sweep_command", "export_command", "info_command", "plot_command", "pages", "cli", "__main__",
+    "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock")
@@ -28,6 +29,8 @@ DOORS = {
     "h5py": ("results",),
     "tomllib": ("case",),
     "matplotlib": ("results",),
+    "meshio": ("importing",),
+    "ezdxf": ("importing",),
 }
 
 # The systems of equations and what they are made of: asking an object which of them it is belongs to none ...

@@ -129,8 +129,9 @@ def test_crack_of_one_element_has_room_for_one_tip() -> None:
     fault = find_only_fault(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], elements = 1"))
     assert fault.startswith("curves.crack.elements (line 11): found 1 element on crack 'crack' with two tips")
     assert "expected at least 2, one for each tip; or tips = false" in fault
-    fault = find_only_fault(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], size = 9"))
-    assert fault.startswith("curves.crack.size")
+    # A size is not exceeded by two.
+    model = build(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], size = 9"))
+    assert sum(leg.elements for leg in model.curves["crack"].legs) >= 2
     build(with_cracks(crack="points = [[0.5, 1], [1.5, 1.2]], elements = 1") + "[analysis]\ntips = false\n")
     build(with_cracks(crack="points = [[0.5, 0], [1.5, 1.2]], elements = 1"))
 
@@ -166,44 +167,10 @@ WRONG = {
         "curves.crack",
         "running over curve 'bottom' from (0.5, 0) to (1.5, 0)",
     ),
-    "crossing another": (
-        {"a": "points = [[0.5, 1], [1.5, 1]], elements = 4", "b": "points = [[1, 0.5], [1, 1.5]], elements = 4"},
-        "curves.b",
-        "crack 'b' crossing or touching crack 'a' at (1, 1); expected cracks that meet others only with their ends",
-    ),
-    "crossing another in vertices": (
-        {
-            "a": "points = [[0.5, 1], [1, 1], [1.5, 1]], elements = 4",
-            "b": "points = [[1, 0.5], [1, 1], [1, 1.5]], elements = 4",
-        },
-        "curves.b",
-        "crossing or touching crack 'a' at (1, 1)",
-    ),
-    "arc crossing": (
-        {
-            "a": "center = [1, 1], radius = 0.5, angles = [-90, 90], elements = 4",
-            "b": "points = [[1.2, 1], [1.7, 1]], elements = 4",
-        },
-        "curves.b",
-        "crossing or touching crack 'a' at (1.5, 1)",
-    ),
     "twice the same": (
         {"a": "points = [[0.5, 1], [1.5, 1]], elements = 4", "b": "points = [[1.5, 1], [0.5, 1]], elements = 4"},
         "curves.b",
         "running over curve 'a'",
-    ),
-    "ring": (
-        {"crack": "center = [1, 1], radius = 0.5, elements = 8"},
-        "curves.crack",
-        "closing a ring of cracks, which cuts region 'body' in two",
-    ),
-    "ring of two": (
-        {
-            "a": "center = [1, 1], radius = 0.5, angles = [0, 180], elements = 8",
-            "b": "center = [1, 1], radius = 0.5, angles = [0, -180], elements = 8",
-        },
-        "curves.b",
-        "make the enclosed part a region, and the ring its interface",
     ),
     "short of the boundary by a rounding": (
         {"crack": "points = [[1, 1], [1, 1e-7]], elements = 4"},

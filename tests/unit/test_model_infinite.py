@@ -130,12 +130,6 @@ WRONG = {
         "regions.host.cracks[2]",
         "crack 'short' outside region 'host', at",
     ),
-    "a crack that encloses": (
-        'cracks = ["crack"]',
-        'cracks = ["crack", "far"]',
-        "curves.far",
-        "closing a ring of cracks",
-    ),
 }
 EXTRA = {
     "more": "more = { center = [0, 0], radius = 0.5, elements = 8 }",

@@ -90,6 +90,9 @@ class Arc(Kind):
         start, end, center = ((z - origin) * factor for z in (e.start, e.end, e.center))
         return Piece(start, end, center, e.sweep)
 
+    def tie(self, e: Shape, start: Any, end: Any) -> Piece:
+        return Piece(start, end, 0.5 * (start + end) + 0.5j * (end - start) / np.tan(0.5 * e.sweep), e.sweep)
+
     def restore(self, e: Shape, z: Any, radius: Any) -> Any:
         return e.center + radius * (z - e.center) / abs(z - e.center)
 

@@ -136,6 +136,10 @@ class Kind(ABC):
         """In other coordinates, (z - origin) factor: moved, turned, enlarged."""
 
     @abstractmethod
+    def tie(self, e: Shape, start: Any, end: Any) -> Piece:
+        """The same with other ends, which are near to its own: an arc keeps its angle, and gets another centre."""
+
+    @abstractmethod
     def restore(self, e: Shape, z: Any, radius: Any) -> Any:
         """Points z on the element put back on a circle of the radius that was written, which rounding took them off."""
 

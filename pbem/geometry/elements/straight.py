@@ -67,6 +67,9 @@ class Straight(Kind):
     def move(self, e: Shape, origin: Any, factor: Any) -> Piece:
         return Piece((e.start - origin) * factor, (e.end - origin) * factor, e.center, e.sweep)
 
+    def tie(self, e: Shape, start: Any, end: Any) -> Piece:
+        return Piece(start, end, e.center, e.sweep)
+
     def restore(self, e: Shape, z: Any, radius: Any) -> Any:
         return z
 

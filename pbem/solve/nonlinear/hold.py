@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
-from pbem.contact.cut_parts import describe_cut_motions
-from pbem.contact.free_motions import CLOSED_AT_LEAST, close_nearest_pairs, stick_calmest_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, stick_creeping
+from pbem.contact.cut_parts import CutMotion
+from pbem.contact.floating import measure_space
+from pbem.contact.free_motions import (
+    CLOSED_AT_LEAST,
+    close_nearest_beside,
+    close_nearest_pairs,
+    stick_calmest_pairs,
+)
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
@@ -24,6 +31,9 @@ MOST_HELD = 12
 UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
+# Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
+# length of the model) carry nothing.
+FAINT = 1e-2
 SHARES = (0.0, 0.3, 1.0)
 
 
@@ -45,6 +55,9 @@ class Hold:
         self.count = 0
         self.driven = False
         self.repeated = 0
+        # Blocks that pairs were closed to hold, and the last state of all pairs that was found.
+        self.placed: set[int] = set()
+        self.state: PairState | None = None
         # Only violations of this share of the largest change modes, once those that hold a body came back: many changes
         # at a time free a body whose contact only wants to move on around it.
         self.share = 0.0
@@ -85,6 +98,10 @@ class Hold:
         return held
 
     def _choose(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        held = self._hold_bodies(modes, opening, slip, before)
+        return self._hold_parts(held, opening, slip, before)
+
+    def _hold_bodies(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
         if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
@@ -95,18 +112,83 @@ class Hold:
                 return closed
         if before is None or self.count >= MOST_HELD:
             return closed
-        # Pairs that stuck until now and are overloaded say in which sense the body goes on to move.
+        joint = np.where(mesh.pairs.crack, -1, mesh.pairs.interface)
+        overloaded = self._find_overloaded(before, modes)
+        return self._stick(joint, closed, slip, overloaded, lambda trial: not self.find_free(trial))
+
+    def _find_overloaded(self, before: ModeState, modes: ModeState) -> Integer:
+        """Pairs that held a body until now and are overloaded: they say in which sense it goes on to move."""
         overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
-        overloaded = np.intersect1d(overloaded, self.pairs)
+        return np.intersect1d(overloaded, self.pairs)
+
+    def _stick(
+        self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]
+    ) -> ModeState:
         for passed_over in (overloaded, overloaded[:0]):
-            held, pairs = stick_calmest_pairs(
-                mesh, laws, closed, slip, passed_over, lambda trial: not self.find_free(trial)
-            )
+            held, pairs = stick_calmest_pairs(joint, self.problem.laws, modes, slip, passed_over, holds)
             if len(pairs):
                 break
         self.count += 1
         self.pairs = np.union1d(self.pairs, pairs)
         return held
+
+    def _hold_parts(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        """The modes, with pairs sticking or closed where parts that cracks cut off would be free.
+
+        Parts are held one pair at a time, as every one that is closed to hold them can pull at them.
+        """
+        problem = self.problem
+        for body in {body for motion in problem.find_cut_motions(modes) for body in motion.moving}:
+            modes = self._place_block(body, modes, opening, before) if problem.parts.block[body] else modes
+        motions = problem.find_cut_motions(modes)
+        if motions and before is not None and self.count < MOST_HELD:
+            beside = problem.cut.find_beside(motions)
+            overloaded = np.intersect1d(self._find_overloaded(before, modes), np.flatnonzero(beside >= 0))
+            modes = self._stick(beside, modes, slip, overloaded, lambda trial: not problem.find_cut_motions(trial))
+        for _ in range(CLOSED_AT_LEAST):
+            motions = problem.find_cut_motions(modes)
+            if not motions:
+                break
+            modes = close_nearest_beside(problem.laws, modes, opening, problem.cut.find_beside(motions))
+        return modes
+
+    def _place_block(self, body: int, modes: ModeState, opening: Real, before: ModeState | None) -> ModeState:
+        """The modes, with the pairs closed on which a block comes to rest all of whose pairs are open.
+
+        One that does not touch anything in some place stays where pairs held it until now.
+        """
+        problem = self.problem
+        own, normal = problem.cut.find_around(body)
+        if (modes.mode[own] != OPEN).any():
+            return modes
+        self.placed.add(body)
+        space = measure_space(problem.mesh.pairs.position[own], normal, opening[own])
+        mode = modes.mode.copy()
+        if before is not None and space.is_wide and (before.mode[own] != OPEN).any():
+            mode[own] = before.mode[own]
+        else:
+            nearest = own[space.nearest]
+            nearest = nearest[~problem.laws.parted[nearest]]
+            mode[nearest] = np.where(resists_slip(problem.laws)[nearest], STICK, SLIP)
+        return follow_leaders(problem.laws, ModeState(mode, modes.sign))
+
+    def find_floating(self, modes: ModeState, state: PairState, pressure: Real) -> tuple[CutMotion, ...]:
+        """Free motions of blocks that touch what is around them by chance: the pairs carry next to nothing, and there
+        are places where nothing touches."""
+        problem, pairs = self.problem, self.problem.mesh.pairs
+        carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
+        jumps = problem.traction_scale * np.hypot(state.g_n, state.g_s)
+        usual = float(pairs.weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(pairs.weight.sum())
+        mode = modes.mode.copy()
+        for body in np.flatnonzero(problem.parts.block):
+            own, normal = problem.cut.find_around(int(body))
+            weight = pairs.weight[own]
+            if weight @ carried[own] > FAINT * usual * weight.sum():
+                continue
+            loose = ~(problem.laws.bonded | (problem.laws.tensile_strength > 0))[own]
+            if measure_space(pairs.position[own], normal, state.g_n[own]).is_wide:
+                mode[own[loose]] = OPEN
+        return problem.find_cut_motions(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else ()
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of pairs that hold a body in the end."""
@@ -115,7 +197,7 @@ class Hold:
             return ()
         released = ModeState(modes.mode.copy(), modes.sign)
         released.mode[held] = SLIP
-        free = self.find_free(released)
+        free = self.find_free(released) or "; ".join(each.text for each in self.problem.find_cut_motions(released))
         if not free:
             return ()
         mesh = self.problem.mesh
@@ -131,23 +213,38 @@ class Hold:
         support = self.problem.find_free_motions(modes)
         return (support.text or None) if self.driven else support.unheld
 
-    def _find_cut_motion(self, modes: ModeState) -> str | None:
-        """The motions of parts that cracks cut off, for which there are no anchors."""
-        problem = self.problem
-        if not problem.parts.cut.any():
-            return None
-        modes = stick_creeping(problem.laws, modes)
-        return describe_cut_motions(problem.model, problem.mesh, problem.outer, problem.parts, modes)
+    def leaves_free(self, modes: ModeState) -> bool:
+        """Whether neither pairs nor anchors hold some body, or part of one, in given modes."""
+        return bool(self.find_free(modes) or self.problem.find_cut_motions(modes))
 
     def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:
         """The error that names what can move freely in the present contact; None if nothing can."""
-        free, advice = self.find_free(modes), "hold it by a condition, or use shorter elements where it touches"
-        if not free:
-            free, advice = self._find_cut_motion(modes), "hold it by a condition"
-        if not free:
+        free = self.find_free(modes)
+        if free:
+            advice = "hold it by a condition, or use shorter elements where it touches"
+            return ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; {advice}")
+        return self._describe_cut(self.problem.find_cut_motions(modes))
+
+    def describe_floating(self, modes: ModeState) -> ConvergenceError | None:
+        """The error of a search that found no end as blocks were held that touch nothing in some place; None if none.
+        """
+        if self.state is None:
             return None
-        detail = f"nothing in the present contact prevents a {free}; {advice}"
-        return ConvergenceError("free motion", detail)
+        mode = modes.mode.copy()
+        for body in self.placed:
+            own, normal = self.problem.cut.find_around(body)
+            if measure_space(self.problem.mesh.pairs.position[own], normal, self.state.g_n[own]).is_wide:
+                mode[own] = OPEN
+        free = ModeState(mode, modes.sign)
+        return self._describe_cut(self.problem.find_cut_motions(free)) if (mode != modes.mode).any() else None
+
+    def _describe_cut(self, motions: tuple[CutMotion, ...]) -> ConvergenceError | None:
+        if not motions:
+            return None
+        advice = "hold it by a condition"
+        if any(self.problem.parts.block[each.moving].any() for each in motions):
+            advice = "let it touch, or be joined, somewhere: bonds, joints of finite stiffness, other loads"
+        return ConvergenceError("free motion", f"{self.problem.cut.describe(motions)}; {advice}")
 
     def describe_collapse(self, modes: ModeState) -> str:
         """The motions that friction alone prevents in some modes, as the end of a sentence; "" if it prevents none."""
@@ -155,9 +252,16 @@ class Hold:
         free = self.find_free(ModeState(np.where(gives_way, SLIP, modes.mode).astype(np.int8), modes.sign))
         return f"; nothing but friction prevents a {free}" if free else ""
 
-    def refuse_free_motion(self, modes: ModeState) -> None:
-        """Raise ConvergenceError if a body can move freely in the present contact, where any position would do."""
+    def refuse_free_motion(
+        self, modes: ModeState, state: PairState | None = None, pressure: Real | None = None
+    ) -> None:
+        """Raise ConvergenceError if a body can move freely in the present contact, where any position would do.
+
+        state: of all pairs in a solution, with the pressure of fluids on them (m,).
+        """
         error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
+        if error is None and state is not None and pressure is not None:
+            error = self._describe_cut(self.find_floating(modes, state, pressure))
         if error:
             raise error
 

@@ -133,6 +133,7 @@ def _search_modes(
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
         pairs, proposal = outcome.pairs, outcome.proposal
+        hold.state = pairs
         fails, cascade = outcome.settled and bool(outcome.failing.any()), None
         if fails:
             floor = _find_floor(problem, solved)
@@ -149,7 +150,7 @@ def _search_modes(
         if driven:
             search.restart()
         elif outcome.settled and not fails:
-            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
@@ -195,6 +196,7 @@ def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> Converg
     search.unsettled = reason != "no admissible modes"
     return hold.problem.decide(lambda: (
         hold.describe_free_motion(proposal.modes)
+        or hold.describe_floating(proposal.modes)
         or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))
 
 
@@ -237,7 +239,7 @@ def _pivot(
             return settle_parts(subset, response, search.proposal.modes, group, judge)
         return settle_subset(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
-            lambda own: not hold.find_free(complete(own)),
+            lambda own: not hold.leaves_free(complete(own)),
         )
 
     found: Settled = problem.decide(settle)

@@ -17,6 +17,7 @@ from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.custom import asked_by_one_rank
+from pbem.contact.cut_parts import CutMotion, CutParts
 from pbem.contact.free_motions import FreeMotions, find_free_motions, find_ties
 from pbem.contact.laws import ModeState, PairLaws, stick_creeping
 from pbem.contact.loads import Load, OuterNodes, evaluate_load
@@ -136,6 +137,25 @@ class Problem:
     def cut_parts(self) -> Integer:
         """Numbers of the parts that share their region with others."""
         return np.flatnonzero(self.parts.cut)
+
+    @cached_property
+    def cut(self) -> CutParts:
+        """What holds the parts that cracks cut off."""
+        return CutParts(self.model, self.mesh, self.outer, self.parts)
+
+    def find_cut_motions(self, modes: ModeState) -> tuple[CutMotion, ...]:
+        """Free motions of parts that cracks cut off, in given modes; remembered, as modes are asked of several times.
+        """
+        if not len(self.cut_parts):
+            return ()
+        return self._cut_motions(stick_creeping(self.laws, modes).mode.tobytes())
+
+    @cached_property
+    def _cut_motions(self) -> Callable[[bytes], tuple[CutMotion, ...]]:
+        sign = np.ones(self.mesh.pairs.count)
+        return lru_cache(maxsize=64)(
+            lambda mode: self.cut.find_motions(ModeState(np.frombuffer(mode, dtype=np.int8), sign))
+        )
 
     @cached_property
     def plane_translations(self) -> tuple[RigidBodyMode, ...]:

@@ -1,0 +1,1 @@
+"""Maps of traces and meshes of other programs, read as cases."""

@@ -1,0 +1,160 @@
+"""DXF drawings: lines, polylines with straight and circular parts, arcs and circles are traces."""
+
+from __future__ import annotations
+
+import cmath
+import itertools
+import math
+import warnings
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pbem.errors import PbemError
+from pbem.geometry.curve import Leg
+from pbem.importing.reading import Reading, Trace, fail
+
+KINDS = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE")
+# Parts of a circle.
+QUARTERS = 4
+
+
+def read_dxf(path: Path) -> Reading:
+    """The traces of the drawing's model space. Raises CaseError with all its faults."""
+    reading = Reading()
+    drawing = _open(path, reading)
+    others: Counter[str] = Counter()
+    heights = False
+    numbers: Counter[str] = Counter()
+    for entity in drawing.modelspace():
+        kind = entity.dxftype()
+        numbers[kind] += 1
+        place = f"{kind} {numbers[kind]}"
+        if kind not in KINDS:
+            others[kind] += 1
+            continue
+        try:
+            legs, lifted = _read_entity(entity, kind)
+        except (ValueError, ArithmeticError, TypeError, AttributeError, KeyError) as error:
+            reading.blame(place, str(error) or type(error).__name__, "a line, polyline, arc or circle")
+            continue
+        if legs is None:
+            reading.left_out.append(f"{place}: drawn in a plane other than that of x and y")
+            continue
+        heights |= lifted
+        wrong = [value for leg in legs for value in _list_numbers(leg) if reading.read_number(value, place) is None]
+        if not legs:
+            reading.left_out.append(f"{place}: one point or none")
+        elif not wrong:
+            reading.traces.append(Trace(f"t{len(reading.traces) + 1}", place, (tuple(legs),)))
+    if heights:
+        reading.notes.append("Heights of points are left out: the model is plane.")
+    for kind, count in sorted(others.items()):
+        reading.left_out.append(f"{count} {kind}: only {', '.join(KINDS)} are read")
+    if reading.faults:
+        raise fail(path, reading.faults)
+    return reading
+
+
+def _open(path: Path, reading: Reading) -> Any:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import ezdxf
+            from ezdxf import recover
+    except ImportError as error:
+        raise PbemError(
+            f"{path}: DXF files are read by ezdxf, which is missing ({error}): install python3-ezdxf, or run "
+            "scripts/setup.sh"
+        ) from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                return ezdxf.readfile(str(path))  # type: ignore[attr-defined]
+            except (ezdxf.DXFStructureError, UnicodeDecodeError):  # type: ignore[attr-defined]
+                drawing, auditor = recover.readfile(str(path))
+    except Exception as error:  # whatever a library says of a file that is none of its own
+        found = f"what ezdxf cannot read ({type(error).__name__}: {error})"
+        reading.blame("the file", found[:200], "a DXF drawing")
+        raise fail(path, reading.faults) from None
+    reading.notes.append(f"The drawing is damaged; ezdxf has mended {len(auditor.fixes)} places and not "
+                         f"{len(auditor.errors)}.")
+    return drawing
+
+
+def _read_entity(entity: Any, kind: str) -> tuple[list[Leg] | None, bool]:
+    """The legs of an entity, none of zero length, or None if it lies in another plane; and whether it has heights."""
+    if kind == "LINE":
+        ends = [entity.dxf.start, entity.dxf.end]
+        return _chain([(complex(point.x, point.y), 0.0) for point in ends]), any(point.z != 0 for point in ends)
+    if kind == "POLYLINE" and entity.is_3d_polyline:
+        points = [vertex.dxf.location for vertex in entity.vertices]
+        if entity.is_closed and points:
+            points.append(points[0])
+        return _chain([(complex(point.x, point.y), 0.0) for point in points]), any(point.z != 0 for point in points)
+    if kind == "POLYLINE" and not entity.is_2d_polyline:
+        return None, False
+    normal = entity.dxf.extrusion
+    if abs(normal.x) > 1e-9 or abs(normal.y) > 1e-9:
+        return None, False
+    # An entity seen from below is the mirror image of what its own numbers say.
+    mirrored = normal.z < 0
+    vertices = _list_vertices(entity, kind)
+    if kind in ("LWPOLYLINE", "POLYLINE"):
+        lifted = float(entity.dxf.get("elevation", 0.0) if kind == "LWPOLYLINE" else entity.dxf.elevation.z) != 0
+    else:
+        lifted = entity.dxf.center.z != 0
+    if mirrored:
+        vertices = [(complex(-point.real, point.imag), -bulge) for point, bulge in vertices]
+    return _chain(vertices), lifted
+
+
+def _list_vertices(entity: Any, kind: str) -> list[tuple[complex, float]]:
+    """Points, each with the bulge to the next one: the tangent of a quarter of the angle that the arc turns through."""
+    if kind in ("ARC", "CIRCLE"):
+        center, radius = complex(entity.dxf.center.x, entity.dxf.center.y), float(entity.dxf.radius)
+        if radius == 0:
+            return []
+        if not radius > 0:
+            raise ValueError(f"a radius of {radius:g}")
+        first = float(entity.dxf.start_angle) if kind == "ARC" else 0.0
+        turn = (float(entity.dxf.end_angle) - first) % 360 or 360.0 if kind == "ARC" else 360.0
+        parts = max(1, math.ceil(turn * QUARTERS / 360 - 1e-9))
+        bulge = math.tan(math.radians(turn / parts) / 4)
+        points = [center + radius * cmath.rect(1.0, math.radians(first + turn * k / parts)) for k in range(parts + 1)]
+        if turn == 360:
+            points[-1] = points[0]
+        return [(point, bulge) for point in points]
+    if kind == "LWPOLYLINE":
+        vertices = [(complex(x, y), float(bulge)) for x, y, bulge in entity.get_points("xyb")]
+    else:
+        vertices = [
+            (complex(vertex.dxf.location.x, vertex.dxf.location.y), float(vertex.dxf.get("bulge", 0.0)))
+            for vertex in entity.vertices
+        ]
+    closed = entity.closed if kind == "LWPOLYLINE" else entity.is_closed
+    if closed and vertices:
+        vertices.append((vertices[0][0], 0.0))
+    return vertices
+
+
+def _chain(vertices: Sequence[tuple[complex, float]]) -> list[Leg]:
+    legs = []
+    for (start, bulge), (end, _) in itertools.pairwise(vertices):
+        turn = 4 * math.atan(bulge)
+        if start == end:
+            continue
+        plain = Leg(start, end, 1)
+        legs.append(plain if abs(bulge) < 1e-9 else _bend(start, end, turn))
+    return legs
+
+
+def _bend(start: complex, end: complex, turn: float) -> Leg:
+    """The arc between two points that turns through an angle (radians)."""
+    return Leg(0j, 0j, 1, center=0j, sweep=turn).tie(start, end)
+
+
+def _list_numbers(leg: Leg) -> list[float]:
+    return [number for point in (leg.start, leg.end) for number in (point.real, point.imag)] + [leg.length]

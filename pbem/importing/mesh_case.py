@@ -1,0 +1,266 @@
+"""From a mesh to a case: surfaces are regions, and what bounds them are curves."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pbem.errors import Fault, PbemError
+from pbem.geometry.curve import Leg
+from pbem.geometry.shape import Outline, outline
+from pbem.importing.chains import Edge, fit_legs, link
+from pbem.importing.listing import format_place, write_case
+from pbem.importing.map_case import make_map_case, write_shape
+from pbem.importing.msh_file import Cell, Grid
+from pbem.importing.options import FRICTION, POISSON, YOUNG, Imported, Options
+from pbem.importing.reading import Reading, Trace, fail
+
+CONDITIONS = """
+# Conditions: outer curves are free of traction until they are told otherwise, for example
+# [boundary]
+# {name} = {{ ux = 0.0, uy = 0.0 }}"""
+LAWS = """
+# Interfaces: shared curves are bonded until they are told otherwise, for example
+# [interfaces]
+# {name} = {{ law = "coulomb", friction = 0.6 }}"""
+
+
+@dataclass(frozen=True)
+class _Side:
+    """What edges of a curve have in common: number of the physical line, or 0; and the regions on both sides of it, one
+    of an outer curve, the same twice of a crack."""
+
+    group: int
+    regions: tuple[str, ...]
+
+    @property
+    def use(self) -> str:
+        """What it is."""
+        if len(self.regions) == 1:
+            return "outer curve"
+        return "crack" if self.regions[0] == self.regions[1] else "interface"
+
+
+def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Imported:
+    """The case of a mesh. Raises PbemError with what is wrong with it."""
+    if not grid.surfaces:
+        return make_map_case(path, _read_traces(grid), options, command)
+    _refuse(path, options)
+    left_out: list[str] = []
+    regions = _name_regions(grid, left_out)
+    sides, entities = _find_sides(path, grid, regions, left_out)
+    curves = _make_curves(grid, sides, entities)
+    names = _name_curves(grid, curves)
+    tables = _make_tables(path, names, dict.fromkeys(regions.values()), options)
+    uses = Counter(side.use for _, side, _, _ in names)
+    summary = [f"regions: {len(set(regions.values()))} ({', '.join(dict.fromkeys(regions.values()))})"]
+    summary += [
+        f"{use}s: {uses[use]} ({', '.join(name for name, side, _, _ in names if side.use == use)})"
+        for use in ("outer curve", "interface", "crack") if uses[use]
+    ]
+    notes = [*grid.notes, *_tell_defaults(options, uses)]
+    groups = [(f"{len(left_out)} parts of the mesh left out", tuple(left_out))] if left_out else []
+    text = write_case(path.name, tables, summary, notes, groups, command)
+    for use, comment in (("outer curve", CONDITIONS), ("interface", LAWS)):
+        first = next((name for name, side, _, _ in names if side.use == use), None)
+        if first is not None:
+            text += comment.format(name=f'"{first}"' if "." in first or " " in first else first) + "\n"
+    return Imported(text, tuple(summary), tuple(notes), tuple(groups))
+
+
+def _refuse(path: Path, options: Options) -> None:
+    for key, reason in (("sxx", "the mesh has an end"), ("syy", "the mesh has an end"), ("sxy", "the mesh has an end"),
+                        ("snap", "nodes are joined by the mesh"), ("simplify", "curves are what the nodes lie on")):
+        if getattr(options, key) is not None:
+            raise PbemError(f"{path}: found --{key} with a mesh of surfaces; expected no such option: {reason}")
+
+
+def _read_traces(grid: Grid) -> Reading:
+    """The lines of a mesh without surfaces, as traces."""
+    reading = Reading(notes=[*grid.notes, "The mesh has no surfaces: its lines are taken as traces."])
+    groups: dict[int, dict[Edge, int]] = defaultdict(dict)
+    for cell in grid.lines:
+        groups[cell.group].setdefault(_key(*cell.corners), cell.entity)
+    xs = [grid.nodes[node] for cell in grid.lines for node in cell.corners]
+    extent = max(max(z.real for z in xs) - min(z.real for z in xs), max(z.imag for z in xs) - min(z.imag for z in xs))
+    taken: set[str] = set()
+    for group, edges in groups.items():
+        usable = [edge for edge in edges if grid.nodes[edge[0]] != grid.nodes[edge[1]]]
+        chains = link(usable, edges, set())
+        parts = tuple(tuple(fit_legs(chain, grid.nodes, set(), extent)) for chain in chains)
+        name = _choose_name(grid.names.get((1, group), f"line_{group}" if group else "lines"), taken)
+        if parts:
+            reading.traces.append(Trace(name, f"physical line {group}", parts))
+        else:
+            reading.left_out.append(f"physical line {group}: no line with a length")
+    return reading
+
+
+def _key(a: int, b: int) -> Edge:
+    return (a, b) if a < b else (b, a)
+
+
+def _choose_name(wanted: str, taken: set[str]) -> str:
+    """A name that is not taken yet, of characters that can be seen."""
+    plain = "".join(each for each in wanted if each.isprintable()).strip() or "unnamed"
+    name, number = plain, 2
+    while name in taken:
+        name, number = f"{plain}_{number}", number + 1
+    taken.add(name)
+    return name
+
+
+def _name_regions(grid: Grid, left_out: list[str]) -> dict[int, str]:
+    """Names of the regions by the numbers of their physical surfaces."""
+    counts = Counter(cell.group for cell in grid.surfaces)
+    if set(counts) == {0}:
+        grid.notes.append("No surface has a physical group: all are one region, 'body'.")
+        return {0: "body"}
+    if counts[0]:
+        left_out.append(f"{counts[0]} surface elements without a physical group")
+    taken: set[str] = set()
+    return {
+        group: _choose_name(grid.names.get((2, group), f"surface_{group}"), taken) for group in sorted(counts) if group
+    }
+
+
+def _find_sides(
+    path: Path, grid: Grid, regions: Mapping[int, str], left_out: list[str]
+) -> tuple[dict[_Side, list[Edge]], dict[Edge, int]]:
+    """The edges that bound regions, or on which a physical line lies inside of one; and the entities of edges."""
+    around: dict[Edge, list[str]] = defaultdict(list)
+    for cell in grid.surfaces:
+        if cell.group in regions:
+            for a, b in zip(cell.corners, (*cell.corners[1:], cell.corners[0]), strict=True):
+                around[_key(a, b)].append(regions[cell.group])
+    faults = [
+        Fault(f"the edge at {format_place(0.5 * (grid.nodes[a] + grid.nodes[b]))}",
+              f"{len(owners)} surface elements at one edge", "two at most")
+        for (a, b), owners in around.items() if len(owners) > 2
+    ]  # fmt: skip
+    if faults:
+        raise fail(path, faults)
+    lines: dict[Edge, Cell] = {}
+    for cell in grid.lines:
+        edge = _key(*cell.corners)
+        if edge not in lines or (cell.group and not lines[edge].group):
+            lines[edge] = cell
+    sides: dict[_Side, list[Edge]] = defaultdict(list)
+    for edge, owners in around.items():
+        line = lines.get(edge)
+        group = line.group if line is not None else 0
+        if group or len(set(owners)) == len(owners):
+            sides[_Side(group, tuple(sorted(owners)))].append(edge)
+    astray = Counter(cell.group for edge, cell in lines.items() if edge not in around)
+    left_out += [
+        f"{count} lines of {_name_group(grid, group)}, on which no surface ends" for group, count in astray.items()
+    ]
+    return sides, {edge: cell.entity for edge, cell in lines.items()}
+
+
+def _name_group(grid: Grid, group: int) -> str:
+    name = grid.names.get((1, group), str(group))
+    return f"the physical line '{name}'" if group else "no physical group"
+
+
+def _make_curves(
+    grid: Grid, sides: Mapping[_Side, Sequence[Edge]], entities: Mapping[Edge, int]
+) -> list[tuple[_Side, list[Leg]]]:
+    """Legs of all chains of edges, which end where more or fewer than two edges of any kind meet."""
+    counts = Counter(node for edges in sides.values() for edge in edges for node in edge)
+    corners = {node for node, count in counts.items() if count != 2}
+    points = [grid.nodes[node] for node in counts]
+    extent = max(max(z.real for z in points) - min(z.real for z in points),
+                 max(z.imag for z in points) - min(z.imag for z in points))
+    # In the order of the groups' numbers, and edges without one last.
+    order = sorted(sides, key=lambda side: (not side.group, side.group))
+    return [
+        (side, fit_legs(chain, grid.nodes, corners, extent))
+        for side in order for chain in link(sides[side], entities, corners)
+    ]
+
+
+def _name_curves(
+    grid: Grid, curves: Sequence[tuple[_Side, list[Leg]]]
+) -> list[tuple[str, _Side, Outline, list[int]]]:
+    """Name, side, shape and numbers of elements of every curve of the case.
+
+    Several curves of one physical line are called NAME.1, NAME.2, ...; NAME stands for them all.
+    """
+    found: dict[str, list[tuple[_Side, Outline, list[int]]]] = {}
+    untold = []
+    for side, legs in curves:
+        if side.group:
+            name = "".join(each for each in grid.names.get((1, side.group), f"line_{side.group}") if each.isprintable())
+        else:
+            name = "_".join(dict.fromkeys(side.regions)) + ("_edge" if len(side.regions) == 1 else "")
+            untold.append(name)
+        done = 0
+        for part in outline(legs, 1e-9 * sum(leg.length for leg in legs)):
+            own = legs[done:done + part.legs]
+            done += part.legs
+            found.setdefault(name.strip() or "unnamed", []).append((side, part, [leg.elements for leg in own]))
+    if untold:
+        grid.notes.append(f"Named here, as no physical line does: {', '.join(dict.fromkeys(untold))}.")
+    taken = set(found)
+    named = []
+    for name, parts in found.items():
+        number = 0
+        for side, part, counts in parts:
+            curve = name
+            while len(parts) > 1 and curve in taken:
+                number += 1
+                curve = f"{name}.{number}"
+            taken.add(curve)
+            named.append((curve, side, part, counts))
+    return named
+
+
+def _make_tables(
+    path: Path, names: Sequence[tuple[str, _Side, Outline, list[int]]], regions: Mapping[str, None], options: Options
+) -> dict[str, Any]:
+    material = {
+        "young": YOUNG if options.young is None else options.young,
+        "poisson": POISSON if options.poisson is None else options.poisson,
+    }
+    curves = {}
+    for name, _, part, counts in names:
+        division: dict[str, Any] = {"elements": counts if part.straight else sum(counts)}
+        if len(counts) == 1:
+            division = {"elements": counts[0]}
+        curves[name] = {**write_shape(part), **(division if options.size is None else {"size": options.size})}
+    tables: dict[str, Any] = {
+        "title": f"Mesh of {path.name}",
+        "materials": {name: material for name in regions},
+        "curves": curves,
+        "regions": {},
+    }
+    cracks = [name for name, side, _, _ in names if side.use == "crack"]
+    for region in regions:
+        table: dict[str, Any] = {"material": region}
+        table["boundary"] = [name for name, side, _, _ in names if region in side.regions and side.use != "crack"]
+        own = [name for name, side, _, _ in names if region in side.regions and side.use == "crack"]
+        tables["regions"][region] = {**table, **({"cracks": own} if own else {})}
+    if cracks:
+        friction = FRICTION if options.friction is None else options.friction
+        tables["interfaces"] = {name: {"friction": friction} for name in cracks}
+    tables["analysis"] = {"steps": 1}
+    return tables
+
+
+def _tell_defaults(options: Options, uses: Mapping[str, int]) -> list[str]:
+    told = [
+        f"--{key} {value:g}" for key, value in (("young", YOUNG), ("poisson", POISSON))
+        if getattr(options, key) is None
+    ]
+    notes = []
+    if options.friction is None and uses["crack"]:
+        told.append(f"--friction {FRICTION:g}")
+    elif options.friction is not None and not uses["crack"]:
+        notes.append("--friction has no effect: no physical line lies inside of a region, and interfaces are bonded.")
+    if options.size is None:
+        told.append("an element for each edge of the mesh")
+    return [*notes, "Taken as nothing else was asked for: " + ", ".join(told) + "."] if told else notes

@@ -1,0 +1,294 @@
+"""Meshes of gmsh: nodes, lines and surfaces with their physical groups."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shlex
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pbem.errors import CaseError, Fault, PbemError
+from pbem.importing.reading import Reading, fail, read_text
+
+# Number of nodes of the kinds of elements, and of the corners, which come first.
+LINES = {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}
+SURFACES = {2: (3, 3), 3: (4, 4), 9: (6, 3), 10: (9, 4), 16: (8, 4), 21: (10, 3), 23: (15, 3), 36: (16, 4), 37: (25, 4)}
+POINT = 15
+VERSIONS = ("2", "2.1", "2.2", "4.1")
+EXPECTED = "a mesh of gmsh, version 2.2 or 4.1"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A line or a surface element: tags of its corners, number of its physical group or 0, and of its entity."""
+
+    corners: tuple[int, ...]
+    group: int
+    entity: int
+
+
+@dataclass
+class Grid:
+    """What a mesh holds. nodes: by tag; names: of physical groups, by dimension and number."""
+
+    nodes: dict[int, complex] = field(default_factory=dict)
+    heights: dict[int, float] = field(default_factory=dict)
+    lines: list[Cell] = field(default_factory=list)
+    surfaces: list[Cell] = field(default_factory=list)
+    names: dict[tuple[int, int], str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
+        """Take in an element. Raises ValueError for one that no plane has."""
+        if kind in LINES:
+            self.lines.append(Cell(nodes[:2], group, entity))
+        elif kind in SURFACES:
+            self.surfaces.append(Cell(nodes[:SURFACES[kind][1]], group, entity))
+        elif kind != POINT:
+            raise ValueError(f"an element of type {kind}; expected points, lines, triangles and quadrangles of a plane")
+
+
+def read_mesh(path: Path) -> Grid:
+    """The mesh of a file, text or binary. Raises PbemError with what is wrong with it."""
+    try:
+        head = path.read_bytes()[:200]
+    except OSError as error:
+        raise PbemError(f"{path}: {error.strerror or error}") from None
+    return _read_by_meshio(path) if _is_binary(head) else read_grid(path, read_text(path))
+
+
+def _is_binary(head: bytes) -> bool:
+    words = head.split(b"$MeshFormat", 1)[-1].split()
+    return len(words) > 1 and words[1] == b"1"
+
+
+class _Lines:
+    """The lines of a text, one after the other."""
+
+    def __init__(self, text: str) -> None:
+        self._lines = text.splitlines()
+        self.number = 0
+
+    def next(self) -> str:
+        if self.number >= len(self._lines):
+            raise ValueError("the end of the file; expected more of it")
+        self.number += 1
+        return self._lines[self.number - 1].strip()
+
+    def words(self, least: int = 1) -> list[str]:
+        words = self.next().split()
+        if len(words) < least:
+            raise ValueError(f"'{' '.join(words)[:60]}'; expected {least} numbers")
+        return words
+
+    def integers(self, least: int = 1) -> list[int]:
+        return [_read_integer(word) for word in self.words(least)]
+
+    @property
+    def ended(self) -> bool:
+        return self.number >= len(self._lines)
+
+
+def _read_integer(word: str) -> int:
+    try:
+        return int(word)
+    except ValueError:
+        raise ValueError(f"'{word[:40]}'; expected a whole number") from None
+
+
+def read_grid(path: Path, text: str) -> Grid:
+    """The mesh of a text. Raises CaseError with the line that is wrong."""
+    lines, grid = _Lines(text), Grid()
+    try:
+        _read_sections(lines, grid)
+    except ValueError as error:
+        found, _, expected = str(error).partition("; expected ")
+        raise fail(path, [Fault(f"line {max(lines.number, 1)}", found, expected or EXPECTED)]) from None
+    faults = _check(grid)
+    if faults:
+        raise fail(path, faults)
+    return grid
+
+
+def _read_sections(lines: _Lines, grid: Grid) -> None:
+    version = ""
+    physical: dict[tuple[int, int], list[int]] = {}
+    while not lines.ended:
+        title = lines.next()
+        if not title:
+            continue
+        if not title.startswith("$"):
+            raise ValueError(f"'{title[:60]}'; expected a section such as $Nodes")
+        section = title[1:]
+        if not version and section not in ("MeshFormat", "Comments"):
+            raise ValueError(f"'{title[:60]}'; expected $MeshFormat")
+        if section == "MeshFormat":
+            version = lines.words(3)[0]
+            if version not in VERSIONS:
+                raise ValueError(f"version {version[:20]}; expected 2.2 or 4.1 (gmsh -format msh41 converts)")
+        elif section == "PhysicalNames":
+            for _ in range(lines.integers()[0]):
+                dimension, number, name = _read_name(lines.next())
+                grid.names[dimension, number] = name
+        elif section == "Entities" and version == "4.1":
+            physical = _read_entities(lines)
+        elif section == "Nodes":
+            (_read_nodes_4 if version == "4.1" else _read_nodes_2)(lines, grid)
+        elif section == "Elements" and version == "4.1":
+            _read_elements_4(lines, grid, physical)
+        elif section == "Elements":
+            _read_elements_2(lines, grid)
+        else:
+            while lines.next() != f"$End{section}":
+                pass
+            continue
+        end = lines.next()
+        if end != f"$End{section}":
+            raise ValueError(f"'{end[:60]}'; expected $End{section}")
+    if not version:
+        raise ValueError(f"no section $MeshFormat; expected {EXPECTED}")
+
+
+def _read_name(line: str) -> tuple[int, int, str]:
+    words = shlex.split(line)
+    if len(words) != 3:
+        raise ValueError(f'\'{line[:60]}\'; expected dimension, number and "name" of a physical group')
+    return _read_integer(words[0]), _read_integer(words[1]), words[2]
+
+
+def _read_node(grid: Grid, tag: int, words: list[str]) -> None:
+    try:
+        x, y, z = (float(word) for word in words[:3])
+    except ValueError:
+        raise ValueError(f"'{' '.join(words)[:60]}'; expected coordinates x y z") from None
+    reading = Reading()
+    if any(reading.read_number(value, "") is None for value in (x, y, z)):
+        raise ValueError(f"{reading.faults[0].found}; expected {reading.faults[0].expected}")
+    if tag in grid.nodes:
+        raise ValueError(f"node {tag} a second time; expected each node once")
+    grid.nodes[tag], grid.heights[tag] = complex(x, y), z
+
+
+def _read_nodes_2(lines: _Lines, grid: Grid) -> None:
+    for _ in range(lines.integers()[0]):
+        words = lines.words(4)
+        _read_node(grid, _read_integer(words[0]), words[1:])
+
+
+def _read_nodes_4(lines: _Lines, grid: Grid) -> None:
+    for _ in range(lines.integers(4)[0]):
+        _, _, _, count = lines.integers(4)[:4]
+        tags = [lines.integers()[0] for _ in range(count)]
+        for tag in tags:
+            _read_node(grid, tag, lines.words(3))
+
+
+def _read_entities(lines: _Lines) -> dict[tuple[int, int], list[int]]:
+    """Numbers of the physical groups, by dimension and tag of the entity."""
+    physical = {}
+    for dimension, count in enumerate(lines.integers(4)[:4]):
+        for _ in range(count):
+            words = lines.words(5 if dimension == 0 else 8)
+            at = 4 if dimension == 0 else 7
+            groups = [_read_integer(word) for word in words[at + 1:at + 1 + _read_integer(words[at])]]
+            physical[dimension, _read_integer(words[0])] = groups
+    return physical
+
+
+def _read_elements_2(lines: _Lines, grid: Grid) -> None:
+    for _ in range(lines.integers()[0]):
+        numbers = lines.integers(4)
+        kind, count = numbers[1], numbers[2]
+        tags, nodes = numbers[3:3 + count], tuple(numbers[3 + count:])
+        _add(grid, kind, nodes, tags[0] if tags else 0, tags[1] if len(tags) > 1 else 0)
+
+
+def _read_elements_4(lines: _Lines, grid: Grid, physical: dict[tuple[int, int], list[int]]) -> None:
+    several = False
+    for _ in range(lines.integers(4)[0]):
+        dimension, entity, kind, count = lines.integers(4)[:4]
+        groups = physical.get((dimension, entity), [])
+        several |= len(groups) > 1
+        for _ in range(count):
+            _add(grid, kind, tuple(lines.integers()[1:]), groups[0] if groups else 0, entity)
+    if several:
+        grid.notes.append("Of entities with several physical groups the first is taken.")
+
+
+def _add(grid: Grid, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
+    wanted = LINES.get(kind) or SURFACES.get(kind, (len(nodes), 0))[0]
+    if len(nodes) != wanted:
+        raise ValueError(f"{len(nodes)} nodes of an element of type {kind}; expected {wanted}")
+    unknown = next((node for node in nodes if node not in grid.nodes), None)
+    if unknown is not None:
+        raise ValueError(f"the node {unknown}, which is not there; expected one of the {len(grid.nodes)} nodes")
+    # A group may have a sign, which says how it is oriented.
+    grid.add(kind, nodes, abs(group), entity)
+
+
+def _check(grid: Grid) -> list[Fault]:
+    """What is wrong with a mesh as a whole."""
+    if not grid.lines and not grid.surfaces:
+        return [Fault("the mesh", f"{len(grid.nodes)} nodes, no line and no surface", "surfaces, or lines at least")]
+    used = {tag for cell in (*grid.lines, *grid.surfaces) for tag in cell.corners}
+    heights = [grid.heights[tag] for tag in used]
+    xs = [grid.nodes[tag] for tag in used]
+    extent = max(max(z.real for z in xs) - min(z.real for z in xs), max(z.imag for z in xs) - min(z.imag for z in xs))
+    if max(heights) - min(heights) > 1e-6 * extent:
+        found = f"nodes at heights from {min(heights):g} to {max(heights):g}"
+        return [Fault("the mesh", found, "a mesh of a plane of constant z")]
+    return []
+
+
+def _read_by_meshio(path: Path) -> Grid:
+    """A binary mesh."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import meshio
+    except ImportError as error:
+        raise PbemError(
+            f"{path}: binary meshes are read by meshio, which is missing ({error}): install python3-meshio, run "
+            "scripts/setup.sh, or write the mesh as text (gmsh -bin 0)"
+        ) from None
+    read: Callable[[str], Any] = meshio.gmsh.read
+    try:
+        with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
+            warnings.simplefilter("ignore")
+            mesh = read(str(path))
+            return _take(mesh, path)
+    except CaseError:
+        raise
+    except (Exception, SystemExit) as error:  # whatever a library says of a file that is none of its own
+        found = f"what meshio cannot read ({type(error).__name__}: {error})"
+        expected = f"{EXPECTED}; of a text (gmsh -bin 0) the line would be told"
+        raise fail(path, [Fault("the file", found[:200], expected)]) from None
+
+
+def _take(mesh: Any, path: Path) -> Grid:
+    grid = Grid(names={(int(dimension), int(number)): name for name, (number, dimension) in mesh.field_data.items()})
+    for tag, (x, y, z) in enumerate(mesh.points):
+        _read_node(grid, tag, [repr(float(value)) for value in (x, y, z)])
+    kinds = {"line": 1, "line3": 1, "line4": 1, "triangle": 2, "triangle6": 2, "triangle10": 2, "quad": 3, "quad8": 3,
+             "quad9": 3, "quad16": 3}
+    for number, block in enumerate(mesh.cells):
+        if block.type == "vertex":
+            continue
+        if block.type not in kinds:
+            expected = "lines, triangles and quadrangles of a plane"
+            raise fail(path, [Fault("the mesh", f"elements '{block.type}'", expected)])
+        kind = kinds[block.type]
+        groups, entities = (
+            mesh.cell_data[key][number] if key in mesh.cell_data else [0] * len(block.data)
+            for key in ("gmsh:physical", "gmsh:geometrical")
+        )
+        for nodes, group, entity in zip(block.data.tolist(), groups, entities, strict=True):
+            grid.add(kind, tuple(nodes[:{1: 2, 2: 3, 3: 4}[kind]]), abs(int(group)), int(entity))
+    faults = _check(grid)
+    if faults:
+        raise fail(path, faults)
+    return grid

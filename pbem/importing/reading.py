@@ -1,0 +1,96 @@
+"""What readers of files give: traces, what was left out of them, and what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+from pbem.errors import CaseError, Fault, PbemError
+from pbem.geometry.curve import Leg
+from pbem.geometry.shape import LARGEST
+from pbem.wording import show
+
+# Faults that are listed one by one.
+MOST_FAULTS = 20
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A line of a map. name: of the trace; place: where it stands in the file; parts: each a chain of legs."""
+
+    name: str
+    place: str
+    parts: tuple[tuple[Leg, ...], ...]
+
+
+@dataclass
+class Reading:
+    """What a reader has found so far.
+
+    notes: sentences about the file; left_out: what no trace was made of, with its place; faults: what is wrong.
+    """
+
+    traces: list[Trace] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+
+    def blame(self, place: str, found: str, expected: str) -> None:
+        self.faults.append(Fault(place, found, expected))
+
+    def read_number(self, value: object, place: str) -> float | None:
+        """A coordinate, or None and a fault."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self.blame(place, show(value), "a number")
+            return None
+        if not abs(value) <= LARGEST:
+            self.blame(place, show(value), f"a finite number of at most {LARGEST:g}")
+            return None
+        return float(value)
+
+
+def fail(path: Path, faults: Sequence[Fault]) -> CaseError:
+    """The error that lists what is wrong with a file, the first faults one by one."""
+    shown = list(faults[:MOST_FAULTS])
+    if len(faults) > len(shown):
+        shown.append(Fault("the file", f"{len(faults) - len(shown)} more of such faults", "none"))
+    return CaseError(str(path), tuple(shown))
+
+
+def read_text(path: Path) -> str:
+    """The text of a file. Raises CaseError if it is empty or none."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise PbemError(f"{path}: {error.strerror or error}") from None
+    if not data.strip():
+        raise fail(path, [Fault("the file", "nothing in it", "traces")])
+    for encoding in ("utf-16",) if data[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8-sig", "cp1252"):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError as error:
+            at = error.start
+            continue
+        if "\0" not in text:
+            return text
+        at = text.index("\0")
+        break
+    line = data[:at].count(b"\n") + 1
+    found = f"the byte 0x{data[min(at, len(data) - 1)]:02x}, which is no text"
+    raise fail(path, [Fault(f"line {line}", found, "a text")])
+
+
+def draw_line(points: Sequence[complex]) -> tuple[Leg, ...]:
+    """Straight legs from point to point."""
+    return tuple(Leg(a, b, 1) for a, b in pairwise(points))
+
+
+def choose_names(candidates: Sequence[Sequence[str | None]], count: int) -> list[str]:
+    """Names of so many traces: the first list of candidates that has a different one for each, else t1, t2, ..."""
+    for names in candidates:
+        given = [name for name in names if name and name == name.strip() and name.isprintable()]
+        if len(set(given)) == count:
+            return given
+    return [f"t{number}" for number in range(1, count + 1)]

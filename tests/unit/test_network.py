@@ -1,0 +1,263 @@
+"""Networks of traces: what meets is cut there, what all but meets is joined, and nothing is done in silence."""
+
+from __future__ import annotations
+
+import cmath
+import itertools
+import math
+import random
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pytest
+
+from pbem.geometry.curve import Curve
+from pbem.geometry.intersection import enclosed_area
+from pbem.geometry.network import Network, cut_network
+from pbem.geometry.shape import Division, draw_circle, draw_polyline
+
+DIVISION = Division(elements=12)
+
+
+def draw(**traces: Sequence[complex]) -> dict[str, Curve]:
+    return {name: draw_polyline(name, points, DIVISION) for name, points in traces.items()}
+
+
+def list_changes(network: Network) -> list[tuple[str, str, str]]:
+    return [(change.kind, change.trace, change.other) for change in network.changes]
+
+
+def list_kinds(network: Network) -> list[str]:
+    return sorted(junction.kind for junction in network.junctions)
+
+
+A = [0j, 2 + 0j]
+# Traces, snap distance, pieces, kinds of junctions, number of blocks, changes.
+CASES: dict[str, tuple[dict[str, list[complex]], float, list[str], list[str], int, list[tuple[str, str, str]]]] = {
+    "apart": ({"a": A, "b": [1j, 2 + 1j]}, 0.1, ["a", "b"], [], 0, []),
+    "crossing": ({"a": A, "b": [1 - 1j, 1 + 1j]}, 0.0, ["a.1", "a.2", "b.1", "b.2"], ["X"], 0,
+                 [("cut", "a", "b"), ("cut", "b", "a")]),
+    "end on a leg": ({"a": A, "b": [1 + 0j, 1 + 1j]}, 0.0, ["a.1", "a.2", "b"], ["T"], 0, [("cut", "a", "b")]),
+    "end on a vertex": ({"a": [0j, 1 + 0j, 2 + 1j], "b": [1 + 0j, 1 - 1j]}, 0.0, ["a.1", "a.2", "b"], ["T"], 0,
+                        [("cut", "a", "b")]),
+    "end that misses": ({"a": A, "b": [1 + 0.01j, 1 + 1j]}, 0.05, ["a.1", "a.2", "b"], ["T"], 0,
+                        [("joined", "b", "a"), ("cut", "a", "b")]),
+    "end that misses by more": ({"a": A, "b": [1 + 0.06j, 1 + 1j]}, 0.05, ["a", "b"], [], 0, []),
+    "end that pokes through": ({"a": A, "b": [1 - 0.01j, 1 + 1j]}, 0.05, ["a.1", "a.2", "b"], ["T"], 0,
+                               [("cut off", "b", "a"), ("cut", "a", "b")]),
+    "end that crosses": ({"a": A, "b": [1 - 0.06j, 1 + 1j]}, 0.05, ["a.1", "a.2", "b.1", "b.2"], ["X"], 0,
+                         [("cut", "a", "b"), ("cut", "b", "a")]),
+    "ends that meet": ({"a": A, "b": [2.01 + 0j, 3 + 1j]}, 0.05, ["a", "b"], ["end to end"], 0,
+                       [("joined", "b", "a")]),
+    "three ends": ({"a": A, "b": [2 + 0j, 3 + 1j], "c": [2 + 0j, 3 - 1j]}, 0.0, ["a", "b", "c"], ["Y"], 0, []),
+    "star": ({"a": [-1 + 0j, 1 + 0j], "b": [-1j, 1j], "c": [-1 - 1j, 1 + 1j]}, 0.0,
+             ["a.1", "a.2", "b.1", "b.2", "c.1", "c.2"], ["star"], 0,
+             [("cut", "a", "b"), ("cut", "b", "a"), ("cut", "c", "a")]),
+    "twice the same": ({"a": A, "b": A}, 0.0, ["a"], [], 0, [("merged", "b", "a")]),
+    "there and back": ({"a": A, "b": A[::-1]}, 0.0, ["a"], [], 0, [("merged", "b", "a")]),
+    "over a part": ({"a": A, "b": [1 + 0j, 3 + 0j]}, 0.0, ["a", "b"], ["end to end"], 0, [("merged", "b", "a")]),
+    "longer on shorter": ({"a": A, "b": [-1 + 0j, 3 + 0j]}, 0.0, ["b"], [], 0, [("merged", "a", "b")]),
+    "nearly on it": ({"a": A, "b": [0.5 + 0.01j, 1.5 - 0.01j]}, 0.05, ["a"], [], 0,
+                     [("joined", "b", "a"), ("joined", "b", "a"), ("merged", "b", "a")]),
+    "back on itself": ({"a": [0j, 2 + 0j, 1 + 0j]}, 0.0, ["a"], [], 0, [("merged", "a", "a")]),
+    "closed": ({"a": [0j, 2 + 0j, 2 + 2j, 2j, 0j]}, 0.0, ["a"], [], 1, []),
+    "all but closed": ({"a": [0j, 2 + 0j, 2 + 2j, 2j, 0.01j]}, 0.05, ["a"], [], 1, [("joined", "a", "a")]),
+    "eight": ({"a": [0j, 2 + 2j, 2 + 0j, 2j, 0j]}, 0.0, ["a.1", "a.2"], ["X"], 2, [("cut", "a", "a")]),
+    "loop": ({"a": [0j, 3 + 0j, 1 - 1j, 1 + 1j]}, 0.0, ["a.1", "a.2", "a.3"], ["X"], 1, [("cut", "a", "a")]),
+    "closed and crossed": ({"a": [0j, 2 + 0j, 2 + 2j, 2j, 0j], "b": [-1 + 1j, 3 + 1j]}, 0.0,
+                           ["a.1", "a.2", "b.1", "b.2", "b.3"], ["X", "X"], 2,
+                           [("cut", "a", "b"), ("cut", "a", "b"), ("cut", "b", "a"), ("cut", "b", "a")]),
+    "no length": ({"a": A, "b": [1 + 1j, 1 + 1j]}, 0.0, ["a"], [], 0, [("dropped", "b", "")]),
+    "shorter than snap": ({"a": A, "b": [1 + 1j, 1.04 + 1j]}, 0.05, ["a"], [], 0, [("dropped", "b", "")]),
+    "doubled vertices": ({"a": [0j, 0j, 1 + 0j, 1 + 0j, 2 + 1j, 2 + 1j]}, 0.0, ["a"], [], 0,
+                         [("thinned", "a", "")] * 3),
+    "three in all but one point": (
+        {"a": [-1 + 0j, 1 + 0j], "b": [0.01 - 1j, 0.01 + 1j], "c": [-1 - 1j, 1 + 1j]}, 0.05,
+        ["a.1", "a.2", "b.1", "b.2", "c.1", "c.2"], ["star"], 0,
+        [("bent", "b", "a"), ("cut", "a", "b"), ("cut", "b", "a"), ("cut", "c", "a")]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_cases(name: str) -> None:
+    traces, snap, pieces, junctions, blocks, changes = CASES[name]
+    network = cut_network(draw(**traces), snap)
+    assert sorted(network.pieces) == pieces
+    assert list_kinds(network) == junctions
+    assert len(network.blocks) == blocks
+    found = [change for change in list_changes(network)]
+    if name == "three in all but one point":  # which of the three is bent is not said
+        found = [change for change in found if change[0] != "bent"]
+        changes = [change for change in changes if change[0] != "bent"]
+        assert {change[:1] for change in found} == {("cut",)}
+    assert Counter(change[:2] for change in found) == Counter(change[:2] for change in changes)
+    check_sound(network)
+
+
+def check_sound(network: Network) -> None:
+    """Pieces meet at ends only, junctions are where ends are equal, and blocks are as many as Euler's formula says."""
+    ends: Counter[complex] = Counter()
+    for curve in network.pieces.values():
+        ends.update((curve.start, curve.end))
+        for one, other in itertools.pairwise(curve.legs):
+            assert one.end == other.start
+    assert {point: count for point, count in ends.items() if count > 1} == {
+        junction.point: len(junction.ends) for junction in network.junctions
+    } | {
+        curve.start: 2 for curve in network.pieces.values() if curve.closed and ends[curve.start] == 2
+    }
+    group = {point: point for point in ends}
+
+    def find(point: complex) -> complex:
+        while group[point] != point:
+            point = group[point]
+        return point
+
+    for curve in network.pieces.values():
+        group[find(curve.start)] = find(curve.end)
+    components = len({find(point) for point in group})
+    assert len(network.blocks) == len(network.pieces) - len(group) + components
+    for block in network.blocks:
+        area = 0.0
+        for ring in block.rings:
+            legs = []
+            for name, forwards in ring:
+                curve = network.pieces[name]
+                legs += list((curve if forwards else curve.reverse()).legs)
+            assert all(one.end == other.start for one, other in itertools.pairwise([*legs, legs[0]]))
+            area += enclosed_area(legs)
+        assert area == pytest.approx(block.area, rel=1e-6) and area > 0
+
+
+def test_distances_are_told() -> None:
+    network = cut_network(draw(a=A, b=[1 + 0.01j, 1 + 1j], c=[0.5 - 0.02j, 0.5 + 1j]), 0.05)
+    told = {(change.kind, change.trace): change for change in network.changes}
+    assert told["joined", "b"].distance == pytest.approx(0.01) and told["joined", "b"].place == 1 + 0.01j
+    assert told["cut off", "c"].distance == pytest.approx(0.02) and told["cut off", "c"].place == 0.5 - 0.02j
+    assert network.pieces["b"].start == 1 and network.pieces["c"].start == 0.5
+
+
+def test_a_trace_to_which_nothing_is_done_keeps_its_curve() -> None:
+    traces = {**draw(a=A), "c": draw_circle("c", 5j, 1.0, DIVISION)}
+    network = cut_network(traces)  # type: ignore[arg-type]
+    assert all(network.pieces[name] is curve for name, curve in traces.items())
+
+
+def test_elements_are_shared_by_the_pieces() -> None:
+    network = cut_network(draw(a=A, b=[0.5 - 1j, 0.5 + 1j]))
+    assert [leg.elements for name in ("a.1", "a.2") for leg in network.pieces[name].legs] == [3, 9]
+
+
+def test_a_name_that_is_taken_is_passed_over() -> None:
+    traces = draw(a=A, b=[1 - 1j, 1 + 1j])
+    traces["a.1"] = draw_polyline("a.1", [5j, 6j], DIVISION)
+    network = cut_network(traces)
+    assert [name for name, trace in network.traces.items() if trace == "a"] == ["a.2", "a.3"]
+    assert network.members["a"] == ("a.2", "a.3")
+
+
+def test_circles_are_cut_where_lines_cross_them() -> None:
+    circle = draw_circle("c", 1 + 1j, 2.0, DIVISION)
+    assert isinstance(circle, Curve)
+    network = cut_network({"c": circle, **draw(a=[-4 + 1j, 4 + 1j])})
+    assert sorted(network.pieces) == ["a.1", "a.2", "a.3", "c.1", "c.2"]
+    assert sorted(block.area for block in network.blocks) == pytest.approx([2 * math.pi] * 2)
+    points = {junction.point for junction in network.junctions}
+    assert all(min(abs(point - at) for at in points) < 1e-12 for point in (-1 + 1j, 3 + 1j))
+    check_sound(network)
+
+
+def test_arcs_that_miss_a_line_are_joined_and_stay_arcs() -> None:
+    arc = draw_circle("c", 0j, 1.0, DIVISION, (1.0, 120.0))
+    assert isinstance(arc, Curve)
+    network = cut_network({"c": arc, **draw(a=[0j, 2 + 0j])}, 0.05)
+    (leg,) = network.pieces["c"].legs
+    assert abs(leg.start.imag) < 1e-15 and leg.turn == pytest.approx(math.radians(119.0))
+    assert list_kinds(network) == ["T"]
+    check_sound(network)
+
+
+def make_segments(seed: int, count: int, extent: float = 1.0) -> dict[str, list[complex]]:
+    r = random.Random(seed)
+    segments = {}
+    for number in range(1, count + 1):
+        center, half = complex(r.random(), r.random()) * extent, cmath.rect(0.15 * extent, r.uniform(0, math.pi))
+        segments[f"t{number}"] = [center - half, center + half]
+    return segments
+
+
+def count_crossings(segments: Mapping[str, Sequence[complex]]) -> int:
+    """Brute force: each end of one on another side of the other."""
+
+    def differ(line: Sequence[complex], other: Sequence[complex]) -> bool:
+        a, b = line
+        sides = [((b - a).conjugate() * (point - a)).imag for point in other]
+        return sides[0] * sides[1] < 0
+
+    return sum(differ(one, other) and differ(other, one) for one, other in itertools.combinations(segments.values(), 2))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_networks_against_brute_force(seed: int) -> None:
+    segments = make_segments(seed, 60)
+    crossings = count_crossings(segments)
+    network = cut_network(draw(**segments))
+    assert network.crossings == crossings > 50
+    assert len(network.pieces) == 60 + 2 * crossings
+    total = sum(curve.length for curve in network.pieces.values())
+    assert total == pytest.approx(sum(abs(b - a) for a, b in segments.values()), rel=1e-12)
+    assert all(change.kind == "cut" for change in network.changes)
+    check_sound(network)
+
+
+def describe(network: Network, unit: float = 1.0) -> tuple[Counter[str], Counter[str], list[float]]:
+    lengths = sorted(curve.length / unit for curve in network.pieces.values())
+    areas = sorted(block.area / unit**2 for block in network.blocks)
+    kinds = Counter(change.kind for change in network.changes)
+    return Counter(junction.kind for junction in network.junctions), kinds, [*lengths, *areas]
+
+
+@pytest.mark.parametrize("factor, by, reverse", [
+    (1.0, 1e7 - 3e7j, False), (cmath.rect(1.0, 0.7), 0j, False), (1e-6, 0j, False), (1e5 * 1j, 0j, True),
+    (1.0, 0j, True),
+], ids=["shift", "turn", "smaller", "larger and backwards", "backwards"])  # fmt: skip
+def test_networks_move_turn_and_grow_with_their_traces(factor: complex, by: complex, reverse: bool) -> None:
+    segments = make_segments(11, 60)
+    r = random.Random(5)
+    for name, (a, b) in list(segments.items())[:20]:
+        # Ends that miss by less than the snap distance.
+        t = r.uniform(0.2, 0.8)
+        end = a + t * (b - a) + 3e-4 * r.choice((-1, 1)) * 1j * (b - a) / abs(b - a)
+        segments[f"{name}x"] = [end, end + 0.1 * 1j * (b - a) / abs(b - a)]
+    unit = abs(factor)
+    expected = describe(cut_network(draw(**segments), 1e-3))
+    moved = {name: [point * factor + by for point in points] for name, points in segments.items()}
+    if reverse:
+        moved = {name: points[::-1] for name, points in reversed(moved.items())}
+    network = cut_network(draw(**moved), 1e-3 * unit)
+    check_sound(network)
+    found = describe(network, unit)
+    assert found[:2] == expected[:2]
+    # 3e7 is known to 4e-9.
+    assert found[2] == pytest.approx(expected[2], rel=1e-6, abs=3e-8)
+    assert Counter(change.kind for change in network.changes)["cut"] > 100
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("snap", [1e-3, 2e-2, 0.1])
+def test_networks_with_large_snap_distances_settle(seed: int, snap: float) -> None:
+    r = random.Random(seed)
+    traces = {}
+    for number in range(25):
+        points = [complex(r.random(), r.random())]
+        for _ in range(r.randint(1, 8)):
+            points.append(points[-1] + cmath.rect(r.uniform(0, 0.15), r.uniform(0, 7)))
+        traces[f"t{number}"] = points
+    network = cut_network(draw(**traces), snap)
+    check_sound(network)
+    again = cut_network(network.pieces, 1e-12)
+    assert len(again.pieces) == len(network.pieces)
+    assert all(change.kind != "cut" for change in again.changes)
+    names = np.array([change.kind for change in network.changes])
+    assert (names == "thinned").any() or snap < 0.05

@@ -164,6 +164,17 @@ def test_simplified_traces_lose_the_vertices_that_say_little(capsys: Capture) ->
     assert "of 102 straight or circular parts 3 remain" in capsys.readouterr().out
 
 
+def test_junctions_are_kept_if_that_is_asked_for(capsys: Capture) -> None:
+    lines = [[0, 0], [5, 0.04], [10, 0]], [[5, 0.04], [5, 3]], [[2, 0.016], [2, -3]]
+    tables = bring_in("map.geojson", write_map(*lines), "--simplify", "0.05", "--snap", "0.001")
+    assert list(tables["curves"]) == ["t1.1", "t1.2", "t2", "t3.1", "t3.2"]
+    assert "2 ends that lay on another trace now miss it or poke through it" in capsys.readouterr().out
+    tables = bring_in("map.geojson", write_map(*lines), "--simplify", "0.05", "--snap", "0.001", "--keep-junctions")
+    assert list(tables["curves"]) == ["t1.1", "t1.2", "t1.3", "t2", "t3"]
+    said = capsys.readouterr().out
+    assert "Simplified by 0.05 between junctions" in said and "junctions: 2 (2 T)" in said
+
+
 def test_maps_far_from_the_origin_keep_their_digits() -> None:
     lines = [[[466000.282, 6691582.099], [466010.282, 6691582.099]], [[466005.001, 6691577], [466005.001, 6691587]]]
     tables = bring_in("map.geojson", write_map(*lines))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,6 +32,8 @@ SNAP, SIZE = 1e-3, 0.25
 LEAST_SNAP = 2e-5
 # Traces shorter than so many roundings of the map's coordinates say nothing.
 COARSEST = 1e3
+# More elements than this are nothing that can be computed.
+MOST_ELEMENTS = 200_000
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,10 @@ def _measure(path: Path, reading: Reading, options: Options) -> _Scale:
     snap = SNAP * median if options.snap is None else options.snap
     snap = max(snap, rounding, LEAST_SNAP * float(shapes.lengths.max()))
     size = SIZE * median if options.size is None else options.size
+    count = math.fsum(lengths) / size
+    if count > MOST_ELEMENTS:
+        found = f"traces of {math.fsum(lengths):.3g} in all, {count:.3g} times the elements' length of {size:.3g}"
+        raise fail(path, [Fault("the map", found, f"longer elements, {MOST_ELEMENTS} at most: --size")])
     return _Scale(median, snap, size, rounding)
 
 

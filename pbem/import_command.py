@@ -31,6 +31,8 @@ def add_import_options(parser: argparse.ArgumentParser) -> None:
         help="points no further apart are one (default: a thousandth of the median length)")
     add("--simplify", type=_read_distance, metavar="D",
         help="leave out vertices as long as no trace is moved by more (default: 0)")
+    add("--keep-junctions", action="store_true",
+        help="cut the traces before they are simplified, and simplify what lies between their junctions")
     add("--friction", type=read_finite, metavar="F", help="friction coefficient of all traces (default: 0.6)")
     add("--young", type=read_finite, metavar="E", help="Young's modulus (default: 1000)")
     add("--poisson", type=read_finite, metavar="P", help="Poisson's ratio (default: 0.2)")

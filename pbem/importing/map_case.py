@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
-from pbem.geometry.network import Network, cut_network
+from pbem.geometry.network import Change, Network, cut_network
 from pbem.geometry.network.noding import UnsettledError
 from pbem.geometry.shape import Outline, outline
 from pbem.geometry.simplification import choose_vertices
@@ -31,6 +32,8 @@ SNAP, SIZE = 1e-3, 0.25
 LEAST_SNAP = 2e-5
 # Traces shorter than so many roundings of the map's coordinates say nothing.
 COARSEST = 1e3
+# More elements than this are nothing that can be computed.
+MOST_ELEMENTS = 200_000
 
 
 @dataclass(frozen=True)
@@ -46,24 +49,16 @@ class _Scale:
 def make_map_case(path: Path, reading: Reading, options: Options, command: str) -> Imported:
     """The case of the traces that were read. Raises CaseError if there are none, or if their numbers make no map."""
     scale = _measure(path, reading, options)
-    traces, notes = _simplify(reading.traces, options.simplify, scale)
-    curves = {
-        _name_part(trace, number): Curve(_name_part(trace, number), part)
-        for trace in traces for number, part in enumerate(trace.parts)
-    }
-    try:
-        network = cut_network(curves, scale.snap)
-    except UnsettledError as error:
-        where = ", ".join(dict.fromkeys(map(format_place, error.places[:5])))
-        found = f"traces too near to each other for a snap distance of {scale.snap:.3g}, at {where}"
-        raise fail(path, [Fault("the map", found, "a smaller distance: --snap")]) from None
-    if not network.pieces:
-        found = f"{len(traces)} traces, none longer than the snap distance of {scale.snap:.3g}"
-        raise fail(path, [Fault("the map", found, "longer traces, or a smaller distance: --snap")])
-    owners = {_name_part(trace, number): trace.name for trace in traces for number in range(len(trace.parts))}
-    changes = [
-        replace(each, trace=owners[each.trace], other=owners.get(each.other, each.other)) for each in network.changes
-    ]
+    traces: Sequence[Trace] = reading.traces
+    notes: list[str] = []
+    if options.simplify and not options.keep_junctions:
+        traces, notes = _simplify_singly(traces, options.simplify, scale)
+    network, owners, changes = _cut(path, traces, scale)
+    if options.simplify and options.keep_junctions:
+        traces, notes = _simplify_between(network, owners, options.simplify)
+        earlier = [change for change in changes if change.kind != "cut"]
+        network, owners, changes = _cut(path, traces, scale)
+        changes = [*earlier, *changes]
     names = _name_curves(network, owners, scale)
     tables = _make_tables(path, network, names, options, scale)
     summary = _summarise(reading, network, owners, names)
@@ -97,13 +92,61 @@ def _measure(path: Path, reading: Reading, options: Options) -> _Scale:
     snap = SNAP * median if options.snap is None else options.snap
     snap = max(snap, rounding, LEAST_SNAP * float(shapes.lengths.max()))
     size = SIZE * median if options.size is None else options.size
+    count = math.fsum(lengths) / size
+    if count > MOST_ELEMENTS:
+        found = f"traces of {math.fsum(lengths):.3g} in all, {count:.3g} times the elements' length of {size:.3g}"
+        raise fail(path, [Fault("the map", found, f"longer elements, {MOST_ELEMENTS} at most: --size")])
     return _Scale(median, snap, size, rounding)
 
 
-def _simplify(traces: Sequence[Trace], distance: float | None, scale: _Scale) -> tuple[list[Trace], list[str]]:
+def _cut(
+    path: Path, traces: Sequence[Trace], scale: _Scale
+) -> tuple[Network, dict[str, str], list[Change]]:
+    """The network of traces, the trace of every part by the name that it has there, and what was done to the traces."""
+    owners = {_name_part(trace, number): trace.name for trace in traces for number in range(len(trace.parts))}
+    curves = {
+        _name_part(trace, number): Curve(_name_part(trace, number), part)
+        for trace in traces for number, part in enumerate(trace.parts)
+    }
+    try:
+        network = cut_network(curves, scale.snap)
+    except UnsettledError as error:
+        where = ", ".join(dict.fromkeys(map(format_place, error.places[:5])))
+        found = f"traces too near to each other for a snap distance of {scale.snap:.3g}, at {where}"
+        raise fail(path, [Fault("the map", found, "a smaller distance: --snap")]) from None
+    if not network.pieces:
+        found = f"{len(traces)} traces, none longer than the snap distance of {scale.snap:.3g}"
+        raise fail(path, [Fault("the map", found, "longer traces, or a smaller distance: --snap")])
+    changes = [
+        replace(each, trace=owners[each.trace], other=owners.get(each.other, each.other)) for each in network.changes
+    ]
+    return network, owners, changes
+
+
+def _simplify_between(network: Network, owners: Mapping[str, str], distance: float) -> tuple[list[Trace], list[str]]:
+    """Traces of pieces without the vertices that are no further than the distance from the lines that remain.
+
+    What meets stays together: the ends of pieces are kept.
+    """
+    parts: dict[str, list[list[Leg]]] = {}
+    before = after = 0
+    last: tuple[str, complex] | None = None
+    for piece, curve in network.pieces.items():
+        legs = _simplify_legs(curve.legs, distance)
+        before, after = before + len(curve.legs), after + len(legs)
+        part, own = network.traces[piece], parts.setdefault(owners[network.traces[piece]], [])
+        if last == (part, curve.start):
+            own[-1] += legs
+        else:
+            own.append(list(legs))
+        last = (part, curve.end)
+    traces = [Trace(name, "", tuple(map(tuple, each))) for name, each in parts.items()]
+    note = f"Simplified by {distance:g} between junctions: of {before} straight or circular parts {after} remain."
+    return traces, [note]
+
+
+def _simplify_singly(traces: Sequence[Trace], distance: float, scale: _Scale) -> tuple[list[Trace], list[str]]:
     """Traces without the vertices that are no further than the distance from the lines that remain."""
-    if not distance:
-        return list(traces), []
     simpler = []
     for trace in traces:
         simpler.append(replace(trace, parts=tuple(_simplify_legs(part, distance) for part in trace.parts)))
@@ -113,7 +156,7 @@ def _simplify(traces: Sequence[Trace], distance: float | None, scale: _Scale) ->
     if touching:
         notes.append(
             f"{len(touching)} ends that lay on another trace now miss it or poke through it, by up to {distance:g}, as "
-            "that one was simplified: a smaller --simplify or a larger --snap keeps more of them."
+            "that one was simplified: --keep-junctions keeps them there."
         )
     return simpler, notes
 

@@ -12,7 +12,8 @@ class Options:
     """Numbers of the command `pbem import`; None where none is given.
 
     size: largest length of elements; snap: points no further apart are one; simplify: distance that a simplified line
-    may be off the one of the file; stresses: sxx, syy, sxy far away.
+    may be off the one of the file; keep_junctions: whether it is simplified between junctions, which stay; stresses:
+    sxx, syy, sxy far away.
     """
 
     size: float | None = None
@@ -24,6 +25,7 @@ class Options:
     sxx: float | None = None
     syy: float | None = None
     sxy: float | None = None
+    keep_junctions: bool = False
 
 
 @dataclass(frozen=True)

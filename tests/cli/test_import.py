@@ -164,6 +164,17 @@ def test_simplified_traces_lose_the_vertices_that_say_little(capsys: Capture) ->
     assert "of 102 straight or circular parts 3 remain" in capsys.readouterr().out
 
 
+def test_junctions_are_kept_if_that_is_asked_for(capsys: Capture) -> None:
+    lines = [[0, 0], [5, 0.04], [10, 0]], [[5, 0.04], [5, 3]], [[2, 0.016], [2, -3]]
+    tables = bring_in("map.geojson", write_map(*lines), "--simplify", "0.05", "--snap", "0.001")
+    assert list(tables["curves"]) == ["t1.1", "t1.2", "t2", "t3.1", "t3.2"]
+    assert "2 ends that lay on another trace now miss it or poke through it" in capsys.readouterr().out
+    tables = bring_in("map.geojson", write_map(*lines), "--simplify", "0.05", "--snap", "0.001", "--keep-junctions")
+    assert list(tables["curves"]) == ["t1.1", "t1.2", "t1.3", "t2", "t3"]
+    said = capsys.readouterr().out
+    assert "Simplified by 0.05 between junctions" in said and "junctions: 2 (2 T)" in said
+
+
 def test_maps_far_from_the_origin_keep_their_digits() -> None:
     lines = [[[466000.282, 6691582.099], [466010.282, 6691582.099]], [[466005.001, 6691577], [466005.001, 6691587]]]
     tables = bring_in("map.geojson", write_map(*lines))
@@ -339,6 +350,19 @@ def test_a_wide_plate_with_a_hole_has_kirschs_stresses() -> None:
     ratio = 0.5 / 0.75
     expected = 0.5 * (1 + ratio**2) + 0.5 * (1 + 3 * ratio**4)
     assert pbem.open_results("plate.h5").interior.stress[-1][0][0] == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.filterwarnings("ignore")  # of the library that writes the file
+def test_binary_meshes_are_read_by_meshio() -> None:
+    meshio = pytest.importorskip("meshio")
+    expected = bring_in("ring.msh", write_2(make_ring(24, 3, 1.0, 2.0)))
+    meshio.gmsh.write("binary.msh", meshio.gmsh.read("ring.msh"), fmt_version="2.2", binary=True)
+    assert main(["import", "binary.msh", "-o", "binary.toml"]) == 0
+    found = tomllib.loads(Path("binary.toml").read_text())
+    assert sorted(found["regions"]) == sorted(expected["regions"]) == ["ring"]
+    assert [curve["radius"] for curve in found["curves"].values()] == pytest.approx([1, 2])
+    Path("binary.msh").write_bytes(Path("binary.msh").read_bytes()[:300])
+    assert main(["import", "binary.msh", "-o", "cut.toml"]) == 2
 
 
 def test_a_polygon_stays_one(capsys: Capture) -> None:

@@ -1,0 +1,58 @@
+"""What is said of a trace holds for its pieces, t12.1, t12.2, ..., but for what is said of a single one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pbem.description.case import Case
+from pbem.errors import CaseError
+from pbem.model.build import build_model
+
+
+def make(**tables: Any) -> Case:
+    curves = {f"t12.{k}": {"points": [[k, 0], [k + 1, 0.1 * k**2]], "elements": 3} for k in (1, 2, 10)}
+    curves["t12.2"]["points"] = [[2, 0.1], [3, 0.4]]
+    return Case(
+        materials={"rock": {"young": 100.0, "poisson": 0.2}}, curves=curves,
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": list(curves)}},
+        remote={"syy": -1.0}, **tables,
+    )  # fmt: skip
+
+
+def test_a_law_of_a_trace_is_that_of_its_pieces_but_for_the_keys_that_they_name() -> None:
+    case = make(interfaces={"t12": {"friction": 0.6, "cohesion": 0.1}, "t12.2": {"friction": 0.3}})
+    laws = build_model(case).interfaces
+    assert [(laws[name].law.friction, laws[name].law.cohesion) for name in ("t12.1", "t12.2", "t12.10")] == [
+        (0.6, 0.1), (0.3, 0.1), (0.6, 0.1),
+    ]
+    assert case.families == {"t12": ("t12.1", "t12.2", "t12.10")}
+
+
+def test_pressures_of_stages_spread_too() -> None:
+    case = make(stages=[{"steps": 1, "interfaces": {"t12": {"pressure": 2.0}, "t12.10": {"pressure": 3.0}}}])
+    assert dict(build_model(case).stages[0].pressure) == {"t12.1": 2.0, "t12.2": 2.0, "t12.10": 3.0}
+
+
+def test_a_fault_of_a_piece_is_told_where_it_stands() -> None:
+    with pytest.raises(CaseError) as caught:
+        build_model(make(interfaces={"t12": {"friction": 0.5, "cohesion": 0.1, "tensile_strength": 9.0}}))
+    assert {fault.place for fault in caught.value.faults} == {"interfaces.t12.tensile_strength"}
+
+
+def test_a_trace_without_pieces_is_unknown() -> None:
+    with pytest.raises(CaseError, match=r"interfaces\.t13: found unknown interface or crack 't13'"):
+        build_model(make(interfaces={"t13": {"friction": 0.5}}))
+
+
+def test_conditions_of_a_line_are_those_of_its_curves() -> None:
+    corners = {"side.1": [[0, 0], [1, 0]], "side.2": [[1, 0], [1, 1]], "rest": [[1, 1], [0, 1], [0, 0]]}
+    case = Case(
+        materials={"rock": {"young": 100.0, "poisson": 0.2}},
+        curves={name: {"points": points, "elements": 4} for name, points in corners.items()},
+        regions={"body": {"material": "rock", "boundary": list(corners)}},
+        boundary={"side": {"ux": 0.0, "uy": 0.0}, "side.2": {"uy": 0.5, "ux": 0.0}},
+    )
+    values = build_model(case).stages[0].boundary
+    assert values["side.1"] == (0.0, 0.0) and values["side.2"] == (0.0, 0.5)

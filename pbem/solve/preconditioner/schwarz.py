@@ -113,6 +113,24 @@ class SchwarzPreconditioner:
                 # A group that nothing holds without the rest of the model: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
 
+    def turn(self, residual: Real) -> Real:
+        """This rank's equations (own unknowns,), turned so that those which determine eliminated unknowns stand alone.
+        """
+        assert self._less is not None
+        return np.asarray((self._less.turn[self._nodes] @ residual.reshape(-1, 2, 1)).ravel())
+
+    def turn_back(self, turned: Real) -> Real:
+        """The inverse of `turn`."""
+        assert self._less is not None
+        transposed = self._less.turn[self._nodes].transpose(0, 2, 1)
+        return np.asarray((transposed @ turned.reshape(-1, 2, 1)).ravel())
+
+    @property
+    def judged(self) -> Real:
+        """1 for turned equations of this rank that contain no eliminated unknowns, 0 for those that determine them."""
+        assert self._less is not None
+        return np.asarray(~self._less.first[self._nodes].ravel(), dtype=float)
+
     def correct(self, residual: Real) -> tuple[Real, Real]:
         """What the eliminated unknowns are off by (own unknowns,), from this rank's part of K x - b, and what is left.
 
@@ -120,7 +138,7 @@ class SchwarzPreconditioner:
         """
         less, nodes = self._less, self._nodes
         assert less is not None
-        turned = (less.turn[nodes] @ residual.reshape(-1, 2, 1))[..., 0]
+        turned = self.turn(residual).reshape(-1, 2)
         off = (less.inverse[nodes] @ turned[..., None])[..., 0]
         return off.ravel(), np.where(less.first[nodes], 0.0, turned).ravel()
 

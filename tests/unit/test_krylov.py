@@ -15,6 +15,7 @@ from pbem.model.model import Model, Operator
 from pbem.parallel import world
 from pbem.results.reader import Results
 from pbem.solve.petsc.session import petsc_options
+from pbem.solve.preconditioner import schwarz
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.step import SilentReporter, Step
 from pbem.solve.system.assembly import assemble_problem
@@ -278,7 +279,8 @@ def test_slender_bodies_are_solved_to_the_true_residual() -> None:
 def test_groups_take_in_more_around_them_where_gmres_is_slow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a slender body divided into many groups; the same system then takes far fewer iterations."""
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
-    monkeypatch.setattr(groups, "GROUP_ELEMENTS", 12)
+    monkeypatch.setattr(groups, "BODY_ELEMENTS", 12)
+    monkeypatch.setattr(schwarz, "MOST_LEFT_OF_BODIES", 0)
     tangent = solve_once(SLENDER.replace("40", "80").replace("steps = 1", "steps = 1\norder = 1"))
     slow, so_far, problem = tangent.iterations[0], len(tangent.iterations), tangent.problem
     assert slow > 60
@@ -314,7 +316,7 @@ order = 1
 def test_the_faces_of_a_slit_are_solved_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """GMRES takes several times as many iterations where each face is in groups of its own."""
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
-    monkeypatch.setattr(groups, "CONNECTED_ELEMENTS", 32)
+    monkeypatch.setattr(groups, "BODY_ELEMENTS", 32)
     monkeypatch.setattr(groups, "GROUP_ELEMENTS", 12)
     tangent = solve_once(SLIT)
     mesh, own = tangent.problem.mesh, tangent.problem.system.groups

@@ -1,8 +1,8 @@
 """How well Newton's linear systems are solved while modes change: as well as the change of the iteration is worth.
 
 With the last solution carried over into the present unknowns, what is left of the equations is what the pairs that
-changed make of it. While modes change this has to become smaller by a factor only, which takes about as many products
-whatever its size, and few where few pairs changed (theory, 80). Once no mode changes, the same system is gone on with
+changed make of it. While modes change this has to become smaller by a factor only, which takes a few products
+however much there is left (theory, 84). Once no mode changes, the same system is gone on with
 to the full accuracy, by which the modes are judged again: what is stored is never less exact than without this.
 """
 

@@ -31,7 +31,7 @@ from pbem.solve.nonlinear.cascade import run_cascade
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
-from pbem.solve.nonlinear.search import Globalisation, Search
+from pbem.solve.nonlinear.search import PLAIN, PLAIN_IF_LOOSE, Globalisation, Search
 from pbem.solve.nonlinear.unsettled import describe_unsettled
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
@@ -141,6 +141,7 @@ def _search_modes(
             solved = tangent.solve(constraints, load, law, forcing.choose(search.level > 0))
             loosely = solved.loosely
             forcing.used |= loosely
+            search.plain = PLAIN_IF_LOOSE if loosely else PLAIN
             outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)

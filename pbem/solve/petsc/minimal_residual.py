@@ -2,7 +2,7 @@
 
 Each iteration takes one further direction z, the preconditioned residual (where that hardly fell: the preconditioned
 last vector of the basis, with which the method cannot break down), and its product K z, orthonormalised against those
-before; the residual then is the smallest that all directions so far allow (theory, 79). That is what GMRES finds, with
+before; the residual then is the smallest that all directions so far allow. That is what GMRES finds, with
 the basis of P. Jiranek and M. Rozloznik (Numer. Algorithms 53, 2010). Unlike PETSc's own GMRES it has the residual and
 the solution after every iteration without a product, and its directions serve for other right-hand sides of the same
 operator, so that a system that was solved loosely is solved in full by going on.
@@ -67,7 +67,7 @@ class MinimalResidual:
         self._factor = np.zeros((0, 0))
 
     def solve(self, solver: PETSc.KSP, right: PETSc.Vec, left: PETSc.Vec) -> None:
-        """What PETSc asks of a Krylov method; begins at zero."""
+        """What PETSc asks of a Krylov method; begins at zero (theory, 83)."""
         residual = self._rows.turn(np.array(right.getArray(readonly=True)))
         judged = self._rows.judged
         if self._count >= self._most:

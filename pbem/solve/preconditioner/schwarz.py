@@ -24,10 +24,11 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
-from pbem.solve.preconditioner.subdomains import Subdomain
+from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 
-# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
-MOST_LEFT = 900
+# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, of cracks and of bodies;
+# or so many times those of the group alone.
+MOST_LEFT, MOST_LEFT_OF_BODIES, MOST_TIMES = 900, 1700, 2.0
 
 
 @dataclass
@@ -67,14 +68,15 @@ class SchwarzPreconditioner:
         self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
         self._node_crack = mesh.node_crack
         self._formed: sparse.csr_matrix | None = None
+        self._widening = 1
         self._less: Elimination | None = None
         self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
         self.singular = 0  # groups without an inverse, of those formed last
         self.inverses = [self._place(group) for group in groups]
 
-    def regroup(self, groups: Sequence[Subdomain]) -> None:
-        """Take other surroundings of the same groups; `update` then forms all inverses."""
-        self._formed = None
+    def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
+        """Take other surroundings of the same groups, so many times as many; `update` then forms all inverses."""
+        self._formed, self._widening = None, widening
         self.inverses = [self._place(group) for group in groups]
 
     def _place(self, group: Subdomain) -> LocalInverse:
@@ -218,7 +220,10 @@ class SchwarzPreconditioner:
         own, width = group.elements, 2 * (self._mesh.order + 1)
         left = (~less.local).reshape(-1, width).sum(axis=1)
         sums = left[own].sum() + np.cumsum(left[group.nearest])
-        elements = np.union1d(own, group.nearest[sums <= MOST_LEFT])
+        least = MOST_LEFT if self._mesh.crack[own].all() else MOST_LEFT_OF_BODIES
+        most = max(least, MOST_TIMES * left[own].sum()) * self._widening
+        most = min(most, max(MOST_AROUND, MOST_TIMES * left[own].sum()))
+        elements = np.union1d(own, group.nearest[sums <= most])
         around = list_nodes(self._mesh, elements)
         inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
         return elements, number_components(around), inside

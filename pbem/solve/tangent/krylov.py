@@ -129,7 +129,7 @@ class KrylovTangent(TangentOperator):
         self._space.forget()
         begin = self._carry_over(law)
         self.law = law
-        loosely = forcing > 0 and self._keeps_directions and begin is not None and self._now.load is load
+        loosely = forcing > 0 and self._keeps_directions
         self._now = self._begin(constraints, load, begin, loosely)
         if self._now.scale == 0.0:
             unknowns = np.zeros(self.problem.unknowns)
@@ -140,13 +140,13 @@ class KrylovTangent(TangentOperator):
         """The first iterate, from unknowns (unknowns,) that are nearly the solution.
 
         Other loads or modes can make these much worse than none: that multiple is taken whose product is nearest to the
-        right-hand side; loosely: as they are, if that is no worse than none.
+        right-hand side; loosely, under the same load: as they are, if that is no worse than none.
         """
         problem, rows = self.problem, self.problem.system.nodes
         if begin is not None:
             part = begin.reshape(-1, 2)[rows].ravel()
             residual = problem.apply(constraints.evaluate(begin), load, constraints.released)
-            if loosely and 0 < problem.measure(residual) <= self._now.scale:
+            if loosely and self._now.load is load and 0 < problem.measure(residual) <= self._now.scale:
                 return _Iterate(load, part, residual, self._now.scale)
         forced = problem.apply(constraints.offset, load, constraints.released)
         scale = problem.measure(forced)
@@ -158,7 +158,7 @@ class KrylovTangent(TangentOperator):
         return _Iterate(load, factor * part, forced + factor * product, scale)
 
     def _solve_loosely(self, constraints: ConstraintMap, forcing: float) -> Solved:
-        """Until the residual is only this part of what it is; its true size is not asked for."""
+        """Until the residual is only this part of what it is (theory, 84); its true size is not asked for."""
         now = self._now
         begin, least = self.problem.measure(now.residual), self._tolerance * now.scale
         now = self._improve(now, max(forcing * begin, least))
@@ -187,7 +187,7 @@ class KrylovTangent(TangentOperator):
             now = replace(now, part=now.part - off, residual=true)
             residual = problem.measure(true) / size_residual(now.scale, unknowns)
             solved = residual <= tolerance
-            widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
+            widened = self.iterations[-1] > SLOW and self._widen()
             if solved:
                 self.solution, self._now = unknowns, now
                 return Solved(unknowns, v, residual, linear_iterations=count)
@@ -234,7 +234,7 @@ class KrylovTangent(TangentOperator):
         if not add_up(self.problem.comm, np.array([float(more)]))[0]:
             return False
         self.widening = wider
-        self.preconditioner.regroup(groups)
+        self.preconditioner.regroup(groups, wider)
         return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:

@@ -175,6 +175,7 @@ def _search_modes(
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
         if refused:
+            forcing.used = False  # no solution was asked for that
             moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
             raise ConvergenceError(refused.reason, refused.detail + moves)
         frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)

@@ -98,7 +98,8 @@ class KrylovTangent(TangentOperator):
         self._keeps_directions = solver.getType() == "python"
         if not self._keeps_directions:
             solver.setPCSide(PETSc.PC.Side.RIGHT)
-            solver.setGMRESRestart(MOST_ITERATIONS)
+            if not PETSc.Options().hasName(PREFIX + "ksp_gmres_restart"):
+                solver.setGMRESRestart(MOST_ITERATIONS)
         if inner.getType() not in ("python", "none"):
             kind = inner.getType()
             solver.destroy()

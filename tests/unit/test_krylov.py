@@ -92,6 +92,8 @@ def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
     shrink_leaves(monkeypatch)
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
     monkeypatch.setattr(groups, "GROUP_ELEMENTS", 24)
+    monkeypatch.setattr(groups, "BODY_ELEMENTS", 16)
+    monkeypatch.setattr(schwarz, "MOST_LEFT_OF_BODIES", 150)
 
 
 def read(text: str, operator: Operator = "hierarchical") -> Model:
@@ -256,7 +258,8 @@ steps = 1
 """
 
 
-def test_slender_bodies_are_solved_to_the_true_residual() -> None:
+def test_slender_bodies_are_solved_to_the_true_residual(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(groups, "BODY_ELEMENTS", 48)
     tangent = solve_once(SLENDER)
     assert len(tangent.problem.system.groups) > 5
     tangent.destroy()
@@ -286,7 +289,7 @@ def test_groups_take_in_more_around_them_where_gmres_is_slow(monkeypatch: pytest
     assert slow > 60
     load, tangent.solution = problem.evaluate_load(0, 1.0), None
     tangent.solve(problem.constrain(linearise_pairs(problem), load), load)
-    assert tangent.iterations[so_far] < 0.6 * slow
+    assert tangent.iterations[so_far] < 0.75 * slow
     tangent.destroy()
 
 

@@ -262,10 +262,7 @@ class KrylovTangent(TangentOperator):
         usual = self._solver.getTolerances()
         self._solver.setTolerances(rtol=RESPONSE, atol=0.0)
         for k in range(states.shape[1]):
-            self._right.setArray(-self._apply(np.asarray(states[:, k])))
-            self._left.set(0.0)
-            self._run_gmres()
-            result[:, k] = self.gather(np.array(self._left.getArray()))[unknowns]
+            result[:, k] = self._find_unknowns(-self._apply(np.asarray(states[:, k])))[unknowns]
         self._solver.setTolerances(*usual)
         return result
 
@@ -311,10 +308,18 @@ class KrylovTangent(TangentOperator):
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See TangentOperator; without the anchors that the constraint map releases."""
         self.constraints = constraints
-        self._left.set(0.0)
+        return self._find_unknowns(forces)
+
+    def _find_unknowns(self, forces: Real) -> Real:
+        """The unknowns on every rank for this rank's part of a right-hand side, as good as the solver is set to."""
         self._right.setArray(forces)
+        self._left.set(0.0)
         self._run_gmres()
-        return self.gather(np.array(self._left.getArray()))
+        part = np.array(self._left.getArray())
+        if self._keeps_directions:
+            # GMRES ends by the equations that contain no eliminated unknowns; these follow from the others.
+            part -= self.preconditioner.correct(-self._space.residual)[0]
+        return self.gather(part)
 
     def destroy(self) -> None:
         for item in (self._solver, self._matrix, self._right, self._left):

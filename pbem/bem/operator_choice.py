@@ -7,11 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from pbem.bem.operator_cost import forecast_dense, forecast_hierarchical
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator, SolverOptions
 
-# With more unknowns in one region than this the hierarchical operator is the faster one.
-DENSE_UNKNOWNS = 10_000
+# The hierarchical operator, whose products have an error, is taken where the dense one would take so many times as
+# long, and of models with so many unknowns at least.
+WORTH_WHILE, LEAST_UNKNOWNS = 2.0, 4000
 # Of the hierarchical operator a difference of meshes asks for less than the solution itself.
 EASED_TOLERANCE, EASED_NEWTON_TOLERANCE = 1e-6, 1e-7
 
@@ -44,9 +46,11 @@ class HierarchicalChoice:
 
 
 def choose_operator(model: Model, mesh: Mesh) -> type[DenseChoice] | type[HierarchicalChoice]:
-    """What a model is computed with: as it asks, else by its largest region."""
+    """What a model is computed with: as it asks, else what is forecast to take less."""
     solver = model.solver
     if solver.operator == "auto":
-        large = 2 * int(np.bincount(mesh.node_region).max()) > DENSE_UNKNOWNS
-        return HierarchicalChoice if large and solver.linear not in ("lu", "mumps") else DenseChoice
+        if solver.linear in ("lu", "mumps") or 2 * mesh.nodes < LEAST_UNKNOWNS:
+            return DenseChoice
+        saves = forecast_dense(model, mesh) > WORTH_WHILE * forecast_hierarchical(model, mesh)
+        return HierarchicalChoice if saves else DenseChoice
     return HierarchicalChoice if solver.operator == "hierarchical" else DenseChoice

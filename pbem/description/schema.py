@@ -333,7 +333,7 @@ class SolverTable(Table):
     operator: Literal["auto", "dense", "hierarchical"] = Field(
         "auto",
         description='`"dense"`: every entry of the matrix is stored; `"hierarchical"`: far elements by the fast '
-        'multipole method, chosen by `"auto"` above 10 000 unknowns in a region unless `linear` asks for factors',
+        'multipole method, chosen by `"auto"` where less time is forecast for it, unless `linear` asks for factors',
     )
     tolerance: ProductTolerance = Field(1e-8, description="relative error of the hierarchical operator's products")
     newton_tolerance: Tolerance = Field(1e-9, description="relative residual of the discrete equations")

@@ -109,8 +109,10 @@ def _describe_iterations(results: Results) -> str:
     if not len(table):
         return "none"
     each = np.unique(table["step"], return_counts=True)[1]
+    # Files of earlier versions do not tell the products.
+    products = int(table["products"].sum()) if "products" in (table.dtype.names or ()) else 0
     return (f"{len(table)} in {_count(len(each), 'step')} ({each.mean():.1f} a step, at most {each.max()}), "
-            f"{table['seconds'].sum():.3g} s")
+            + (f"{products} products, " if products else "") + f"{table['seconds'].sum():.3g} s")
 
 
 def _contact_rows(results: Results) -> list[list[str]]:

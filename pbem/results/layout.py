@@ -28,7 +28,7 @@ from pbem.version import __version__
 ITERATION = np.dtype(
     [
         ("step", "i4"), ("iteration", "i4"), ("residual", "f8"), ("changed", "i4"),
-        ("stick", "i4"), ("slip", "i4"), ("open", "i4"), ("seconds", "f8"),
+        ("stick", "i4"), ("slip", "i4"), ("open", "i4"), ("seconds", "f8"), ("products", "i4"),
     ]
 )
 STEP_DATASETS = {"stage": "i4", "factor": "f8", "iterations": "i4", "residual": "f8", "number": "i4"}

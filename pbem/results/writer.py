@@ -11,6 +11,7 @@ from types import MappingProxyType, TracebackType
 
 import h5py
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.hoop import evaluate_hoop_stress
@@ -159,7 +160,9 @@ class ResultWriter:
         steps before.
         """
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
-        extend(self._file["convergence"], np.array(rows, dtype=ITERATION))
+        table = self._file["convergence"]
+        # Files of earlier versions that are resumed have fewer columns.
+        extend(table, repack_fields(np.array(rows, dtype=ITERATION)[list(table.dtype.names)]))
         self._energy = self._balance.add(step)
         self._estimates = estimates or {}
         fault = find_fault(group.law for group in self._balance.laws.strengths)
@@ -324,4 +327,4 @@ def _describe_end(error: BaseException) -> Mapping[str, str]:
 
 def _iteration_row(step: int, iteration: Iteration) -> tuple[float, ...]:
     return (step, iteration.number, iteration.residual, iteration.changed,
-            iteration.stick, iteration.slip, iteration.open, iteration.seconds)
+            iteration.stick, iteration.slip, iteration.open, iteration.seconds, iteration.products)

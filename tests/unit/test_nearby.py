@@ -55,6 +55,7 @@ def draw_modes(count: int) -> ModeState:
 def many_groups(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
     monkeypatch.setattr(groups, "CONNECTED_ELEMENTS", 16)
+    monkeypatch.setattr(groups, "GROUP_ELEMENTS", 16)
 
 
 def test_cracks_that_meet_are_divided_by_place(many_groups: None) -> None:

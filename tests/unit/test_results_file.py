@@ -192,7 +192,7 @@ def test_resuming_drops_a_step_that_was_cut_in_the_middle(tmp_path: Path) -> Non
         field = file["fields/displacement"]
         field.resize(4, axis=0)
         file["convergence"].resize(12, axis=0)
-        file["convergence"][9:] = np.array([(4, 1, 1.0, 0, 0, 0, 0, 0.0)] * 3, dtype=file["convergence"].dtype)
+        file["convergence"][9:] = np.array([(4, 1, 1.0, 0, 0, 0, 0, 0.0, 0)] * 3, dtype=file["convergence"].dtype)
     assert open_results(tmp_path / "a.h5").displacement.shape[0] == 3
     with ResultWriter.resume(tmp_path / "a.h5", MODEL, MESH, 1, "3.18.5") as writer:
         writer.append(STEPS[3])

@@ -114,6 +114,7 @@ OWN: dict[str, Callable[[System], bool]] = {
     "tolerance": lambda system: 0 <= system.tolerance <= 1e-9,
     "notes": lambda system: all(isinstance(note, str) for note in system.notes),
     "stored": lambda system: system.stored > 0,
+    "products": lambda system: system.products >= 0,
 }
 
 

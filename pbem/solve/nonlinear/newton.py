@@ -29,8 +29,9 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import run_cascade
 from pbem.solve.nonlinear.fixed_point import FixedPoint
+from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
-from pbem.solve.nonlinear.search import Globalisation, Search
+from pbem.solve.nonlinear.search import PLAIN, PLAIN_IF_LOOSE, Globalisation, Search
 from pbem.solve.nonlinear.unsettled import describe_unsettled
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
@@ -74,20 +75,31 @@ def solve_step(
     modes are searched for is said in pbem.solve.nonlinear.search. Brittle bonds fail, those with the largest overload
     first, only when the modes of all other pairs have settled. Where groups of a crack network that settle by
     themselves lead to modes that do not, the search begins anew without that. All decisions are taken by the first
-    rank.
+    rank. Linear systems are solved loosely while modes change (pbem.solve.nonlinear.forcing); a search that fails so
+    begins anew with every system solved in full.
     Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
     "singular tangent", "linear solver"; and what `refuse` answers, asked now and then with the memory as it is by then:
     "limit load" in a march, where nothing can balance the loads with the bonds that are left.
     """
     iterations: list[Iteration] = []
-    *first, last = _list_searches(problem, tangent)
-    for search in first:
+    # Where friction changes with slip, Newton's steps lead through states that have to be followed exactly.
+    loosely = bool(find_linear(problem.laws).all())
+    for forcing in (Forcing(loosely), Forcing(False)):
+        *first, last = _list_searches(problem, tangent)
         try:
-            return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations)
+            for search in first:
+                try:
+                    return _search_modes(
+                        problem, tangent, memory, load, reporter, refuse, hurried, search, iterations, forcing)
+                except ConvergenceError:
+                    if not (search.swept or (search.varying and search.unsettled)):
+                        raise
+            return _search_modes(
+                problem, tangent, memory, load, reporter, refuse, hurried, last, iterations, forcing)
         except ConvergenceError:
-            if not (search.swept or (search.varying and search.unsettled)):
+            if not forcing.used:
                 raise
-    return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, last, iterations)
+    raise AssertionError("a search without forcing ends with a solution or an error")
 
 
 def _list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
@@ -107,6 +119,7 @@ def _list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
 def _search_modes(
     problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Reporter,
     refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, search: Search, iterations: list[Iteration],
+    forcing: Forcing,
 ) -> Solution:
     """See solve_step; by one search, whose iterations join those before."""
     laws = problem.laws
@@ -116,6 +129,7 @@ def _search_modes(
         laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
     fixed_point, kept = FixedPoint(), (modes, normal_traction, slip)
+    products = problem.system.products
     while True:
         begin = time.perf_counter()
         law = linearise(
@@ -124,11 +138,16 @@ def _search_modes(
         )
         constraints = hold.release(problem.constrain(law, load), modes)
         try:
-            solved = tangent.solve(constraints, load, law)
+            solved = tangent.solve(constraints, load, law, forcing.choose(search.level > 0))
+            loosely = solved.loosely
+            forcing.used |= loosely
+            search.plain = PLAIN_IF_LOOSE if loosely else PLAIN
             outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)
                 outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
+                if loosely and not outcome.settled:
+                    forcing.tighten()
         except ConvergenceError:
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
@@ -144,7 +163,8 @@ def _search_modes(
             memory = memory.lose(cascade.broken)
             proposal = _judge(problem, modes, memory, load, law, solved, search.globalisation).proposal
             search.restart()
-        iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin))
+        iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin, problem, products))
+        products = problem.system.products
         reporter.iterate(iterations[-1])
         driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
         if driven:
@@ -156,6 +176,7 @@ def _search_modes(
             return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
         refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
         if refused:
+            forcing.used = False  # no solution was asked for that
             moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
             raise ConvergenceError(refused.reason, refused.detail + moves)
         frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
@@ -171,11 +192,11 @@ def _search_modes(
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
         if not cascade and not (share > search.globalisation.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
-        if chosen is not None and search.returns(chosen.fingerprint()) and not search.descend():
+        if chosen is not None and search.returns(chosen.fingerprint()) and not _go_on(forcing, search):
             raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, share)
-            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not search.descend():
+            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not _go_on(forcing, search):
                 raise _end(hold, "mode cycle", proposal, search)
         slipped, former = plastic_slip(laws, pairs) - memory.slip, modes
         modes = problem.decide(
@@ -189,6 +210,15 @@ def _search_modes(
         slip = choose_slip(laws, modes, memory, slip, found, former)
         if search.just_returned:
             kept = (modes, normal_traction, slip)
+
+
+def _go_on(forcing: Forcing, search: Search) -> bool:
+    """Where modes come back: at first with systems that are solved in full, then with more caution; False at the end.
+    """
+    if forcing.end():
+        search.seen.clear()
+        return True
+    return search.descend()
 
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
@@ -298,8 +328,12 @@ def _judge(
     return problem.decide(judge)
 
 
-def _record(number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float) -> Iteration:
+def _record(
+    number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float, problem: Problem, products: int
+) -> Iteration:
+    """products: so many there were before."""
     stick, slip, is_open = (int((modes.mode == kind).sum()) for kind in (STICK, SLIP, OPEN))
     seconds = time.perf_counter() - begin
     changed = int(proposal.changed.sum())
-    return Iteration(number, solved.residual, changed, stick, slip, is_open, seconds, solved.linear_iterations)
+    return Iteration(number, solved.residual, changed, stick, slip, is_open, seconds, solved.linear_iterations,
+                     problem.system.products - products)

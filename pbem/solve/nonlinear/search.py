@@ -56,8 +56,9 @@ NEARER = 0.1
 SLOW = 0.5
 # Iterations in which the number of changes should have fallen.
 LONG = 10
-# Iterations that are plain Newton steps whatever they change.
-PLAIN = 3
+# Iterations that are plain Newton steps whatever they change; and where systems are solved loosely, so that such a step
+# takes far fewer products than the responses of a few pairs.
+PLAIN, PLAIN_IF_LOOSE = 3, 6
 # Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
 COSTLY = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
@@ -92,6 +93,7 @@ class Search:
         self.sweeps, self.swept = sweeps, False
         self.unsettled = False  # whether it ended as modes came back, or took too long
         self.wary = wary
+        self.plain = PLAIN
         self.restart()
 
     def restart(self) -> None:
@@ -169,7 +171,7 @@ class Search:
         if self.widening:
             self.group = self._list_all()
             return self.group
-        if len(self.counts) <= PLAIN or not self.counts[-1]:
+        if len(self.counts) <= self.plain or not self.counts[-1]:
             return nothing
         if self.paused < self.pause:
             self.paused += 1

@@ -65,6 +65,11 @@ def list_options() -> list[str]:
     return list(PETSc.Options(PREFIX).getAll())
 
 
+def find_number(name: str, default: float) -> float:
+    """The value of an option of the program's own under its prefix."""
+    return float(PETSc.Options(PREFIX).getReal(name, default))
+
+
 @contextmanager
 def factor_in_place(wanted: bool) -> Iterator[None]:
     """Let the factors take the matrix's storage; petsc4py knows this by an option only."""

@@ -25,10 +25,11 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
-from pbem.solve.preconditioner.subdomains import Subdomain
+from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 
-# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, but for the group's own.
-MOST_LEFT = 900
+# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, of cracks and of bodies;
+# or so many times those of the group alone.
+MOST_LEFT, MOST_LEFT_OF_BODIES, MOST_TIMES = 900, 1700, 2.0
 
 
 @dataclass
@@ -68,14 +69,15 @@ class SchwarzPreconditioner:
         self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
         self._node_crack = mesh.node_crack
         self._formed: sparse.csr_matrix | None = None
+        self._widening = 1
         self._less: Elimination | None = None
         self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
         self.singular = 0  # groups without an inverse, of those formed last
         self.inverses = [self._place(group) for group in groups]
 
-    def regroup(self, groups: Sequence[Subdomain]) -> None:
-        """Take other surroundings of the same groups; `update` then forms all inverses."""
-        self._formed = None
+    def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
+        """Take other surroundings of the same groups, so many times as many; `update` then forms all inverses."""
+        self._formed, self._widening = None, widening
         self.inverses = [self._place(group) for group in groups]
 
     def _place(self, group: Subdomain) -> LocalInverse:
@@ -115,6 +117,24 @@ class SchwarzPreconditioner:
                 # A group that nothing holds without the rest of the model: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
 
+    def turn(self, residual: Real) -> Real:
+        """This rank's equations (own unknowns,), turned so that those which determine eliminated unknowns stand alone.
+        """
+        assert self._less is not None
+        return np.asarray((self._less.turn[self._nodes] @ residual.reshape(-1, 2, 1)).ravel())
+
+    def turn_back(self, turned: Real) -> Real:
+        """The inverse of `turn`."""
+        assert self._less is not None
+        transposed = self._less.turn[self._nodes].transpose(0, 2, 1)
+        return np.asarray((transposed @ turned.reshape(-1, 2, 1)).ravel())
+
+    @property
+    def judged(self) -> Real:
+        """1 for turned equations of this rank that contain no eliminated unknowns, 0 for those that determine them."""
+        assert self._less is not None
+        return np.asarray(~self._less.first[self._nodes].ravel(), dtype=float)
+
     def correct(self, residual: Real) -> tuple[Real, Real]:
         """What the eliminated unknowns are off by (own unknowns,), from this rank's part of K x - b, and what is left.
 
@@ -122,7 +142,7 @@ class SchwarzPreconditioner:
         """
         less, nodes = self._less, self._nodes
         assert less is not None
-        turned = (less.turn[nodes] @ residual.reshape(-1, 2, 1))[..., 0]
+        turned = self.turn(residual).reshape(-1, 2)
         off = (less.inverse[nodes] @ turned[..., None])[..., 0]
         return off.ravel(), np.where(less.first[nodes], 0.0, turned).ravel()
 
@@ -202,7 +222,10 @@ class SchwarzPreconditioner:
         own, width = group.elements, 2 * (self._mesh.order + 1)
         left = (~less.local).reshape(-1, width).sum(axis=1)
         sums = left[own].sum() + np.cumsum(left[group.nearest])
-        elements = np.union1d(own, group.nearest[sums <= MOST_LEFT])
+        least = MOST_LEFT if self._mesh.crack[own].all() else MOST_LEFT_OF_BODIES
+        most = max(least, MOST_TIMES * left[own].sum()) * self._widening
+        most = min(most, max(MOST_AROUND, MOST_TIMES * left[own].sum()))
+        elements = np.union1d(own, group.nearest[sums <= most])
         around = list_nodes(self._mesh, elements)
         inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
         return elements, number_components(around), inside

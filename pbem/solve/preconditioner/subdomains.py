@@ -18,11 +18,15 @@ from pbem.parallel import share_nodes
 ONE_GROUP = 1500
 # Elements of a group at most; both sides of an interface count.
 GROUP_ELEMENTS = 48
-# Cracks that meet are divided by place, not by curve: what is enclosed by them moves as a whole. So are the two faces
-# of a slit, whose equations differ by no more than its width makes of them. Their groups have so many elements at
-# most, and around them the nearest elements, so many times as many, whichever group those belong to.
+# What is connected - cracks that meet, the boundary of a body, bodies in contact, faces of a slit - and is more than
+# a group is divided by place, not by curve: blocks between cracks and slices of thin bodies move as a whole, whatever
+# curves their boundaries are cut into. Such groups have so many elements at most, and around them the nearest elements,
+# so many times as many, whichever group those belong to.
 CONNECTED_ELEMENTS = 128
 NEAREST_SHARE = 2.0
+# The same of bodies, of whose unknowns none are eliminated, and through which forces go from one end to the other.
+BODY_ELEMENTS = 192
+BODY_SHARE = 3.0
 # Candidates for the nearest, as a multiple of those taken.
 CANDIDATES = 3
 # Groups around a group are taken until they have so many unknowns together, or so many times those of the group. One
@@ -59,8 +63,9 @@ def divide_model(mesh: Mesh) -> list[Integer]:
     if is_one_group(mesh):
         return [np.arange(mesh.elements)]
     bulge = np.zeros(mesh.elements)
-    sets, connected = connect_cracks(mesh)
-    most = np.where(connected, CONNECTED_ELEMENTS, GROUP_ELEMENTS)
+    sets, connected = connect_elements(mesh)
+    body = np.bincount(sets[~mesh.crack], minlength=len(connected)) > 0
+    most = np.where(connected, np.where(body, BODY_ELEMENTS, CONNECTED_ELEMENTS), GROUP_ELEMENTS)
     forest = build_forest(mesh.start, mesh.end, bulge, sets, most)
     groups = [np.sort(forest.items(leaf)) for leaf in forest.leaves]
     middle = 0.5 * (mesh.start + mesh.end)
@@ -70,31 +75,37 @@ def divide_model(mesh: Mesh) -> list[Integer]:
     return [groups[k] for k in order]
 
 
-def connect_cracks(mesh: Mesh) -> tuple[Integer, Bool]:
-    """Of every element the number of its set, the cracks that meet or else one curve; and whether a set is of several.
+def connect_elements(mesh: Mesh) -> tuple[Integer, Bool]:
+    """Of every element the number of its set, what is connected with it; and whether a set is more than a group.
 
-    Cracks meet in a common end of two elements. The faces of a contact within one region are taken to meet as well.
+    Elements are connected that have an end in common, or face each other in a contact.
     """
+    sets = _connect(mesh, np.arange(mesh.elements))
+    return sets, np.bincount(sets, minlength=mesh.elements) > GROUP_ELEMENTS
+
+
+def do_cracks_meet(mesh: Mesh) -> bool:
+    """Whether any cracks have an end in common."""
     own = np.flatnonzero(mesh.crack)
-    curves = len(mesh.curve_names)
+    sets = _connect(mesh, own)[own]
+    curve_of_set = np.unique(np.stack([sets, mesh.curve[own]]), axis=1)
+    return bool(len(curve_of_set[0]) > len(np.unique(sets)))
+
+
+def _connect(mesh: Mesh, own: Integer) -> Integer:
+    """Of every element the number of the first one of its set, where some of them (k,) are connected."""
     points, at = np.unique(np.concatenate([mesh.start[own], mesh.end[own]]), return_inverse=True)
-    size = curves + len(points)
-    first, second = _find_slits(mesh)
-    joined = np.concatenate([np.tile(mesh.curve[own], 2), first]), np.concatenate([curves + at.ravel(), second])
+    pairs, element = mesh.pairs, mesh.node_element
+    facing = ~pairs.crack
+    size = mesh.elements + len(points)
+    joined = (
+        np.concatenate([np.tile(own, 2), element[pairs.first[facing]]]),
+        np.concatenate([mesh.elements + at.ravel(), element[pairs.second[facing]]]),
+    )
     meeting = (np.ones(len(joined[0])), joined)
     _, label = csgraph.connected_components(sparse.coo_matrix(meeting, shape=(size, size)), directed=False)
-    # The number of a set is that of its first curve.
-    _, first, inverse = np.unique(label[:curves], return_index=True, return_inverse=True)
-    set_of_curve = first[inverse.ravel()]
-    return set_of_curve[mesh.curve], np.bincount(set_of_curve, minlength=curves) > 1
-
-
-def _find_slits(mesh: Mesh) -> tuple[Integer, Integer]:
-    """Curves (k,) and (k,) that face each other in a contact within one region, as those of a thin slit in it."""
-    pairs, element = mesh.pairs, mesh.node_element
-    one, other = element[pairs.first[~pairs.crack]], element[pairs.second[~pairs.crack]]
-    same = mesh.region[one] == mesh.region[other]
-    return mesh.curve[one[same]], mesh.curve[other[same]]
+    _, first, inverse = np.unique(label[: mesh.elements], return_index=True, return_inverse=True)
+    return np.asarray(first[inverse.ravel()])
 
 
 def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tuple[int, int]:
@@ -116,7 +127,7 @@ def surround_groups(
     most = widening * MOST_NEIGHBOURS
     count = min(4 * most, len(groups))
     ends = [set(np.concatenate([mesh.start[group], mesh.end[group]]).tolist()) for group in groups]
-    sets, connected = connect_cracks(mesh)
+    sets, connected = connect_elements(mesh)
     middle = 0.5 * (mesh.start + mesh.end)
     elements = cKDTree(np.column_stack([middle.real, middle.imag]))
     result = []
@@ -141,7 +152,8 @@ def surround_groups(
 
 def _surround_by_nearest(mesh: Mesh, group: Integer, elements: cKDTree, widening: int) -> Subdomain:
     least = NEIGHBOUR_UNKNOWNS // (2 * (mesh.order + 1))
-    nearest = find_nearest(mesh, group, elements, int(NEAREST_SHARE * widening * max(len(group), least)))
+    share = NEAREST_SHARE if mesh.crack[group].all() else BODY_SHARE
+    nearest = find_nearest(mesh, group, elements, int(share * widening * max(len(group), least)))
     return Subdomain(group, np.union1d(group, nearest), nearest)
 
 

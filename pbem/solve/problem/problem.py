@@ -68,6 +68,10 @@ class System(Protocol):
     def stored(self) -> int:
         """Bytes of this rank's matrices that a product reads."""
 
+    @property
+    def products(self) -> int:
+        """How often `apply` was called so far, where a product is what the solution consists of; else 0."""
+
     def apply(self, v: Real) -> Real:
         """This rank's rows (2 k,) of B v, lengths, for v (4 nodes,)."""
 

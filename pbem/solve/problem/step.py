@@ -18,7 +18,8 @@ from pbem.model.model import Model
 class Iteration:
     """One Newton iteration: relative residual of its linear system, pairs that changed mode, counts, seconds.
 
-    linear_iterations: of GMRES with the hierarchical operator, else 0.
+    linear_iterations: of GMRES with the hierarchical operator, else 0. products: with that operator since the iteration
+    before, whatever they were for.
     """
 
     number: int
@@ -29,6 +30,7 @@ class Iteration:
     open: int
     seconds: float
     linear_iterations: int = 0
+    products: int = 0
 
 
 @dataclass(frozen=True)

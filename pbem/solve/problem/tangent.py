@@ -23,8 +23,9 @@ Judge = Callable[[PairLaws, ModeState, PairState, Memory, Real], Proposal]
 class Solved:
     """Unknowns x (2 nodes,), v = M x + m (4 nodes,), and the relative residual of B v = 0.
 
-    checked: the residual is that of v itself. Else it is that of the condensed system, and `check` has to confirm it.
-    linear_iterations: of GMRES with the hierarchical operator.
+    checked: the residual is that of v itself, and within the tolerance. Else it is that of the condensed system, or of
+    one that was solved loosely, and `check` has to confirm or complete it.
+    linear_iterations: of GMRES with the hierarchical operator. loosely: solved only as well as the forcing term asks.
     """
 
     unknowns: Real
@@ -32,6 +33,7 @@ class Solved:
     residual: float
     checked: bool = True
     linear_iterations: int = 0
+    loosely: bool = False
 
 
 # The most pairs that are settled together where their responses cost little.
@@ -60,9 +62,13 @@ class TangentOperator(Protocol):
         """How pairs can be settled together."""
         return Settling(MOST_SETTLED, with_neighbours=True, nearby=False)
 
-    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+    def solve(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, forcing: float = 0.0
+    ) -> Solved:
         """Solve B (M x + m) = 0 for the constraint map of linearised laws.
 
+        forcing: an unchecked solution will do whose residual is this part of that of the solution before; what solves
+        by factors takes no notice of it.
         Raises ConvergenceError: "singular tangent", "linear solver".
         """
 

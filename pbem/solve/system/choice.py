@@ -14,5 +14,5 @@ SYSTEMS: dict[str, type[DenseSystem] | type[HierarchicalSystem]] = {
 
 
 def choose_system(model: Model, mesh: Mesh) -> type[DenseSystem] | type[HierarchicalSystem]:
-    """As the model asks, else by its largest region; the class assembles the system and knows what it can do."""
+    """As the model asks, else what is forecast to take less; the class assembles the system."""
     return SYSTEMS[choose_operator(model, mesh).name]

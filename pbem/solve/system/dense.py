@@ -99,6 +99,11 @@ class DenseSystem:
         """See System."""
         return sum(block.matrix.nbytes for block in self.operator.blocks)
 
+    @property
+    def products(self) -> int:
+        """See System."""
+        return 0
+
     def apply(self, v: Real) -> Real:
         """See System; also for many v (4 nodes, c) at a time."""
         with clock.piece("product", self.stored):

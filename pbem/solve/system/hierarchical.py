@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from mpi4py import MPI
@@ -40,6 +40,13 @@ from pbem.solve.tangent.krylov import KrylovTangent
 MOST_TERMS = 60
 
 
+@dataclass
+class Count:
+    """Of products so far."""
+
+    products: int = 0
+
+
 @dataclass(frozen=True)
 class HierarchicalSystem:
     """See pbem.solve.problem.problem.System.
@@ -54,6 +61,7 @@ class HierarchicalSystem:
     widen_groups: Callable[[int], tuple[Subdomain, ...]]
     tolerance: float
     notes: tuple[str, ...]
+    _count: Count = field(default_factory=Count)
 
     @staticmethod
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
@@ -97,8 +105,14 @@ class HierarchicalSystem:
 
     def apply(self, v: Real) -> Real:
         """See System."""
+        self._count.products += 1
         with clock.piece("product", self.stored):
             return self.operator.apply(v)
+
+    @property
+    def products(self) -> int:
+        """See System."""
+        return self._count.products
 
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""

@@ -88,7 +88,9 @@ class CondensedTangent(TangentOperator):
         self.unknowns = number_components(pairs.slave[self.varying])
         self.known: Known | None = None
 
-    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+    def solve(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, forcing: float = 0.0
+    ) -> Solved:
         """See TangentOperator. The first solution after a factorisation is checked, others are not."""
         fresh = not self._reach(law)
         if fresh:

@@ -38,7 +38,9 @@ class FactoredTangent(TangentOperator):
         if self.factored is None or not are_equal(self.factored, constraints.matrix):
             self._factorise(constraints)
 
-    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+    def solve(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, forcing: float = 0.0
+    ) -> Solved:
         """See TangentOperator."""
         problem = self.problem
         self.reference.present = constraints.matrix

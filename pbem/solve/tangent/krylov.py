@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
+from pbem.solve.petsc.minimal_residual import MinimalResidual
 from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence, petsc_options
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
@@ -39,6 +41,19 @@ SAFETY = 0.1
 MOST_SETTLED_BY_GMRES = 12
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
+
+
+@dataclass(frozen=True)
+class _Iterate:
+    """An approximate solution under a load: this rank's part of it, and of its residual K x + B m.
+
+    scale: the norm of the forces B m.
+    """
+
+    load: Load | None
+    part: Real
+    residual: Real
+    scale: float
 
 
 class KrylovTangent(TangentOperator):
@@ -71,16 +86,21 @@ class KrylovTangent(TangentOperator):
         solver = PETSc.KSP().create(problem.comm)
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
-        solver.setType("gmres")
-        solver.setGMRESRestart(MOST_ITERATIONS)
-        solver.setPCSide(PETSc.PC.Side.RIGHT)
+        self._space = MinimalResidual(problem.comm, _Rows(self), MOST_ITERATIONS)
+        solver.setType("python")
+        solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
-        solver.setInitialGuessNonzero(True)
         inner = solver.getPC()
         inner.setType("python")
         inner.setPythonContext(_Preconditioning(self))
         with petsc_options(_choose_options()):
             solver.setFromOptions()
+        # The user may have asked for another method.
+        self._keeps_directions = solver.getType() == "python"
+        if not self._keeps_directions:
+            solver.setPCSide(PETSc.PC.Side.RIGHT)
+            if not PETSc.Options().hasName(PREFIX + "ksp_gmres_restart"):
+                solver.setGMRESRestart(MOST_ITERATIONS)
         if inner.getType() not in ("python", "none"):
             kind = inner.getType()
             solver.destroy()
@@ -90,60 +110,93 @@ class KrylovTangent(TangentOperator):
                 'leave pc_type out, or ask for operator = "dense"',
             )
         self._solver = solver
-        self._tolerance = float(solver.getTolerances()[0])  # the user's ksp_rtol, if one is given
+        # The user's ksp_rtol and ksp_atol, if they are given.
+        self._tolerance, self._least = (float(each) for each in solver.getTolerances()[:2])
+        self._now = _Iterate(None, np.zeros(0), np.zeros(0), 0.0)
 
     @property
     def settling(self) -> Settling:
         """See TangentOperator."""
         return self._settling
 
-    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None) -> Solved:
-        """Solve B (M x + m) = 0 for a constraint map.
+    def solve(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None, forcing: float = 0.0
+    ) -> Solved:
+        """See TangentOperator.
 
         Raises ConvergenceError: "linear solver".
         """
         self.preconditioner.update(constraints)
-        self.constraints = constraints
+        self.constraints, self._space.residual = constraints, np.zeros(0)
+        self._space.forget()
         begin = self._carry_over(law)
         self.law = law
-        forced = self.problem.apply(constraints.offset, load, constraints.released)
-        if self.problem.measure(forced) == 0.0:
+        loosely = forcing > 0 and self._keeps_directions
+        self._now = self._begin(constraints, load, begin, loosely)
+        if self._now.scale == 0.0:
             unknowns = np.zeros(self.problem.unknowns)
             return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
-        return self._complete(constraints, load, forced, self._guess(-forced, begin))
+        return self._solve_loosely(constraints, forcing) if loosely else self._complete(constraints, load)
 
-    def _complete(self, constraints: ConstraintMap, load: Load, forced: Real, begin: Real) -> Solved:
-        """The solution to the tolerance, from this rank's part of an approximate one on."""
-        problem, tolerance = self.problem, self.problem.model.solver.newton_tolerance
+    def _begin(self, constraints: ConstraintMap, load: Load, begin: Real | None, loosely: bool) -> _Iterate:
+        """The first iterate, from unknowns (unknowns,) that are nearly the solution.
+
+        Other loads or modes can make these much worse than none: that multiple is taken whose product is nearest to the
+        right-hand side; loosely, under the same load: as they are, if that is no worse than none.
+        """
+        problem, rows = self.problem, self.problem.system.nodes
+        if begin is not None:
+            part = begin.reshape(-1, 2)[rows].ravel()
+            residual = problem.apply(constraints.evaluate(begin), load, constraints.released)
+            if loosely and self._now.load is load and 0 < problem.measure(residual) <= self._now.scale:
+                return _Iterate(load, part, residual, self._now.scale)
+        forced = problem.apply(constraints.offset, load, constraints.released)
         scale = problem.measure(forced)
-        self._left.setArray(begin)
-        self._right.setArray(-forced)
-        self._solver.setTolerances(rtol=self._tolerance)
+        if begin is None:
+            return _Iterate(load, np.zeros(2 * len(rows)), forced, scale)
+        product = residual - forced
+        sums = add_up(problem.comm, np.array([-(product @ forced), product @ product]))
+        factor = sums[0] / sums[1] if sums[1] > 0 else 0.0
+        return _Iterate(load, factor * part, forced + factor * product, scale)
+
+    def _solve_loosely(self, constraints: ConstraintMap, forcing: float) -> Solved:
+        """Until the residual is only this part of what it is (theory, 88); its true size is not asked for."""
+        now = self._now
+        begin, least = self.problem.measure(now.residual), self._tolerance * now.scale
+        now = self._improve(now, max(forcing * begin, least))
+        off, left = self.preconditioner.correct(now.residual)
+        self._now = replace(now, part=now.part - off, residual=self.preconditioner.turn_back(left))
+        unknowns = self.solution = self.gather(self._now.part)
+        residual = self.problem.measure(left) / size_residual(now.scale, unknowns)
+        return Solved(unknowns, constraints.evaluate(unknowns), residual, False, self.iterations[-1], loosely=True)
+
+    def _complete(self, constraints: ConstraintMap, load: Load) -> Solved:
+        """The solution to the tolerance, from the iterate on."""
+        problem, tolerance, now = self.problem, self.problem.model.solver.newton_tolerance, self._now
         residual, count = np.inf, 0
         for _ in range(MOST_ATTEMPTS):
             before = residual
-            self._run_gmres()
-            self.iterations.append(int(self._solver.getIterationNumber()))
+            now = self._improve(now, self._tolerance * now.scale)
             count += self.iterations[-1]
-            own = np.array(self._left.getArray())
-            v = constraints.evaluate(self.gather(own))
+            if not self._keeps_directions:
+                v = constraints.evaluate(self.gather(now.part))
+                now = replace(now, residual=problem.apply(v, load, constraints.released))
             # The tractions of crack pairs are those of the jumps to rounding: pairs are judged by them.
-            off, left = self.preconditioner.correct(problem.apply(v, load, constraints.released))
-            unknowns = self.gather(own - off)
+            off, _ = self.preconditioner.correct(now.residual)
+            unknowns = self.gather(now.part - off)
             v = constraints.evaluate(unknowns)
-            size = size_residual(scale, unknowns)
-            residual = problem.measure(left) / size
-            if residual <= tolerance:  # what is said of the solution is measured on it
-                residual = problem.measure(problem.apply(v, load, constraints.released)) / size
-            self._left.setArray(own - off)
+            true = problem.apply(v, load, constraints.released)
+            now = replace(now, part=now.part - off, residual=true)
+            residual = problem.measure(true) / size_residual(now.scale, unknowns)
             solved = residual <= tolerance
-            widened = self.iterations[-1] > (2 * SLOW if solved else SLOW) and self._widen()
+            widened = self.iterations[-1] > SLOW and self._widen()
             if solved:
-                self.solution = unknowns
+                self.solution, self._now = unknowns, now
                 return Solved(unknowns, v, residual, linear_iterations=count)
             # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
             if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or not residual < 0.1 * before):
                 break
+            self._space.forget()
             if widened:
                 self.preconditioner.update(constraints)
                 self._solver.getPC().setUp()
@@ -155,6 +208,17 @@ class KrylovTangent(TangentOperator):
             + (f"; the option ksp_rtol = {self._tolerance:g} lets it end there"
                if self._tolerance > SAFETY * tolerance else '; try operator = "dense"'),
         )
+
+    def _improve(self, now: _Iterate, goal: float) -> _Iterate:
+        """The iterate after GMRES, ended where the norm of the residual is at the goal."""
+        self._right.setArray(-now.residual)
+        self._left.set(0.0)
+        usual = self._solver.getTolerances()
+        self._solver.setTolerances(rtol=0.0, atol=max(goal, self._least))
+        self._run_gmres()
+        self._solver.setTolerances(*usual)
+        self.iterations.append(int(self._solver.getIterationNumber()))
+        return replace(now, part=now.part + np.array(self._left.getArray()), residual=-self._space.residual)
 
     def _run_gmres(self) -> None:
         """Improve the left vector for the right one; whether it is good enough is measured by the callers."""
@@ -172,12 +236,17 @@ class KrylovTangent(TangentOperator):
         if not add_up(self.problem.comm, np.array([float(more)]))[0]:
             return False
         self.widening = wider
-        self.preconditioner.regroup(groups)
+        self.preconditioner.regroup(groups, wider)
         return True
 
     def check(self, solved: Solved, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
-        """See TangentOperator; every solution is checked."""
-        return solved
+        """See TangentOperator; what was solved loosely is gone on with."""
+        if solved.checked:
+            return solved
+        forced = self.problem.apply(constraints.offset, load, constraints.released)
+        self._now = replace(self._now, scale=self.problem.measure(forced))
+        full = self._complete(constraints, load)
+        return replace(full, linear_iterations=solved.linear_iterations + full.linear_iterations)
 
     def respond(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, pairs: Integer, directions: Real
@@ -192,13 +261,10 @@ class KrylovTangent(TangentOperator):
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
         result = np.empty((len(unknowns), len(unknowns)))
         usual = self._solver.getTolerances()
-        self._solver.setTolerances(rtol=RESPONSE)
+        self._solver.setTolerances(rtol=RESPONSE, atol=0.0)
         for k in range(states.shape[1]):
-            self._right.setArray(-self._apply(np.asarray(states[:, k])))
-            self._left.set(0.0)
-            self._run_gmres()
-            result[:, k] = self.gather(np.array(self._left.getArray()))[unknowns]
-        self._solver.setTolerances(rtol=usual[0])
+            result[:, k] = self._find_unknowns(-self._apply(np.asarray(states[:, k])))[unknowns]
+        self._solver.setTolerances(*usual)
         return result
 
     def sweep(
@@ -224,19 +290,6 @@ class KrylovTangent(TangentOperator):
         carried[slave] = carry_over(state, law, self.problem.traction_scale)
         return carried.ravel()
 
-    def _guess(self, right: Real, begin: Real | None) -> Real:
-        """This rank's part of that multiple of an approximate solution whose product is nearest to the right-hand side.
-
-        Other loads or modes can make it much worse than none.
-        """
-        problem, rows = self.problem, self.problem.system.nodes
-        if begin is None:
-            return np.zeros(2 * len(rows))
-        product = self.multiply(begin)
-        sums = add_up(problem.comm, np.array([product @ right, product @ product]))
-        factor = sums[0] / sums[1] if sums[1] > 0 else 0.0
-        return np.ascontiguousarray(factor * begin.reshape(-1, 2)[rows].ravel())
-
     def gather(self, part: Real) -> Real:
         """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""
         whole = np.empty(self.problem.unknowns)
@@ -256,11 +309,18 @@ class KrylovTangent(TangentOperator):
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See TangentOperator; without the anchors that the constraint map releases."""
         self.constraints = constraints
-        self._solver.setTolerances(rtol=self._tolerance)
-        self._left.set(0.0)
+        return self._find_unknowns(forces)
+
+    def _find_unknowns(self, forces: Real) -> Real:
+        """The unknowns on every rank for this rank's part of a right-hand side, as good as the solver is set to."""
         self._right.setArray(forces)
+        self._left.set(0.0)
         self._run_gmres()
-        return self.gather(np.array(self._left.getArray()))
+        part = np.array(self._left.getArray())
+        if self._keeps_directions:
+            # GMRES ends by the equations that contain no eliminated unknowns; these follow from the others.
+            part -= self.preconditioner.correct(-self._space.residual)[0]
+        return self.gather(part)
 
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
@@ -290,6 +350,31 @@ class _Product:
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray(readonly=True)))))
+
+
+class _Rows:
+    """This rank's equations and preconditioner, turned within each node: see pbem.solve.petsc.minimal_residual.Rows."""
+
+    def __init__(self, tangent: KrylovTangent) -> None:
+        self._tangent = tangent
+
+    def multiply(self, part: Real) -> Real:
+        return self._tangent.multiply(self._tangent.gather(part))
+
+    def precondition(self, part: Real) -> Real:
+        result = np.zeros(len(part))
+        self._tangent.preconditioner.apply(self._tangent.gather(part), result)
+        return result
+
+    def turn(self, part: Real) -> Real:
+        return self._tangent.preconditioner.turn(part)
+
+    def turn_back(self, part: Real) -> Real:
+        return self._tangent.preconditioner.turn_back(part)
+
+    @property
+    def judged(self) -> Real:
+        return self._tangent.preconditioner.judged
 
 
 class _Preconditioning:

@@ -26,7 +26,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.preconditioner.subdomains import connect_cracks, find_nearest
+from pbem.solve.preconditioner.subdomains import do_cracks_meet, find_nearest
 from pbem.solve.problem.problem import Problem
 
 # So few pairs are answered for by the whole model: what is left at the end can hang on what is far away.
@@ -43,7 +43,7 @@ def answers_nearby(problem: Problem) -> bool:
     Cracks that meet, and whose bonds do not fail: of such failures the order matters.
     """
     pairs = problem.mesh.pairs
-    return bool(pairs.crack.all() and not problem.laws.brittle.any() and connect_cracks(problem.mesh)[1].any())
+    return bool(pairs.crack.all() and not problem.laws.brittle.any() and do_cracks_meet(problem.mesh))
 
 
 def settle_parts(

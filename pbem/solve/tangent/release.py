@@ -38,7 +38,9 @@ class ReleasedTangent(TangentOperator):
         self.held: Solved | None = None  # the last solution with all anchors
         self.responses = np.zeros((problem.unknowns, 0))  # X
 
-    def solve(self, constraints: ConstraintMap, load: Load, law: Linearisation) -> Solved:
+    def solve(
+        self, constraints: ConstraintMap, load: Load, law: Linearisation, forcing: float = 0.0
+    ) -> Solved:
         """See TangentOperator."""
         self.held = self.anchored.solve(constraints, load, law)
         if not _releases(constraints):

@@ -24,8 +24,6 @@ from pathlib import Path
 from pbem.cli import main as run_command
 
 Line = list[list[float]]
-# What `pbem check` says of rings until blocks within a region are computed.
-RING = "closing a ring of cracks"
 
 
 def draw_map(r: random.Random) -> list[Line]:
@@ -316,8 +314,7 @@ def try_mutant(seed: int, folder: Path) -> tuple[str, str]:
     if code:
         return "wrong", said
     code, checked = call("check", str(case))
-    faults = [line for line in checked.splitlines() if line.startswith("  ") and RING not in line]
-    right = code == 0 or (code == 2 and RING in checked and not faults)
+    right = code == 0
     return ("accepted" if right else "wrong"), f"{said}\n{checked}"
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-
 from pbem.bem.operator_cost import forecast_dense, forecast_hierarchical
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator, SolverOptions

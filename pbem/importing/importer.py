@@ -49,7 +49,6 @@ def _check(path: Path, imported: Imported) -> None:
     faults = list(draft.faults)
     if draft.case is not None:
         faults += add_lines(examine(draft.case, draft.conditions_known)[1], draft.lines)
-    faults = [fault for fault in faults if "closing a ring of cracks" not in fault.found]
     if faults:
         error = fail(path, faults)
         raise CaseError(f"the case that would be made of {path}", error.faults)

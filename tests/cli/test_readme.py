@@ -14,6 +14,7 @@ import pytest
 
 import pbem
 from pbem.cli import main, make_parser
+from pbem.description.translation import find_schema_findings
 from pbem.pages import TOPICS, read_page
 
 ROOT = Path(__file__).parents[2]
@@ -49,9 +50,9 @@ def run_python(text: str, folder: Path) -> list[str]:
 def test_all_snippets_are_found() -> None:
     # Else the tests below could pass because they look at nothing.
     assert set(FILES) == {"first.toml", "limited_friction.py"}
-    assert (len(SNIPPETS), len(FRAGMENTS)) == (5, 1)
+    assert (len(SNIPPETS), len(FRAGMENTS)) == (7, 4)
     whole = "".join(TEXTS)
-    assert whole.count("```python") == 7 and whole.count("```toml") == 2
+    assert whole.count("```python") == 9 and whole.count("```toml") == 5
     assert len(COMMANDS) == sum(text.count("\n") for language, text in BLOCKS if language == "sh") > 10
 
 
@@ -97,7 +98,7 @@ def test_cases_are_changed_and_swept_in_python(folder: Path) -> None:
 
 
 def test_a_law_of_ones_own_gives_the_force_that_is_told(folder: Path) -> None:
-    (fragment,) = FRAGMENTS
+    (fragment,) = (text for text in FRAGMENTS if "limited_friction.py" in text)
     text, count = re.subn(r"(?ms)^\[interfaces\.seat\].*?(?=^\[)", fragment + "\n", FILES["first.toml"])
     assert count == 1
     (folder / "limited.toml").write_text(text, encoding="utf-8")
@@ -105,6 +106,13 @@ def test_a_law_of_ones_own_gives_the_force_that_is_told(folder: Path) -> None:
     assert abs(results.contact["seat"].traction_s).max() <= 2.0 * (1 + 1e-9)
     force = abs(results.reactions["top"][-1, 0])
     assert f"the shear force is then {force:.3f} in place of 2.497" in " ".join(PAGES["laws"].split())
+
+
+@pytest.mark.parametrize("text", FRAGMENTS)
+def test_pieces_of_cases_have_keys_of_cases(text: str) -> None:
+    """They lack the rest of the case, and nothing else is wrong with them."""
+    wrong = [each for each in find_schema_findings(tomllib.loads(text)) if not each.found.startswith("no ")]
+    assert wrong == []
 
 
 def test_the_readme_shows_the_picture_and_is_short() -> None:
@@ -118,7 +126,7 @@ def test_the_readme_shows_the_picture_and_is_short() -> None:
 def test_commands_are_those_of_the_program(line: str) -> None:
     words = shlex.split(line, comments=True)
     options = make_parser().parse_args(words[words.index("pbem") + 1 :])
-    assert options.command in ("check", "run", "sweep", "info", "plot", "export", "make", "help")
+    assert options.command in ("check", "run", "sweep", "info", "plot", "export", "import", "make", "help")
     for name in ("case", "file"):
         path = getattr(options, name, "")
         assert Path(path).stem in ("", "first", "field"), f"{path} is not shown"

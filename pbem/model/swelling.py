@@ -23,15 +23,22 @@ NONE = (0.0, 0.0, 0.0)
 @dataclass(frozen=True)
 class Swelling:
     """strain: exx, eyy, exy in the plane, as where nothing resists; growth: what exx and eyy grow by with x and with y
-    (complex), from `center`, where the displacement vanishes."""
+    (complex), from `center`, where the displacement vanishes. across, across_growth: the strain across the plane, which
+    plane strain holds back, alike."""
 
     strain: tuple[float, float, float] = NONE
     growth: complex = 0j
     center: complex = 0j
+    across: float = 0.0
+    across_growth: complex = 0j
 
     @property
     def is_zero(self) -> bool:
-        return not (any(self.strain) or self.growth)
+        return not (any(self.strain) or self.growth or self.across or self.across_growth)
+
+    def strain_across(self, point: Complex) -> Real:
+        """The strain across the plane at points, as where nothing resists."""
+        return np.asarray(self.across + (np.conj(self.across_growth) * (point - self.center)).real)
 
     def displacement(self, point: Complex) -> Complex:
         """Displacement (complex) at points, which leaves the region without stress (theory, 86)."""
@@ -51,6 +58,8 @@ class Swelling:
         return Swelling(
             tuple(a + part * (b - a) for a, b in zip(self.strain, other.strain, strict=True)),  # type: ignore[arg-type]
             self.growth + part * (other.growth - self.growth), center,
+            self.across + part * (other.across - self.across),
+            self.across_growth + part * (other.across_growth - self.across_growth),
         )
 
     def describe(self, origin: complex) -> str:
@@ -104,11 +113,12 @@ def read_swellings(case: Case, corners: Complex) -> Swellings:
                 faults.append(Fault.at((*loc, "temperature", name), error.found, error.expected))
         for name, table in tables.eigenstrain.items():
             faults += _check_region(case, (*loc, "eigenstrain", name), name, heated=False)
-            eigenstrain[name] = table
+            before = eigenstrain.get(name, EigenstrainTable())
+            eigenstrain[name] = before.model_copy(update={key: getattr(table, key) for key in table.model_fields_set})
         stages.append({} if faults else {
             name: _combine(case.materials[case.regions[name].material], temperature.get(name, NONE),
                            eigenstrain.get(name), complex(corners[0]))
-            for name in {**temperature, **eigenstrain}
+            for name in {**temperature, **eigenstrain} if case.regions[name].material in case.materials
         })  # fmt: skip
     return Swellings(tuple(stages[1:] or stages), tuple(faults))
 
@@ -134,7 +144,8 @@ def _combine(
 ) -> Swelling:
     """The strain in the plane of both; in plane strain what is held across the plane pushes out into it."""
     across = material.poisson if material.plane == "strain" else 0.0
-    heat, by_x, by_y = (material.expansion * (1 + across) * value for value in temperature)
+    heat, by_x, by_y = (material.expansion * value for value in temperature)
     table = eigenstrain or EigenstrainTable()
-    held = across * table.ezz
-    return Swelling((heat + table.exx + held, heat + table.eyy + held, table.exy), complex(by_x, by_y), center)
+    own, growth = (1 + across) * heat + across * table.ezz, complex(by_x, by_y)
+    return Swelling((own + table.exx, own + table.eyy, table.exy), (1 + across) * growth, center,
+                    heat + table.ezz, growth)

@@ -123,7 +123,8 @@ def _read_stress(stored: Any) -> LinearStress:
 
 
 def _read_swelling(stored: Mapping[str, Any]) -> Swelling:
-    return Swelling(tuple(stored["strain"]), _read_point(stored["growth"]), _read_point(stored["center"]))
+    return Swelling(tuple(stored["strain"]), _read_point(stored["growth"]), _read_point(stored["center"]),
+                    stored["across"], _read_point(stored["across_growth"]))
 
 
 def _read_leg(stored: Mapping[str, Any]) -> Leg:

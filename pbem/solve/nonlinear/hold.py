@@ -176,6 +176,8 @@ class Hold:
         """Free motions of blocks that touch what is around them by chance: the pairs carry next to nothing, and there
         are places where nothing touches."""
         problem, pairs = self.problem, self.problem.mesh.pairs
+        if not problem.parts.block.any():
+            return ()
         carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
         jumps = problem.traction_scale * np.hypot(state.g_n, state.g_s)
         usual = float(pairs.weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(pairs.weight.sum())

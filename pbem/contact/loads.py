@@ -188,10 +188,11 @@ def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:
     ever = np.zeros((len(outer.node), 2), dtype=bool)
     known = np.zeros(4 * mesh.nodes, dtype=bool)
     for stage in range(len(model.stages)):
-        load = evaluate_load(model, mesh, outer, stage, 1.0)
-        # What depends on time by itself may be zero at the ends of the stages alone.
-        ever |= (load.values != 0) | model.timed
-        known |= load.known != 0
+        # In between all is linear, but for what depends on time by itself.
+        for factor in (0.0, 1.0):
+            load = evaluate_load(model, mesh, outer, stage, factor)
+            ever |= (load.values != 0) | model.timed
+            known |= load.known != 0
     parts = np.stack([outer.direction.real, outer.direction.imag], axis=2) != 0  # (k, direction, component)
     for first, free in ((0, ~outer.displacement_known), (2 * mesh.nodes, outer.displacement_known)):
         wanted = ((free | ever | (outer.stiffness > 0))[:, :, None] & parts).any(axis=1)

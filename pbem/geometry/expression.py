@@ -62,6 +62,30 @@ def list_names(text: str) -> set[str]:
         return set()
 
 
+def is_linear(text: str, names: tuple[str, ...]) -> bool:
+    """Whether an expression is a polynomial of degree 1 at most in these names, by how it is written."""
+    return _find_degree(_parse(text), names) <= 1
+
+
+def _find_degree(node: ast.expr, names: tuple[str, ...]) -> float:
+    """The degree in the names; infinite for what is no polynomial."""
+    match node:
+        case ast.Name(id=name):
+            return 1 if name in names else 0
+        case ast.UnaryOp(operand=operand):
+            return _find_degree(operand, names)
+        case ast.BinOp(left=left, op=operator, right=right):
+            first, second = _find_degree(left, names), _find_degree(right, names)
+            if isinstance(operator, ast.Add | ast.Sub):
+                return max(first, second)
+            if isinstance(operator, ast.Mult):
+                return first + second
+            return math.inf if second or (isinstance(operator, ast.Pow) and first) else first
+        case ast.Call(args=arguments):
+            return math.inf if any(_find_degree(each, names) for each in arguments) else 0
+    return 0
+
+
 def _parse(text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise ExpressionError(f"a text of {len(text)} characters", f"at most {LONGEST}")

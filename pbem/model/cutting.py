@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from pbem.description.case import Case
-from pbem.description.schema import CurveTable
-from pbem.errors import Fault
+from pbem.description.schema import CurveTable, LawTable, StageInterfaceTable
+from pbem.description.varying import VaryingTable
+from pbem.errors import Fault, KeyPath
 from pbem.geometry.curve import Curve
+from pbem.geometry.expression import list_names
 from pbem.geometry.junction import find_crossing_cracks, format_point
 from pbem.geometry.network import Change, Network, cut_network
 from pbem.model.roles import Roles
@@ -60,6 +62,7 @@ def cut_cracks(case: Case, roles: Roles, shapes: Shapes) -> Cut:
         Fault.at(("curves", name), f"curve '{name}', the name of a piece of a crack that is cut", "another name")
         for name in sorted(taken)
     )
+    faults += tuple(_find_lengths(case, [trace for trace, names in members.items() if len(names) > 1]))
     if faults or any(trace not in members for trace in crossing):
         return Cut(case, roles, shapes, faults=faults)
     pieces = {name: _count_elements(case.curves[net.traces[name]], curve)
@@ -89,6 +92,22 @@ def _find_overlaps(network: Network) -> list[Fault]:
         )
         for change in network.changes if change.kind == "merged"
     ]
+
+
+def _find_lengths(case: Case, cut: Sequence[str]) -> Iterator[Fault]:
+    """Values over the length s along cracks that are cut, of whose pieces each has an s of its own."""
+    for name in cut:
+        tables: list[tuple[KeyPath, LawTable | StageInterfaceTable | None]] = [
+            (("interfaces", name), case.interfaces.get(name)),
+            *((("stages", number, "interfaces", name), stage.interfaces.get(name))
+              for number, stage in enumerate(case.stages)),
+        ]
+        for loc, table in tables:
+            for key in table.model_fields_set if table is not None else ():
+                given = getattr(table, key)
+                if isinstance(given, VaryingTable) and (given.table or "s" in list_names(given.expression or "")):
+                    found = f"a value over the length s of crack '{name}', which others cut into pieces"
+                    yield Fault.at((*loc, key), found, "an expression of x and y, which the pieces have in common")
 
 
 def _count_elements(table: CurveTable, curve: Curve) -> Curve:

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 
 from pbem.arrays import Complex
-from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.expression import ExpressionError, evaluate_expression, is_linear
 
 # An expression is linear to this part of its largest value.
 EXACT = 1e-9
@@ -23,7 +23,8 @@ def fit_linear(text: str, corners: Complex) -> tuple[float, float, float]:
     linear = start + by_x * away.real + by_y * away.imag
     # A coordinate far from the origin is rounded, and with it what grows with it.
     rounding = sys.float_info.epsilon * (abs(by_x) * np.abs(points.real).max() + abs(by_y) * np.abs(points.imag).max())
-    if not (np.abs(values - linear) <= EXACT * np.abs(values).max() + 16 * rounding).all():
+    exact = (np.abs(values - linear) <= EXACT * np.abs(values).max() + 16 * rounding).all()
+    if not exact or not is_linear(text, ("x", "y")):
         raise ExpressionError(f'"{text}", which is not linear in x and y', "an expression linear in x and y")
     size = np.abs(values).max() * EXACT + 16 * rounding
     # What rounding alone makes grow does not.

@@ -19,6 +19,8 @@ from pbem.model.varying import Places, Varying
 
 # Fractions of a stage at which a load that depends on time is looked at; not its beginning, where t may be 0.
 FRACTIONS = (1e-3, 0.1, 0.5, 0.9, 1.0)
+# Load steps of a stage at which it is, too.
+MOST_STEPS = 50
 
 
 def check_loads(case: Case, model: Model) -> list[Fault]:
@@ -27,18 +29,23 @@ def check_loads(case: Case, model: Model) -> list[Fault]:
     model: about the origin of the user's coordinates.
     """
     faults = []
-    for loc, curve, given, first in _list_given(case):
+    for loc, curve, given, stages in _list_given(case):
         value = read_value(loc, given, timed=True)[0]
         if not isinstance(value, Varying) or curve not in model.curves:
             continue
-        stages = range(first, len(model.stages)) if value.timed else [first]
-        times = [model.find_time(stage, fraction) for stage in stages for fraction in FRACTIONS]
-        faults += _check_value(loc, value, model.curves[curve], times if value.timed else times[:1])
+        times = [model.find_time(stage, fraction) for stage in stages
+                 for fraction in (*FRACTIONS, *_list_steps(model.stages[stage].steps))]
+        faults += _check_value(loc, value, model.curves[curve], times if value.timed else times[-1:])
     return faults
 
 
-def _list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, int]]:
-    """Place, curve, what is given, and the first stage in which it acts."""
+def _list_steps(steps: int) -> list[float]:
+    """The ends of the load steps, as fractions of the stage; of many some."""
+    return [number / steps for number in range(1, steps + 1, max(1, steps // MOST_STEPS))]
+
+
+def _list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]]:
+    """Place, curve, what is given, and the stages in which it acts: until another value takes its place."""
     tables: list[tuple[KeyPath, object, int]] = []
     for key in ("boundary", "interfaces", "contacts"):
         tables += [((key, name), table, 0) for name, table in getattr(case, key).items()]
@@ -50,10 +57,24 @@ def _list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, int]]:
         for key in (*CONDITIONS, "pressure"):
             given = getattr(table, key, None)
             if isinstance(given, VaryingTable):
-                yield (*loc, key), curve, given, first
+                yield (*loc, key), curve, given, range(first, _find_next(case, (*loc, key), first))
+
+
+def _find_next(case: Case, loc: KeyPath, first: int) -> int:
+    """The first stage in which another value takes its place; the number of stages if there is none."""
+    kind, name, key = (str(part) for part in loc[-3:])
+    same = {each for keys in ALIKE if key in keys for each in keys}
+    for number, stage in enumerate(case.stages):
+        table = getattr(stage, kind).get(name)
+        later = number > first or (number == first and loc[0] != "stages")
+        if later and table is not None and any(getattr(table, each, None) is not None for each in same):
+            return number
+    return max(len(case.stages), 1)
 
 
 CONDITIONS = ("ux", "uy", "tx", "ty", "un", "us", "tn", "ts")
+# Keys of which one takes the place of another.
+ALIKE = (("ux", "tx", "un", "tn", "pressure"), ("uy", "ty", "us", "ts", "pressure"))
 
 
 def _check_value(loc: KeyPath, value: Varying, curve: Curve, times: list[float]) -> list[Fault]:

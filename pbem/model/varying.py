@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,18 @@ from pbem.geometry.expression import evaluate_expression, list_names
 @dataclass(frozen=True)
 class Varying:
     """An expression of x, y (the user's coordinates), s (length from the curve's first point) and t (time), or a table
-    of (s, value) with rising s: linear in between, and with its first and last value beyond its ends."""
+    of (s, value) with rising s: linear in between, and with its first and last value beyond its ends.
+
+    sign: what it is multiplied by, 1 or -1.
+    """
 
     expression: str = ""
     table: tuple[tuple[float, float], ...] = ()
+    sign: float = 1.0
+
+    def __bool__(self) -> bool:
+        """False for a table of zeros."""
+        return bool(self.expression) or any(value for _, value in self.table)
 
     @property
     def timed(self) -> bool:
@@ -33,17 +41,18 @@ class Varying:
         """The values (k,) at places of the curve; not finite where an expression has none."""
         if self.table:
             s, values = np.array(self.table).T
-            return np.asarray(np.interp(places.along, s, values))
+            return np.asarray(self.sign * np.interp(places.along, s, values))
         point = places.point
-        return evaluate_expression(self.expression, x=point.real, y=point.imag, s=places.along, t=time)
+        return self.sign * evaluate_expression(self.expression, x=point.real, y=point.imag, s=places.along, t=time)
 
     def __format__(self, form: str) -> str:
         """The expression in quotes, or the ends of the table, its numbers in the given form."""
+        sign = "-" if self.sign < 0 else ""
         if not self.table:
-            return f'"{self.expression}"'
+            return f'{sign}"{self.expression}"'
         (first, start), (last, end) = self.table[0], self.table[-1]
         ends = f"{start:{form}} at s = {first:{form}} to {end:{form}} at s = {last:{form}}"
-        return f"table of {len(self.table)} ({ends})"
+        return f"{sign}table of {len(self.table)} ({ends})"
 
 
 # A number stands for the same value everywhere.
@@ -71,16 +80,14 @@ def to_plain(value: Value | None) -> Any:
     """As it is written in a case."""
     if not isinstance(value, Varying):
         return value
-    return {"expression": value.expression} if value.expression else {"table": [list(row) for row in value.table]}
+    if value.expression:
+        return {"expression": value.expression if value.sign > 0 else f"-({value.expression})"}
+    return {"table": [[s, value.sign * each] for s, each in value.table]}
 
 
 def negate(value: Value) -> Value:
     """The value with the other sign."""
-    if not isinstance(value, Varying):
-        return -value
-    return Varying(f"-({value.expression})") if value.expression else Varying(
-        table=tuple((s, -each) for s, each in value.table)
-    )
+    return replace(value, sign=-value.sign) if isinstance(value, Varying) else -value
 
 
 @dataclass(frozen=True)

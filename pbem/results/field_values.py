@@ -17,7 +17,9 @@ from pbem.bem.interior import turn_stress
 from pbem.mesh.interpolation import interpolate, interpolate_tips
 from pbem.results.outline import to_columns, to_complex
 from pbem.results.reader import Results
+from pbem.results.rebuilt import read_model
 from pbem.results.region_triangles import Triangles
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class VertexField:
         self._tips = triangles.find_tips(results.elements)
         materials = [region["material"] for region in json.loads(results.configuration)["regions"]]
         self._lateral = np.array([each["poisson"] if each["plane"] == "strain" else 0.0 for each in materials])
+        self._young = np.array([each["young"] if each["plane"] == "strain" else 0.0 for each in materials])
+        self._model = read_model(results.configuration)
 
     def evaluate(self, steps: Sequence[int]) -> VertexValues:
         """At stored steps (their places in the file). Raises ResultFileError for files of earlier versions."""
@@ -52,11 +56,24 @@ class VertexField:
             moved[:, self._inside], stress[:, self._inside] = inner.displacement, inner.stress
         for number, step in enumerate(steps):
             moved[number, self._on], stress[number, self._on] = self._evaluate_limits(step)
-        # In plane strain the third normal stress is Poisson's ratio times the sum of the others.
-        lateral = self._lateral[self._triangles.region] * (stress[:, :, 0] + stress[:, :, 1])
+        # In plane strain the third normal stress is Poisson's ratio times the sum of the others, less what swells.
+        region = self._triangles.region
+        lateral = self._lateral[region] * (stress[:, :, 0] + stress[:, :, 1])
+        for number, step in enumerate(steps):
+            lateral[number] -= self._young[region] * self._evaluate_swelling(step)
         whole = np.concatenate([stress, lateral[:, :, None]], axis=2)
         self._tips = self._tips | ~np.isfinite(whole).all(axis=(0, 2))
         return VertexValues(np.nan_to_num(moved), self._smooth_tips(whole), ~self._tips)
+
+    def _evaluate_swelling(self, step: int) -> Real:
+        """Strain across the plane without stress, at all vertices."""
+        stage, factor = int(self._results.steps.stage[step]), float(self._results.steps.factor[step])
+        strain = np.zeros(len(self._triangles.position))
+        for number, (balanced, _) in enumerate(evaluate_particular_solutions(self._model, stage, factor)):
+            if not balanced.swelling.is_zero:
+                own = self._triangles.region == number
+                strain[own] = balanced.swelling.strain_across(self._triangles.position[own] - self._model.origin)
+        return strain
 
     def _smooth_tips(self, stress: Real) -> Real:
         """What is infinite is drawn as the mean of the vertices around it."""

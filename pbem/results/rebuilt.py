@@ -44,7 +44,7 @@ def rebuild_run(path: str, nodes: contents.Nodes, elements: contents.Elements, c
     if not configuration:
         raise ResultFileError(path, "was written by an older version of pbem, which did not store what this needs")
     try:
-        model = _read_model(json.loads(configuration))
+        model = read_model(configuration)
     except (KeyError, TypeError, ValueError) as error:
         reason = f"was written by another version of pbem, whose configuration lacks what this needs ({error})"
         raise ResultFileError(path, reason) from error
@@ -87,8 +87,9 @@ def find_opposite_faces(mesh: Mesh) -> Integer:
     return opposite
 
 
-def _read_model(stored: Mapping[str, Any]) -> Model:
+def read_model(configuration: str) -> Model:
     """The parts of a model that `pbem.results.configuration.dump_configuration` has written and fields depend on."""
+    stored: Mapping[str, Any] = json.loads(configuration)
     curves = {
         name: Curve(name, tuple(_read_leg(leg) for leg in curve["legs"])) for name, curve in stored["curves"].items()
     }

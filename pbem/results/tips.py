@@ -32,15 +32,16 @@ ALIKE = 1e-9
 class _Alike:
     """Tips (k,) with the same elements around them, turned and enlarged, in the same material.
 
-    tip: number among the ends of all cracks. direction (k,): unit vector that the tip points along; length (k,): their
-    unit. pair, sense (k, m (p + 1)): pairs of the nodes, from the tip on, and 1 or -1 where the first face is on the
-    left or on the right when leaving the tip. region (k,): index.
+    tip: number among the ends of all cracks; place (k,): where. direction (k,): unit vector that the tip points along;
+    length (k,): their unit. pair, sense (k, m (p + 1)): pairs of the nodes, from the tip on, and 1 or -1 where the
+    first face is on the left or on the right when leaving the tip. region (k,): index.
     """
 
     forms: TipForms
     material: Material
     tip: Integer
     region: Integer
+    place: Complex
     direction: Complex
     length: Real
     pair: Integer
@@ -120,10 +121,9 @@ class TipRules:
             moved = (moved - moved.mean(axis=1)[:, None]) @ forms.of_mean
             value = modulus / group.length * (jumps @ forms.parallel + moved.real)
             value += step.contact.traction_n[near] @ forms.of_normal
-            place = self.mesh.pairs.position[group.pair[:, 0]]
             value -= modulus * np.array([
                 backgrounds[region][0].swelling.strain_along(at[None], along[None])[0]
-                for region, at, along in zip(group.region, place, group.direction, strict=True)
+                for region, at, along in zip(group.region, group.place, group.direction, strict=True)
             ])
             T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in backgrounds])
         return T.reshape(-1, 2)
@@ -141,9 +141,8 @@ class TipRules:
     def _evaluate_initial(self, group: _Alike, backgrounds: list[ParticularSolution]) -> Real:
         """In-situ stress, which has no displacement: what Hooke's law leaves out of the stress along the crack."""
         kappa = group.material.kappa
-        places = self.mesh.pairs.position[group.pair[:, 0]]
         initial = [backgrounds[region].initial.evaluate(place[None])[0]
-                   for region, place in zip(group.region, places, strict=True)]
+                   for region, place in zip(group.region, group.place, strict=True)]
         sxx, syy, sxy = np.array(initial).T
         turned = 0.5 * (sxx - syy) - 1j * sxy  # (s_tt - s_nn)/2 along a direction d: its product with d^2
         deviator = (turned * group.direction**2).real
@@ -173,7 +172,7 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
 
 def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pair_of: Integer) -> list[_Alike]:
     """Sort paths by what they look like."""
-    seen, direction, length = _see_from_tip(mesh, paths)
+    seen, place_of, direction, length = _see_from_tip(mesh, paths)
     region = mesh.region[paths.elements[:, 0]]
     tip = np.where(paths.outward, mesh.tip[paths.elements], np.array([0, 2, 1])[mesh.tip[paths.elements]])
     chord = seen.end - seen.start
@@ -194,19 +193,20 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
         )  # fmt: skip
         pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])]
         sense = np.repeat(np.where(paths.outward[at], 1.0, -1.0), mesh.order + 1, axis=1)
-        groups.append(_Alike(derive_forms(shape), material, number[paths.tip[at]], region[at], direction[at],
-                             length[at], pair, sense))
+        groups.append(_Alike(derive_forms(shape), material, number[paths.tip[at]], region[at], place_of[at],
+                             direction[at], length[at], pair, sense))
     return groups
 
 
-def _see_from_tip(mesh: Mesh, paths: TipPaths) -> tuple[Elements, Complex, Real]:
-    """The elements (k, m) of paths in the tips' frames; the directions (k,) of the tips, and the units of length."""
+def _see_from_tip(mesh: Mesh, paths: TipPaths) -> tuple[Elements, Complex, Complex, Real]:
+    """The elements (k, m) of paths in the tips' frames; the places and directions (k,) of the tips, and their units of
+    length."""
     elements = view_outward(mesh, paths.elements, paths.outward)
     tip = elements.start[:, :1]
     length = np.abs(elements.end[:, 0] - tip[:, 0])
     direction = _find_directions(elements)
     turned = (np.conj(direction) / length)[:, None]
-    return elements.move(tip, turned), direction, length
+    return elements.move(tip, turned), tip[:, 0], direction, length
 
 
 def _find_directions(elements: Elements) -> Complex:

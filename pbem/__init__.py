@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from pbem.errors import (
     CaseError,
     ConvergenceError,
+    ExportError,
     LaunchError,
     LawError,
     PbemError,
@@ -39,8 +40,8 @@ if TYPE_CHECKING:
     from pbem.sweeps.sweep import sweep
 
 __all__ = [
-    "Case", "CaseError", "ConvergenceError", "LaunchError", "LawError", "PbemError", "ResultFileError", "StopError",
-    "StorageError", "__version__", "open_results", "run", "sweep",
+    "Case", "CaseError", "ConvergenceError", "ExportError", "LaunchError", "LawError", "PbemError", "ResultFileError",
+    "StopError", "StorageError", "__version__", "open_results", "run", "sweep",
 ]
 
 # Looked up at first use: whoever imports the package for something else waits for neither MPI nor HDF5.

@@ -152,3 +152,7 @@ class LaunchError(PbemError):
     def __init__(self, reason: str) -> None:
         self.reason = reason
         super().__init__(reason)
+
+
+class ExportError(PbemError):
+    """The options of `pbem export` do not fit together; nothing was written."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pbem.errors import PbemError
+from pbem.errors import ExportError
 
 VTK, TABLE = (".vtkhdf", ".hdf"), (".csv",)
 NOTES = """\
@@ -16,10 +16,6 @@ NOTES = """\
 
 Tables: contact.NAME, contact (of all interfaces), reactions, tips, interior, steps; a row for each stored step and
 pair, curve, tip or point; numbers with all their digits, empty where they are not known."""
-
-
-class ExportError(PbemError):
-    """The options of `pbem export` do not fit together; nothing was written."""
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:

@@ -34,6 +34,8 @@ LEAST_SNAP = 2e-5
 COARSEST = 1e3
 # More elements than this are nothing that can be computed.
 MOST_ELEMENTS = 200_000
+# Radians that an element of an arc turns by at most, before its curve is refined.
+WIDEST = 0.2
 
 
 @dataclass(frozen=True)
@@ -227,7 +229,9 @@ def _make_tables(
         length = sum(abs(b - a) for a, b in zip(part.points, part.points[1:], strict=False))
         # A crack with two tips needs an element for each of them.
         single = tips and len(part.points) == 2 and part.straight and length <= scale.size
-        division = {"elements": 2} if single else {"size": scale.size}
+        # Elements of an arc, refined towards its ends, must not turn too far.
+        size = scale.size if part.straight else min(scale.size, WIDEST * part.radius)
+        division = {"elements": 2} if single else {"size": size}
         curves[name] = {**write_shape(part), **division}
     friction = FRICTION if options.friction is None else options.friction
     stress = {"sxx": options.sxx, "syy": options.syy, "sxy": options.sxy}

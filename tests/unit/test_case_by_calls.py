@@ -83,7 +83,7 @@ WRONG: list[tuple[tuple[str, Any], str, str]] = [
     (("boundary.wall", {"tx": 1.0}), "regions.body", "a free rigid motion"),
     (("boundary.wal", {"tx": 1.0}), "boundary.wal", "did you mean 'wall'?"),
     (("interfaces.crack.law", "bonded"), "interfaces.crack.friction", "no effect"),
-    (("interfaces.crack.gap", {"expression": "x - 1.5"}), "interfaces.crack.gap", "-0.5"),
+    (("interfaces.crack.friction", {"expression": "x - 1.5"}), "interfaces.crack.friction", "-0.5"),
     (("stages", [{"boundary": {"wall": {"tx": 1.0}}}]), "stages[1].boundary.wall.tx", "'tx' where 'ux' was given"),
     (("gravity", {"gy": -9.81}), "gravity", "gravity on regions without density"),
     (("output", {"interior": {"box": (0, 0, 0, 1), "shape": (2, 2)}}), "output.interior.box", "a box without width"),
@@ -153,7 +153,7 @@ SAME_FAULTS = {
     "crossing": f"""{MATERIAL}
 [curves]
 one = {{ points = [[0, 0], [1, 1]], elements = 4 }}
-other = {{ points = [[0, 1], [1, 0]], elements = 4 }}
+other = {{ points = [[0.5, 0.5], [2, 2]], elements = 4 }}
 [regions.plane]
 material = "soft"
 infinite = true
@@ -207,7 +207,7 @@ def test_a_case_prints_in_a_few_lines() -> None:
     case = pbem.Case(**alter(("title", "A crack & more")))
     assert repr(case).splitlines() == [
         "<Case: A crack & more", "  materials   rock", "  curves      wall, crack", "  regions     body",
-        "  conditions  wall", "  interfaces  crack", "  stages      1 step", "  analysis    SST, order 2>",
+        "  conditions  wall", "  interfaces  crack", "  stages      10 steps", "  analysis    SST, order 2>",
     ]  # fmt: skip
     table = case._repr_html_()
     assert table.startswith("<table><caption>A crack &amp; more</caption><tr><th>materials</th><td>rock</td></tr>")

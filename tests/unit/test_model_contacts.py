@@ -304,8 +304,8 @@ WRONG = {
     "gap in a bond": ("friction = 0.3", 'gap = 0.3\nlaw = "bonded"', "contacts.seat.gap", "no effect"),
     "gap negative somewhere": (
         "friction = 0.3",
-        'gap = { expression = "x - 1.5" }',
-        "contacts.seat.gap (line 28)",
+        'law = "open"\ngap = { expression = "x - 1.5" }',
+        "contacts.seat.gap (line 29)",
         "a gap that is -0.5 at (1, 1.1) on curve 'punch_face'",
     ),
     "lost without strength": (

@@ -7,6 +7,7 @@ import cmath
 import numpy as np
 import pytest
 
+from pbem.model.in_situ import LinearStress
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import find_rigid_body_modes
 from tests.unit.case_sample import MATERIAL, SQUARE, build, change, find_faults, find_only_fault
@@ -201,7 +202,7 @@ def test_wrong_density_raises_no_false_alarm() -> None:
 
 def test_initial_stress_of_materials() -> None:
     model = build(PLANE + "[initial_stress.soft]\nsxx = -3\nsyy = -5.0\n")
-    assert model.initial_stress == {"soft": (-3.0, -5.0, 0.0)}
+    assert model.initial_stress == {"soft": LinearStress((-3.0, -5.0, 0.0))}
     assert model.stages[0].remote == (0.0, 2.0, 0.5)
     text = PLANE + "[initial_stress.hard]\nsxx = -3\n[initial_stress.sotf]\n"
     assert [fault.place.split(" ")[0] for fault in find_faults(text)] == ["initial_stress.hard", "initial_stress.sotf"]

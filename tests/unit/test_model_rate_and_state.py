@@ -77,7 +77,7 @@ WRONG = {
         ("friction = 0.6", "friction = 0.6\ntensile_strength = 2"), "interfaces.interface.tensile_strength", "no effect"
     ),
     "a duration for a law without time": (
-        (LAW, 'law = "coulomb"\nfriction = 0.5\n'), "stages[1].duration", "a law that depends on time",
+        (LAW, 'law = "coulomb"\nfriction = 0.5\n'), "stages[1].duration", "a load that depends on time",
     ),
 }  # fmt: skip
 

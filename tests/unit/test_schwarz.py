@@ -134,7 +134,8 @@ def test_only_what_sees_a_change_is_formed_anew(name: str, many_groups: None) ->
     preconditioner, count = precondition(problem), len(problem.system.groups)
     residual = np.random.default_rng(2).normal(size=problem.unknowns)
     modes = draw_modes(problem, 5)
-    assert preconditioner.update(constrain(problem, modes)) == count > 5
+    assert preconditioner.update(constrain(problem, modes)) == count
+    assert count > 5 or name == "panel"  # a body is one group
     assert preconditioner.update(constrain(problem, modes)) == 0
     changed = ModeState(modes.mode.copy(), modes.sign.copy())
     changed.mode[0] = OPEN if modes.mode[0] == STICK else STICK

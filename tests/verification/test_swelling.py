@@ -9,6 +9,10 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.geometry.expression import is_linear
+from pbem.results.field_values import VertexField
+from pbem.results.region_triangles import triangulate
+from tests.unit.test_plots_field import make_view
 
 FINE = {"elements": 24}
 
@@ -142,3 +146,49 @@ def test_wrong_swelling_is_told(kind: str) -> None:
     material = {"young": 7e3, "poisson": 0.3} | ({"expansion": 1.0} if kind == "not linear" else {})
     with pytest.raises(pbem.CaseError, match=text):
         pbem.run(make_inclusion(0j, 1.0, material, 2, **tables))
+
+
+def test_stages_keep_components_and_steps_between_are_right(tmp_path: Path) -> None:
+    """A clamped square: sxx = -E'(exx + nu' eyy) and so on, of both components once both were given."""
+    def line(a: tuple[int, int], b: tuple[int, int]) -> dict[str, Any]:
+        return {"points": [a, b], "elements": 4}
+
+    case = {
+        "materials": {"m": {"young": 1000.0, "poisson": 0.25, "expansion": 1e-5}},
+        "curves": {"b": line((0, 0), (1, 0)), "r": line((1, 0), (1, 1)), "t": line((1, 1), (0, 1)),
+                   "l": line((0, 1), (0, 0))},
+        "regions": {"a": {"material": "m", "boundary": ["b", "r", "t", "l"]}},
+        "boundary": {name: {"ux": 0.0, "uy": 0.0} for name in "brtl"},
+        "eigenstrain": {"a": {"exx": 1e-3}},
+        "stages": [{"steps": 1}, {"steps": 1, "eigenstrain": {"a": {"eyy": 2e-3}}},
+                   {"steps": 1, "eigenstrain": {"a": {"exx": 0.0, "eyy": 0.0}}, "temperature": {"a": 100.0}}],
+        "output": {"points": [[0.4, 0.6]]},
+    }
+    results = pbem.run(case, tmp_path / "square.h5")
+    lame, twice_shear = 1000 * 0.25 / (1.25 * 0.5), 1000 / 1.25
+    for step, (exx, eyy) in ((0, (1e-3, 0.0)), (1, (1e-3, 2e-3))):
+        trace = lame * (exx + eyy)
+        exact = [-trace - twice_shear * exx, -trace - twice_shear * eyy, 0.0]
+        np.testing.assert_allclose(results.interior.stress[step][0], exact, atol=1e-9)
+    # All is held alike in the end: the stress is hydrostatic, and there is nothing for von Mises.
+    triangles = triangulate(results.elements, np.array([False]), make_view(results))
+    values = VertexField(results, triangles).evaluate([2])
+    np.testing.assert_allclose(values.stress[0], [[-2.0, -2.0, 0.0, -2.0]] * values.stress.shape[1], atol=1e-6)
+
+
+def test_linear_is_as_it_is_written() -> None:
+    for text, right in (("20 + 3*x - y/2", True), ("sin(1)*x", True), ("abs(y)", False), ("x*y", False),
+                        ("max(0, 1 - abs(y - 1.6)/0.1)", False), ("x**1.0", False), ("-(x + 2)*3", True)):
+        assert is_linear(text, ("x", "y")) is right, text
+
+
+def test_parallel_stress_of_a_crack_under_a_graded_temperature(tmp_path: Path) -> None:
+    """T follows at the tip's own place: as coarse meshes tell it, so do fine ones."""
+    found = []
+    for elements in (6, 24):
+        case = make_ring("strain", boundary={"outer": {"un": 0.0}, "inner": {"un": 0.0, "us": 0.0}},
+                         temperature={"ring": {"expression": "10 + 3*(x - 5)"}})
+        case["curves"]["crack"] = {"points": [[28, 6], [32, 7]], "elements": elements}
+        case["regions"]["ring"]["cracks"] = ["crack"]
+        found.append(pbem.run(case, tmp_path / "graded.h5", force=True).tips["crack"].T[-1])
+    np.testing.assert_allclose(found[0], found[1], rtol=2e-3)

@@ -27,6 +27,7 @@ from pbem.errors import (
     LaunchError,
     LawError,
     PbemError,
+    PlotError,
     ResultFileError,
     StopError,
     StorageError,
@@ -40,7 +41,8 @@ if TYPE_CHECKING:
     from pbem.sweeps.sweep import sweep
 
 __all__ = [
-    "Case", "CaseError", "ConvergenceError", "ExportError", "LaunchError", "LawError", "PbemError", "ResultFileError",
+    "Case", "CaseError", "ConvergenceError", "ExportError", "LaunchError", "LawError", "PbemError", "PlotError",
+    "ResultFileError",
     "StopError", "StorageError", "__version__", "open_results", "run", "sweep",
 ]
 

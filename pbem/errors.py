@@ -156,3 +156,11 @@ class LaunchError(PbemError):
 
 class ExportError(PbemError):
     """The options of `pbem export` do not fit together; nothing was written."""
+
+
+class PlotError(PbemError):
+    """The options of `pbem plot` are wrong; nothing was written. Carries all faults at once."""
+
+    def __init__(self, faults: tuple[str, ...]) -> None:
+        self.faults = faults
+        super().__init__("\n".join(faults))

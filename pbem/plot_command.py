@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbem.errors import PbemError
+from pbem.errors import PlotError
 from pbem.make_command import read_finite
 from pbem.wording import suggest
 
@@ -52,14 +52,6 @@ examples:
 
 along curves (--curve NAME --field ...): opening, slip, traction_n, traction_s and the variables of the law of contact
 pairs; ux, uy, u, tx, ty, normal, shear, hoop at the nodes. `pbem help pictures` tells what pictures show."""
-
-
-class PlotError(PbemError):
-    """The options of `pbem plot` are wrong; nothing was written. Carries all faults at once."""
-
-    def __init__(self, faults: tuple[str, ...]) -> None:
-        self.faults = faults
-        super().__init__("\n".join(faults))
 
 
 def add_plot_arguments(plot: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -108,11 +109,22 @@ class CutParts:
         """The parts that move (3,) against the largest one of their region that is no block."""
         parts, rest, moving = self.parts, np.zeros(3), []
         for region in {int(parts.region[body]) for body in motion if parts.cut[body]}:
+            others, first = self._largest[region]
+            largest = motion.get(first, rest)
+            # There may be thousands of blocks: where the largest part rests, only those that move are asked.
+            asked = others if largest.any() else [body for body in motion if parts.region[body] == region]
+            moving += [body for body in asked if np.abs(motion.get(body, rest) - largest).max() > APART]
+        return tuple(sorted(moving))
+
+    @cached_property
+    def _largest(self) -> dict[int, tuple[list[int], int]]:
+        """Of every region its parts, and the largest of them that is no block."""
+        parts, found = self.parts, {}
+        for region in np.unique(parts.region).tolist():
             others = np.flatnonzero(parts.region == region)
             outer = others[~parts.block[others]] if not parts.block[others].all() else others
-            largest = motion.get(int(outer[np.argmax(self.size[outer])]), rest)
-            moving += [int(body) for body in others if np.abs(motion.get(int(body), rest) - largest).max() > APART]
-        return tuple(sorted(moving))
+            found[region] = (others.tolist(), int(outer[np.argmax(self.size[outer])]))
+        return found
 
     def _tie_sticking(self, modes: ModeState) -> tuple[Integer, int]:
         """Numbers of the groups of parts that sticking pairs tie to each other, two at least of each two, and how many.

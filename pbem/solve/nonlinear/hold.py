@@ -55,9 +55,10 @@ class Hold:
         self.count = 0
         self.driven = False
         self.repeated = 0
-        # Blocks that pairs were closed to hold, and the last state of all pairs that was found.
+        # Blocks that pairs were closed to hold; the last state of all pairs that was found; what floats in it.
         self.placed: set[int] = set()
         self.state: PairState | None = None
+        self.floating: tuple[CutMotion, ...] = ()
         # Only violations of this share of the largest change modes, once those that hold a body came back: many changes
         # at a time free a body whose contact only wants to move on around it.
         self.share = 0.0
@@ -193,7 +194,17 @@ class Hold:
         return problem.find_cut_motions(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else ()
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
-        """What the user should know of pairs that hold a body in the end."""
+        """What the user should know of what holds a body in the end."""
+        return (*self._describe_floating_blocks(), *self._describe_held(modes))
+
+    def _describe_floating_blocks(self) -> tuple[str, ...]:
+        if not self.floating:
+            return ()
+        told = self.problem.cut.describe(self.floating)
+        return (f"{told[0].upper()}{told[1:]}. All else is determined; where such a block lies between its neighbours "
+                "is that of the last iterations.",)
+
+    def _describe_held(self, modes: ModeState) -> tuple[str, ...]:
         held = self.pairs[modes.mode[self.pairs] == STICK]
         if not len(held):
             return ()
@@ -259,11 +270,18 @@ class Hold:
     ) -> None:
         """Raise ConvergenceError if a body can move freely in the present contact, where any position would do.
 
-        state: of all pairs in a solution, with the pressure of fluids on them (m,).
+        state: of all pairs in a solution, with the pressure of fluids on them (m,). Single blocks of a network that
+        float, where other blocks are held, are noted: all but their own displacement is determined.
         """
         error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
+        self.floating = ()
         if error is None and state is not None and pressure is not None:
-            error = self._describe_cut(self.find_floating(modes, state, pressure))
+            floating, block = self.find_floating(modes, state, pressure), self.problem.parts.block
+            moving = np.array([body for each in floating for body in each.moving], dtype=np.int64)
+            if block[moving].all() and len(np.unique(moving)) < block.sum():
+                self.floating = floating
+            else:
+                error = self._describe_cut(floating)
         if error:
             raise error
 

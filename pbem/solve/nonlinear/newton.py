@@ -170,6 +170,7 @@ def _search_modes(
         if driven:
             search.restart()
         elif outcome.settled and not fails:
+            forcing.used = False  # what follows is said of a solution in full
             problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)

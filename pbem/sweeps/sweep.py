@@ -31,7 +31,7 @@ from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
 from pbem.solve.system.kept import KeptProblems
 from pbem.sweeps.files import name_results
-from pbem.sweeps.outcome import Names, Outcome, list_quantity_names
+from pbem.sweeps.outcome import AbsentNameError, Names, Outcome, list_quantity_names
 from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, Table, TableFile
@@ -296,11 +296,17 @@ def compute_case(
         status, reason = "failed", str(error)
         kept.forget_factors()
     known = comm.rank == 0 and outcome.step is not None
-    found = tuple(
-        float(each.evaluate(outcome)) if known and (status == "finished" or each.of_steps) else float("nan")
-        for each in columns
-    )
-    return Row(_cells(values), found, status, outcome.iterations, time.perf_counter() - begun, reason)
+    found, absent = [], []
+    for each in columns:
+        value = float("nan")
+        if known and (status == "finished" or each.of_steps):
+            try:
+                value = float(each.evaluate(outcome))
+            except AbsentNameError as error:
+                absent.append(f"{each.title}: {error}")
+        found.append(value)
+    reason = "; ".join([*([reason] if reason else []), *absent])
+    return Row(_cells(values), tuple(found), status, outcome.iterations, time.perf_counter() - begun, reason)
 
 
 def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems, signals: StopSignals) -> None:

@@ -16,9 +16,11 @@ from pbem.cli import main
 from pbem.errors import CaseError, ResultFileError
 from pbem.results.reader import open_results
 from pbem.sweeps.files import name_results
+from pbem.sweeps.outcome import AbsentNameError, Names, Outcome
 from pbem.sweeps.sharing import sort_cases
 from pbem.sweeps.values import combine, read_values
 from tests.cli.cli_sample import BLOCKS
+from tests.unit.results_sample import make_mesh, make_model, make_steps
 
 Capture = pytest.CaptureFixture[str]
 VALUES = {"interfaces.joint.friction": [0.1, 0.4, 0.7], "stages.shear.boundary.top.ux": [0.02, 0.004]}
@@ -168,6 +170,88 @@ def test_cracks_have_factors_and_families(folder: Path) -> None:
     # An ellipse opens by pi/4 of its middle in the mean.
     assert last["contact.two.opening.mean"] == pytest.approx(math.pi / 4 * two.opening[-1].max(), rel=0.03)
     assert "contact.one.slip.largest" in pbem.sweep("cracked.toml", {"remote.sxy": [0.5]}).columns
+
+
+# Clear of the other crack, and across it: then both are cut in pieces.
+BESIDE, ACROSS = [[0.3, 1.0], [0.3, 2.0]], [[0.3, -1.0], [0.3, 1.0]]
+
+
+def find_strongest(values: list[Any]) -> float:
+    """The value that is largest without its sign."""
+    every = np.concatenate(values)
+    return float(every[np.nanargmax(np.abs(every))])
+
+
+@pytest.mark.parametrize("places", [[BESIDE, ACROSS], [ACROSS, BESIDE]], ids=["whole first", "pieces first"])
+def test_a_name_stands_for_the_pieces_that_each_case_has(folder: Path, places: list[Any]) -> None:
+    wanted = ["contact.one.traction_s.integral", "contact.traction_s.integral", "tips.KII", "tips.one.KII",
+              "tips.one.start.KI"]
+    table = pbem.sweep("cracked.toml", {"curves.two.points": places}, wanted)
+    for row, points in zip(table, places, strict=True):
+        results = pbem.run("cracked.toml", "x.h5", force=True, set={"curves.two.points": points})
+        of_one = [name for name in results.contact if name.startswith("one")]
+        assert (len(of_one), row["status"], row["reason"]) == (2 if points is ACROSS else 1, "finished", "")
+        force = {name: each.integrate("traction_s")[-1] for name, each in results.contact.items()}
+        factors = {name: each.KII[-1] for name, each in results.tips.items()}
+        expected = [sum(force[name] for name in of_one), sum(force.values()), find_strongest([*factors.values()]),
+                    find_strongest([factors[name] for name in of_one]), results.tips[of_one[0]].KI[-1, 0]]
+        assert [row[name] for name in wanted] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+GENERATED = """\
+materials.rock = { young = 1e3, poisson = 0.2 }
+curves.rim = { points = [[0, 9], [0, 0], [9, 0], [9, 9]], elements = 4 }
+curves.top = { points = [[9, 9], [0, 9]], elements = 4 }
+regions.rock = { material = "rock", boundary = ["rim", "top"] }
+boundary.rim = { ux = 0, uy = 0 }
+boundary.top = { ux = 0.1, uy = -0.1 }
+[[generate]]
+kind = "cracks"
+name = "k"
+region = "rock"
+box = [1, 1, 8, 8]
+count = 2
+elements = 2
+half_length = 0.6
+distance = 0.5
+friction = 0.1
+"""
+
+
+def test_a_case_with_more_or_fewer_cracks_has_other_members(folder: Path) -> None:
+    Path("many.toml").write_text(GENERATED)
+    wanted = ["contact.k.traction_n.integral", "contact.traction_n.integral", "tips.k.KII", "contact.k_*.slip.largest"]
+    table = pbem.sweep("many.toml", {"generate.k.count": [3, 5, 2]}, wanted)
+    assert table.columns[4:7] == tuple(f"contact.k_{number}.slip.largest" for number in (1, 2, 3))
+    for row in table:
+        results = pbem.run("many.toml", "x.h5", force=True, set={"generate.k.count": row["generate.k.count"]})
+        force = sum(each.integrate("traction_n")[-1] for each in results.contact.values())
+        assert force != 0 and row["status"] == "finished"
+        assert [row[name] for name in wanted[:3]] == pytest.approx(
+            [force, force, find_strongest([each.KII[-1] for each in results.tips.values()])], rel=1e-6)
+    assert [bool(reason) for reason in table["reason"]] == [False, False, True]
+    assert table["reason"][2] == "contact.k_3.slip.largest: this case has no 'k_3' with contact"
+    assert np.isnan(table["contact.k_3.slip.largest"]).tolist() == [False, False, True]
+
+
+def test_a_name_that_a_model_does_not_have_is_no_empty_set() -> None:
+    model, outcome = make_model(), Outcome()
+    mesh = make_mesh(model)
+    outcome.expect(model, mesh)
+    outcome.accept(make_steps(model, mesh)[0])
+    with pytest.raises(KeyError):
+        outcome.find_pairs("jont")
+    with pytest.raises(KeyError):
+        outcome.find_factors("crak")
+
+
+def test_a_generated_crack_that_is_cut_stays_a_member() -> None:
+    contact, tips = ("k_1", "k_2.1", "k_2.2", "a"), ("k_1", "k_2.2")
+    names = Names((), contact, tips, {"k": ("k_1", "k_2"), "k_2": ("k_2.1", "k_2.2")})
+    assert names.find_members("contact", "k") == ("k_1", "k_2.1", "k_2.2")
+    assert names.find_members("tips", "k") == ("k_1", "k_2.2") and names.find_members("contact", "a") == ("a",)
+    with pytest.raises(AbsentNameError, match="no 'b' with contact"):
+        names.find_members("contact", "b")
 
 
 def test_reactions_have_moments(folder: Path) -> None:

@@ -16,6 +16,7 @@ from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.interface_tips import list_tip_curves
+from pbem.results.pair_weights import weigh_mesh_pairs
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.problem.step import SilentReporter, Step
 
@@ -119,6 +120,11 @@ class Outcome(SilentReporter):
     def find_pairs(self, name: str) -> Integer:
         """The numbers of an interface's pairs. Raises KeyError if there is none of this name."""
         return self._pairs[name]
+
+    @cached_property
+    def weights(self) -> tuple[Real, Real]:
+        """Of all pairs (m,), for tractions and for jumps: lengths, as `integrate` of results has them."""
+        return weigh_mesh_pairs(self.mesh)
 
     @cached_property
     def _pairs(self) -> Mapping[str, Integer]:

@@ -12,6 +12,7 @@ from pbem.contact.laws import OPEN, SLIP, STICK, find_joint
 from pbem.description.replacement import Part, split_key
 from pbem.errors import CaseError, Fault
 from pbem.model.model import Model
+from pbem.results.pair_weights import JUMPS
 from pbem.sweeps.outcome import FACTORS, AbsentNameError, Kind, Names, Outcome
 from pbem.wording import list_names, show, suggest
 
@@ -199,7 +200,8 @@ def _summarise(outcome: Outcome, members: tuple[str, ...], field: str, what: str
         return float(weight[contact.mode[pairs] == MODES[what]].sum() / weight.sum())
     values = getattr(contact, field)[pairs]
     if what in ("mean", "integral"):
-        whole = float(weight @ values)
+        # Beside tips jumps have the root's shape, which the plain weights integrate wrongly.
+        whole = float(outcome.weights[field in JUMPS][pairs] @ values)
         return whole / float(weight.sum()) if what == "mean" else whole
     if what == "largest":
         return float(np.abs(values).max())

@@ -254,6 +254,30 @@ def test_a_generated_crack_that_is_cut_stays_a_member() -> None:
         names.find_members("contact", "b")
 
 
+def test_integrals_are_those_of_results_beside_tips(folder: Path) -> None:
+    fields = ("slip", "opening", "traction_n", "traction_s")
+    wanted = [f"contact.{name}.{field}.{what}" for name in ("one", "two") for field in fields
+              for what in ("integral", "mean")]
+    row = next(iter(pbem.sweep("cracked.toml", {"remote.syy": [1.0]}, wanted)))
+    results = pbem.run("cracked.toml", "x.h5", set={"remote.syy": 1.0})
+    length = {"one": math.hypot(2, 0.2), "two": 1.5}
+    for name in length:
+        for field in fields:
+            whole = results.contact[name].integrate(field)[-1]
+            found = [row[f"contact.{name}.{field}.{what}"] for what in ("integral", "mean")]
+            assert found == pytest.approx([whole, whole / length[name]], rel=1e-7, abs=1e-12)
+
+
+def test_a_pressed_crack_alone_opens_by_the_area_of_an_ellipse(folder: Path) -> None:
+    text = CRACKED.replace('cracks = ["one", "two"]', 'cracks = ["one"]').replace("points = [[-1, 0], [1, 0.2]]",
+                                                                              "points = [[-1, 0], [1, 0]]")
+    lines = [line for line in text.splitlines() if not line.startswith("two = ")]
+    Path("alone.toml").write_text("\n".join(lines))
+    row = next(iter(pbem.sweep("alone.toml", {"remote.syy": [2.0]}, ["contact.one.opening.integral"])))
+    # Plane strain: the area is 2 pi (1 - poisson^2) stress a^2 / young.
+    assert row["contact.one.opening.integral"] == pytest.approx(2 * math.pi * 0.96 * 2.0 / 1e3, rel=1e-4)
+
+
 def test_reactions_have_moments(folder: Path) -> None:
     body = """\
 materials.m = { young = 1e3, poisson = 0.2 }

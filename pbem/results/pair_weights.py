@@ -31,7 +31,8 @@ def weigh_mesh_pairs(mesh: Mesh) -> tuple[Real, Real]:
     """The same weights (m,) of all pairs of a mesh, in its order; second faces of cracks lie on the first ones."""
     vertices = np.stack([mesh.start, mesh.end], axis=1)
     elements = Elements(
-        np.stack([vertices.real, vertices.imag], axis=-1), mesh.sweep, mesh.region, mesh.curve, mesh.crack, mesh.tip)
+        np.stack([vertices.real, vertices.imag], axis=-1), mesh.sweep, mesh.region, mesh.curve, mesh.crack,
+        mesh.tip.astype(np.int64))
     position, pairs = (np.column_stack([each.real, each.imag]) for each in (mesh.position, mesh.pairs.position))
     return weigh_pairs(elements, position, mesh.order, pairs)
 

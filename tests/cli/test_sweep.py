@@ -362,6 +362,12 @@ def test_wrong_arguments_are_refused(folder: Path, values: Any, quantities: Any)
         pbem.sweep("blocks.toml", values, quantities)
 
 
+def test_no_values_are_said_as_a_program_gives_them(folder: Path) -> None:
+    with pytest.raises(CaseError, match="values: found nothing; expected what is to be varied") as caught:
+        pbem.sweep("blocks.toml", {})
+    assert "--set" not in str(caught.value)
+
+
 def test_values_of_the_command_line() -> None:
     found = read_values(["a=0.1:0.3:3", "b=1:5:3", "c=x,y", "d=[1, 2],[3, 4]", 'e="p,q",r', "f=1e3,true", "g=5:5:1"])
     assert found == {"a": [0.1, 0.2, 0.3], "b": [1, 3, 5], "c": ["x", "y"], "d": [[1, 2], [3, 4]], "e": ["p,q", "r"],

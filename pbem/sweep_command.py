@@ -104,4 +104,5 @@ def _describe_end(row: Row) -> str:
     if row.status != "finished":
         reason = " ".join(row.reason.split())
         return f"{row.status}: {reason if len(reason) <= 120 else reason[:116] + ' ...'}"
-    return f"{row.iterations} iteration{'s' * (row.iterations != 1)}, {row.seconds:.3g} s"
+    lacks = f"; {row.reason if len(row.reason) <= 120 else row.reason[:116] + ' ...'}" if row.reason else ""
+    return f"{row.iterations} iteration{'s' * (row.iterations != 1)}, {row.seconds:.3g} s{lacks}"

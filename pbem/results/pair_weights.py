@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Real
+from pbem.mesh.mesh import Mesh
 from pbem.mesh.shape_functions import integrate_shapes, tip_shapes
 from pbem.results.contents import Elements
 
@@ -24,6 +25,16 @@ def weigh_pairs(elements: Elements, position: Real, order: int, pairs: Real) -> 
     plain, rooted = _weigh_nodes(elements, position, order)
     _, node = cKDTree(position).query(pairs)
     return plain[node], rooted[node]
+
+
+def weigh_mesh_pairs(mesh: Mesh) -> tuple[Real, Real]:
+    """The same weights (m,) of all pairs of a mesh, in its order; second faces of cracks lie on the first ones."""
+    vertices = np.stack([mesh.start, mesh.end], axis=1)
+    elements = Elements(
+        np.stack([vertices.real, vertices.imag], axis=-1), mesh.sweep, mesh.region, mesh.curve, mesh.crack,
+        mesh.tip.astype(np.int64))
+    position, pairs = (np.column_stack([each.real, each.imag]) for each in (mesh.position, mesh.pairs.position))
+    return weigh_pairs(elements, position, mesh.order, pairs)
 
 
 def _weigh_nodes(elements: Elements, position: Real, order: int) -> tuple[Real, Real]:

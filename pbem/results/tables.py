@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError
 from pbem.results.reader import Results
+from pbem.results.trace_names import find_names, name_trace
 from pbem.wording import list_names, suggest
 
 Table = dict[str, NDArray[Any]]
@@ -22,17 +23,23 @@ FIXED = ("position", "normal", "arc_length")
 def make_table(results: Results, what: str) -> Table:
     """The columns of a table: `steps`, `reactions`, `tips`, `interior`, or the contact of an interface.
 
-    That is named as contact.NAME, or by NAME alone if it is none of the others; "contact" is all of them. One row for
-    each stored step and pair, curve, tip or point. Raises ResultFileError for what the file does not hold.
+    That is named as contact.NAME, or by NAME alone if it is none of the others; "contact" is all of them. NAME may be a
+    trace, which stands for all its pieces, or a pattern: then a column tells the interface. One row for each stored
+    step and pair, curve, tip or point. Raises ResultFileError for what the file does not hold, TypeError for no text.
     """
+    if not isinstance(what, str):
+        raise TypeError(f"what: found {what!r}; expected the name of a table: {list_names(list_tables(results))}")
     known = list_tables(results)
     if what in known and not what.startswith(PREFIX):
         return KINDS[what](results)
     name = what.removeprefix(PREFIX)
     if name in results.contact:
         return _tabulate_contact(results, name)
-    hint = suggest(name, [*known, *results.contact]) or ";"
-    raise ResultFileError(str(results.path), f"has no table '{what}'{hint} it has {list_names(known)}")
+    try:
+        return _tabulate_pieces(results, find_names([name], list(results.contact))[name])
+    except ValueError as error:
+        hint = suggest(name, [*known, *results.contact, *map(name_trace, results.contact)]) or ";"
+        raise ResultFileError(str(results.path), f"has no table '{what}'{hint} it has {list_names(known)}") from error
 
 
 def choose_table(results: Results) -> str:
@@ -137,6 +144,18 @@ def _tabulate_contact(results: Results, name: str) -> Table:
         **_name_steps(results, contact.pairs), **{each: _repeat(results, values) for each, values in fixed.items()},
         **{each: values.ravel() for each, values in growing.items()},
     }
+
+
+def _tabulate_pieces(results: Results, names: Sequence[str]) -> Table:
+    """Some interfaces together, step by step, with the internal variables that all of them have."""
+    tables = [_tabulate_contact(results, name) for name in names]
+    places = [np.repeat(np.arange(len(results.steps)), results.contact[name].pairs) for name in names]
+    owner = np.repeat(np.array(names, dtype=object), [len(each) for each in places])
+    order = np.argsort(np.concatenate(places), kind="stable")
+    shared = [title for title in tables[0] if all(title in table for table in tables)]
+    columns = {title: np.concatenate([table[title] for table in tables])[order] for title in shared}
+    first = list(_name_steps(results, 1))
+    return {**{title: columns[title] for title in first}, "interface": owner[order], **columns}
 
 
 def _tabulate_contacts(results: Results) -> Table:

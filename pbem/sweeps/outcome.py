@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -15,10 +16,16 @@ from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.interface_tips import list_tip_curves
+from pbem.results.pair_weights import weigh_mesh_pairs
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.problem.step import SilentReporter, Step
 
 FACTORS = ("KI", "KII", "J", "T")
+Kind = Literal["reactions", "contact", "tips"]
+
+
+class AbsentNameError(LookupError):
+    """A case has nothing of a name that another case of the sweep has."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,26 @@ class Names:
     contact: tuple[str, ...]
     tips: tuple[str, ...]
     families: Mapping[str, tuple[str, ...]]
+
+    def find_members(self, kind: Kind, name: str | None) -> tuple[str, ...]:
+        """What a name stands for in this case: itself, or all of its family; None: everything of the kind.
+
+        Cuts give a curve other pieces in one case than in another, so it may be one in one and several in another.
+        Raises AbsentNameError where there is nothing of this name.
+        """
+        known: tuple[str, ...] = getattr(self, kind)
+        if name is None or name in known:
+            return known if name is None else (name,)
+        there, found, open_names = set(known), [], list(self.families.get(name, ()))
+        while open_names:
+            member = open_names.pop(0)
+            if member in there:
+                found.append(member)
+            elif member != name:  # a generated curve may itself be cut in pieces
+                open_names = [*self.families.get(member, ()), *open_names]
+        if not found:
+            raise AbsentNameError(f"this case has no '{name}' with {kind}")
+        return tuple(dict.fromkeys(found))
 
 
 def list_quantity_names(model: Model, mesh: Mesh) -> Names:
@@ -85,9 +112,19 @@ class Outcome(SilentReporter):
         assert self.step is not None
         return self.step
 
+    @cached_property
+    def names(self) -> Names:
+        """What there is in this case, which another case of the sweep may not have."""
+        return list_quantity_names(self.model, self.mesh)
+
     def find_pairs(self, name: str) -> Integer:
-        """The numbers of an interface's pairs; empty if there is none of this name."""
-        return self._pairs.get(name, np.zeros(0, dtype=np.int64))
+        """The numbers of an interface's pairs. Raises KeyError if there is none of this name."""
+        return self._pairs[name]
+
+    @cached_property
+    def weights(self) -> tuple[Real, Real]:
+        """Of all pairs (m,), for tractions and for jumps: lengths, as `integrate` of results has them."""
+        return weigh_mesh_pairs(self.mesh)
 
     @cached_property
     def _pairs(self) -> Mapping[str, Integer]:
@@ -107,8 +144,11 @@ class Outcome(SilentReporter):
         return list_faces(self.mesh)
 
     def find_factors(self, crack: str) -> Mapping[str, Real]:
-        """KI, KII, J and T (2,) at the start and the end of a crack; NaN where no tip is."""
-        return self._tips.get(crack, {kind: np.full(2, np.nan) for kind in FACTORS})
+        """KI, KII, J and T (2,) at the start and the end of a crack; NaN where no tip is.
+
+        Raises KeyError if there is none of this name.
+        """
+        return self._tips[crack]
 
     @cached_property
     def _tips(self) -> Mapping[str, Mapping[str, Real]]:

@@ -12,7 +12,8 @@ from pbem.contact.laws import OPEN, SLIP, STICK, find_joint
 from pbem.description.replacement import Part, split_key
 from pbem.errors import CaseError, Fault
 from pbem.model.model import Model
-from pbem.sweeps.outcome import FACTORS, Names, Outcome
+from pbem.results.pair_weights import JUMPS
+from pbem.sweeps.outcome import FACTORS, AbsentNameError, Kind, Names, Outcome
 from pbem.wording import list_names, show, suggest
 
 COMPONENTS = ("x", "y", "moment")
@@ -36,7 +37,11 @@ MOST_INTERFACES, MOST_CRACKS = 10, 5
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column of the table: its title, and what gives its value."""
+    """A column of the table: its title, and what gives its value.
+
+    Names are those of the first case, what they stand for is found in each: evaluate raises AbsentNameError where a
+    case has nothing of a name.
+    """
 
     title: str
     evaluate: Callable[[Outcome], float]
@@ -116,18 +121,16 @@ def _take(parts: Sequence[Part], known: Collection[str], kind: str) -> str:
     raise WrongQuantityError(f"{len(parts)} names after {kind}", KINDS[kind])
 
 
-def _select(part: Part, known: Sequence[str], names: Names, kind: str) -> list[tuple[str, tuple[str, ...]]]:
-    """Titles and members of what a name or a pattern stands for."""
-    if part.text in known:
-        return [(part.text, (part.text,))]
-    if part.text in names.families:
-        members = tuple(name for name in names.families[part.text] if name in known)
-        if members:
-            return [(part.text, members)]
-    if not part.literal:
-        matched: list[tuple[str, tuple[str, ...]]] = [(name, (name,)) for name in known if part.matches(name)]
-        if matched:
-            return matched
+def _select(part: Part, names: Names, kind: Kind) -> list[str]:
+    """The names of columns that a name or a pattern stands for: of single curves, or of families."""
+    known: Sequence[str] = getattr(names, kind)
+    try:
+        names.find_members(kind, part.text)
+        return [part.text]
+    except AbsentNameError:
+        matched = [] if part.literal else [name for name in known if part.matches(name)]
+    if matched:
+        return matched
     everything = [*known, *names.families]
     found = f"'{part.text}'{suggest(part.text, everything)}"
     raise WrongQuantityError(found, f"{KINDS[kind]}; names: {list_names(known) or 'none in this case'}")
@@ -138,30 +141,28 @@ def _read_reaction(parts: Sequence[Part], names: Names) -> list[Quantity]:
         raise WrongQuantityError(f"{len(parts)} names after reactions", KINDS["reactions"])
     at = COMPONENTS.index(_take(parts[1:], COMPONENTS, "reactions"))
 
-    def make(title: str, members: tuple[str, ...]) -> Quantity:
-        return Quantity(f"reactions.{quote(title)}.{COMPONENTS[at]}",
-                        lambda outcome: sum(outcome.sum_reaction(name)[at] for name in members))
+    def make(name: str) -> Quantity:
+        return Quantity(f"reactions.{quote(name)}.{COMPONENTS[at]}", lambda outcome: sum(
+            outcome.sum_reaction(each)[at] for each in outcome.names.find_members("reactions", name)))
 
-    return [make(*each) for each in _select(parts[0], names.reactions, names, "reactions")]
+    return [make(each) for each in _select(parts[0], names, "reactions")]
 
 
 def _read_contact(parts: Sequence[Part], names: Names) -> list[Quantity]:
     if len(parts) not in (2, 3):
         raise WrongQuantityError(f"{len(parts)} names after contact", KINDS["contact"])
-    *name, field, statistic = parts
+    *whose, field, statistic = parts
     known = (*FIELDS, "status")
     if field.text not in known:
         raise WrongQuantityError(f"'{field.text}'{suggest(field.text, known)}", KINDS["contact"])
     what = _take([statistic], MODES if field.text == "status" else STATISTICS, "contact")
 
-    def make(title: str, members: tuple[str, ...]) -> Quantity:
-        return Quantity(f"contact{title}.{field.text}.{what}",
-                        lambda outcome: _summarise(outcome, members, field.text, what))
+    def make(name: str | None) -> Quantity:
+        title = "" if name is None else f".{quote(name)}"
+        return Quantity(f"contact{title}.{field.text}.{what}", lambda outcome: _summarise(
+            outcome, outcome.names.find_members("contact", name), field.text, what))
 
-    if not name:
-        return [make("", names.contact)]
-    return [make(f".{quote(title)}", members)
-            for title, members in _select(name[0], names.contact, names, "contact")]
+    return [make(each) for each in _select(whose[0], names, "contact")] if whose else [make(None)]
 
 
 def _read_tips(parts: Sequence[Part], names: Names) -> list[Quantity]:
@@ -173,13 +174,13 @@ def _read_tips(parts: Sequence[Part], names: Names) -> list[Quantity]:
         place = _take(parts[1:2], ENDS, "tips")
         end = ENDS[place]
 
-    def make(title: str, members: tuple[str, ...]) -> Quantity:
+    def make(name: str | None) -> Quantity:
+        title = "" if name is None else f".{quote(name)}"
         at = "" if end is None else f".{'start' if end == 0 else 'end'}"
-        return Quantity(f"tips{title}{at}.{kind}", lambda outcome: _find_largest(outcome, members, kind, end))
+        return Quantity(f"tips{title}{at}.{kind}", lambda outcome: _find_largest(
+            outcome, outcome.names.find_members("tips", name), kind, end))
 
-    if len(parts) == 1:
-        return [make("", names.tips)]
-    return [make(f".{quote(title)}", members) for title, members in _select(parts[0], names.tips, names, "tips")]
+    return [make(None)] if len(parts) == 1 else [make(each) for each in _select(parts[0], names, "tips")]
 
 
 def _find_step(outcome: Outcome, name: str) -> float:
@@ -199,7 +200,8 @@ def _summarise(outcome: Outcome, members: tuple[str, ...], field: str, what: str
         return float(weight[contact.mode[pairs] == MODES[what]].sum() / weight.sum())
     values = getattr(contact, field)[pairs]
     if what in ("mean", "integral"):
-        whole = float(weight @ values)
+        # Beside tips jumps have the root's shape, which the plain weights integrate wrongly.
+        whole = float(outcome.weights[field in JUMPS][pairs] @ values)
         return whole / float(weight.sum()) if what == "mean" else whole
     if what == "largest":
         return float(np.abs(values).max())

@@ -31,7 +31,7 @@ from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
 from pbem.solve.system.kept import KeptProblems
 from pbem.sweeps.files import name_results
-from pbem.sweeps.outcome import Names, Outcome, list_quantity_names
+from pbem.sweeps.outcome import AbsentNameError, Names, Outcome, list_quantity_names
 from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, Table, TableFile
@@ -95,12 +95,13 @@ def sweep(
     case: as of `pbem.run`. values: by keys, as of `Case.replace`, those that each key takes; the last key changes
     fastest. quantities: what is taken from the last step of each, see `pbem help sweeps`; without: reactions, the
     largest slips and openings, stress-intensity factors. out: a file for the table (CSV); one that is there is gone on
-    with: its rows are not computed again. keep: a folder for the result files of the cases; without, none are written,
-    and errors are not estimated. set: values that are the same in all. petsc, operator: as of `pbem.run`. force: begin
-    a table that is there anew. neighbours: begin the search for the statuses of a case with those of the one before
-    it, where laws do not remember; a case with more than one equilibrium, which high friction can have, may so end in
-    another one than alone. comm: ranks that share the cases, or each case, as is faster; all of them call this and
-    get the table. listener: told of each case, on the first rank. label, option: how messages name values, quantities.
+    with: its rows are not computed again. keep: a folder for the result files of the cases, where a row whose file is
+    not there is computed again; without, none are written, and errors are not estimated. set: values that are the same
+    in all. petsc, operator: as of `pbem.run`. force: begin a table that is there anew. neighbours: begin the search for
+    the statuses of a case with those of the one before it, where laws do not remember; a case with more than one
+    equilibrium, which high friction can have, may so end in another one than alone. comm: ranks that share the cases,
+    or each case, as is faster; all of them call this and get the table. listener: told of each case, on the first rank.
+    label, option: how messages name values, quantities.
 
     A case that does not converge is a row with the status "failed" and the reason, a combination of values that makes
     no case one with the status "refused"; neither has quantities, but for those of steps.
@@ -172,8 +173,15 @@ def _make_plan(
             raise ResultFileError(str(out), "is a file that the case is read from; name another file")
         file.append(TableFile(out, list(several), [each.title for each in columns], _mark(setting, first), force))
     done = file[0].done if file else {}
-    todo = sort_cases([each for each in cases if _cells(each) not in done], several)
+    todo = sort_cases([each for each in cases if _is_to_be_computed(setting, each, done.get(_cells(each)))], several)
     return Plan(names, wanted, tuple(todo), choose_share(first, mesh, comm, len(todo), several))
+
+
+def _is_to_be_computed(setting: Setting, values: Mapping[str, Any], row: Row | None) -> bool:
+    """Whether a case has no row, or lacks the result file that is asked for; what makes no case never has one."""
+    if row is None or setting.keep is None or row.status == "refused":
+        return row is None
+    return not (setting.keep / name_results(values)).exists()
 
 
 def _check_values_alone(
@@ -296,11 +304,17 @@ def compute_case(
         status, reason = "failed", str(error)
         kept.forget_factors()
     known = comm.rank == 0 and outcome.step is not None
-    found = tuple(
-        float(each.evaluate(outcome)) if known and (status == "finished" or each.of_steps) else float("nan")
-        for each in columns
-    )
-    return Row(_cells(values), found, status, outcome.iterations, time.perf_counter() - begun, reason)
+    found, absent = [], []
+    for each in columns:
+        value = float("nan")
+        if known and (status == "finished" or each.of_steps):
+            try:
+                value = float(each.evaluate(outcome))
+            except AbsentNameError as error:
+                absent.append(f"{each.title}: {error}")
+        found.append(value)
+    reason = "; ".join([*([reason] if reason else []), *absent])
+    return Row(_cells(values), tuple(found), status, outcome.iterations, time.perf_counter() - begun, reason)
 
 
 def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems, signals: StopSignals) -> None:

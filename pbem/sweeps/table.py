@@ -119,6 +119,7 @@ class TableFile:
         self.path, self._values, self._quantities, self._mark = Path(path), len(values), len(quantities), mark
         self.header = [*values, *quantities, *LAST_COLUMNS]
         self.done: dict[tuple[str, ...], Row] = {}
+        self._repeated = False  # rows that were computed again follow those they replace until the rows are sorted
         try:
             if self.path.is_dir():
                 raise ResultFileError(str(path), "is a folder; name a file in it")
@@ -154,6 +155,7 @@ class TableFile:
                 raise ResultFileError(
                     str(self.path), "holds rows of another case, of this case before it was changed, or of other "
                     "settings; --force replaces it, -o names another file")
+            self._repeated |= row.cells in self.done
             self.done[row.cells] = row
         if not whole:
             self._replace(list(self.done.values()))
@@ -171,6 +173,7 @@ class TableFile:
 
     def add(self, row: Row) -> None:
         """Write one row; it is on the disk when this returns. Raises StorageError if there is no room."""
+        self._repeated |= row.cells in self.done
         self.done[row.cells] = row
         try:
             with self.path.open("a", encoding="utf-8", newline="") as file:
@@ -184,10 +187,11 @@ class TableFile:
         """Bring the rows into an order, those that are not in it after them. Raises StorageError."""
         places = {cells: number for number, cells in enumerate(order)}
         rows = sorted(self.done.values(), key=lambda row: places.get(row.cells, len(places)))
-        if rows == list(self.done.values()):
+        if rows == list(self.done.values()) and not self._repeated:
             return
         try:
             self._replace(rows)
+            self._repeated = False
         except OSError as error:
             raise StorageError(str(self.path), f"cannot be sorted ({error.strerror or error})") from error
 

@@ -106,7 +106,7 @@ def check_combinations(values: Mapping[str, Sequence[Any]]) -> None:
     """Raise CaseError if there are none or too many, or a value is there twice."""
     faults = []
     if not values:
-        faults.append(Fault("--set", "nothing", f"what is to be varied: {SEVERAL}"))
+        faults.append(Fault("values", "nothing", "what is to be varied: lists of values by keys, one key or more"))
     for key, given in values.items():
         written = [write_cell(each) for each in given]
         if not given:

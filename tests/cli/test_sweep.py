@@ -16,9 +16,11 @@ from pbem.cli import main
 from pbem.errors import CaseError, ResultFileError
 from pbem.results.reader import open_results
 from pbem.sweeps.files import name_results
+from pbem.sweeps.outcome import AbsentNameError, Names, Outcome
 from pbem.sweeps.sharing import sort_cases
 from pbem.sweeps.values import combine, read_values
 from tests.cli.cli_sample import BLOCKS
+from tests.unit.results_sample import make_mesh, make_model, make_steps
 
 Capture = pytest.CaptureFixture[str]
 VALUES = {"interfaces.joint.friction": [0.1, 0.4, 0.7], "stages.shear.boundary.top.ux": [0.02, 0.004]}
@@ -150,6 +152,28 @@ def test_files_are_kept_where_they_are_asked_for(folder: Path) -> None:
     assert name_results({"a.x": 1, "b.x": 2}) == "a.x=1,b.x=2.h5" and name_results({"t": "a/b"}).startswith("case-")
 
 
+def test_files_that_are_missing_are_made_for_rows_that_are_there(folder: Path, capsys: Capture) -> None:
+    command = ["sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.1,0.4", "-o", "t.csv", "--quantity",
+               "reactions.top.x"]
+    assert main(command) == 0
+    before = [row["reactions.top.x"] for row in read("t.csv")]
+    capsys.readouterr()
+    assert main([*command, "--keep", "files"]) == 0 and "2 cases in" in capsys.readouterr().out
+    files = [Path(f"files/friction={value}.h5") for value in (0.1, 0.4)]
+    rows = read("t.csv")
+    assert [row["interfaces.joint.friction"] for row in rows] == ["0.1", "0.4"]
+    for path, row, force in zip(files, rows, before, strict=True):
+        found = float(row["reactions.top.x"])
+        assert open_results(path).reactions["top"][-1, 0] == found == pytest.approx(float(force))
+    files[0].unlink()
+    # Cut off before the rows were sorted: a row that was computed again is there twice.
+    Path("t.csv").write_text(Path("t.csv").read_text() + Path("t.csv").read_text().splitlines(keepends=True)[2])
+    assert main([*command, "--keep", "files"]) == 0
+    assert "1 cases in" in (said := capsys.readouterr().out) and "(1 were in the table)" in said
+    assert files[0].exists() and len(read("t.csv")) == 2
+    assert main([*command, "--keep", "files"]) == 0 and "0 cases in" in capsys.readouterr().out
+
+
 def test_cracks_have_factors_and_families(folder: Path) -> None:
     table = pbem.sweep("cracked.toml", {"remote.sxy": [0.5, 1.0]}, [
         "tips.*.KII", "tips.two.end.KI", "tips.KI", "contact.opening.max", "contact.t*.opening.mean", "tips.one.0.J",
@@ -168,6 +192,112 @@ def test_cracks_have_factors_and_families(folder: Path) -> None:
     # An ellipse opens by pi/4 of its middle in the mean.
     assert last["contact.two.opening.mean"] == pytest.approx(math.pi / 4 * two.opening[-1].max(), rel=0.03)
     assert "contact.one.slip.largest" in pbem.sweep("cracked.toml", {"remote.sxy": [0.5]}).columns
+
+
+# Clear of the other crack, and across it: then both are cut in pieces.
+BESIDE, ACROSS = [[0.3, 1.0], [0.3, 2.0]], [[0.3, -1.0], [0.3, 1.0]]
+
+
+def find_strongest(values: list[Any]) -> float:
+    """The value that is largest without its sign."""
+    every = np.concatenate(values)
+    return float(every[np.nanargmax(np.abs(every))])
+
+
+@pytest.mark.parametrize("places", [[BESIDE, ACROSS], [ACROSS, BESIDE]], ids=["whole first", "pieces first"])
+def test_a_name_stands_for_the_pieces_that_each_case_has(folder: Path, places: list[Any]) -> None:
+    wanted = ["contact.one.traction_s.integral", "contact.traction_s.integral", "tips.KII", "tips.one.KII",
+              "tips.one.start.KI"]
+    table = pbem.sweep("cracked.toml", {"curves.two.points": places}, wanted)
+    for row, points in zip(table, places, strict=True):
+        results = pbem.run("cracked.toml", "x.h5", force=True, set={"curves.two.points": points})
+        of_one = [name for name in results.contact if name.startswith("one")]
+        assert (len(of_one), row["status"], row["reason"]) == (2 if points is ACROSS else 1, "finished", "")
+        force = {name: each.integrate("traction_s")[-1] for name, each in results.contact.items()}
+        factors = {name: each.KII[-1] for name, each in results.tips.items()}
+        expected = [sum(force[name] for name in of_one), sum(force.values()), find_strongest([*factors.values()]),
+                    find_strongest([factors[name] for name in of_one]), results.tips[of_one[0]].KI[-1, 0]]
+        assert [row[name] for name in wanted] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+GENERATED = """\
+materials.rock = { young = 1e3, poisson = 0.2 }
+curves.rim = { points = [[0, 9], [0, 0], [9, 0], [9, 9]], elements = 4 }
+curves.top = { points = [[9, 9], [0, 9]], elements = 4 }
+regions.rock = { material = "rock", boundary = ["rim", "top"] }
+boundary.rim = { ux = 0, uy = 0 }
+boundary.top = { ux = 0.1, uy = -0.1 }
+[[generate]]
+kind = "cracks"
+name = "k"
+region = "rock"
+box = [1, 1, 8, 8]
+count = 2
+elements = 2
+half_length = 0.6
+distance = 0.5
+friction = 0.1
+"""
+
+
+def test_a_case_with_more_or_fewer_cracks_has_other_members(folder: Path) -> None:
+    Path("many.toml").write_text(GENERATED)
+    wanted = ["contact.k.traction_n.integral", "contact.traction_n.integral", "tips.k.KII", "contact.k_*.slip.largest"]
+    table = pbem.sweep("many.toml", {"generate.k.count": [3, 5, 2]}, wanted)
+    assert table.columns[4:7] == tuple(f"contact.k_{number}.slip.largest" for number in (1, 2, 3))
+    for row in table:
+        results = pbem.run("many.toml", "x.h5", force=True, set={"generate.k.count": row["generate.k.count"]})
+        force = sum(each.integrate("traction_n")[-1] for each in results.contact.values())
+        assert force != 0 and row["status"] == "finished"
+        assert [row[name] for name in wanted[:3]] == pytest.approx(
+            [force, force, find_strongest([each.KII[-1] for each in results.tips.values()])], rel=1e-6)
+    assert [bool(reason) for reason in table["reason"]] == [False, False, True]
+    assert table["reason"][2] == "contact.k_3.slip.largest: this case has no 'k_3' with contact"
+    assert np.isnan(table["contact.k_3.slip.largest"]).tolist() == [False, False, True]
+
+
+def test_a_name_that_a_model_does_not_have_is_no_empty_set() -> None:
+    model, outcome = make_model(), Outcome()
+    mesh = make_mesh(model)
+    outcome.expect(model, mesh)
+    outcome.accept(make_steps(model, mesh)[0])
+    with pytest.raises(KeyError):
+        outcome.find_pairs("jont")
+    with pytest.raises(KeyError):
+        outcome.find_factors("crak")
+
+
+def test_a_generated_crack_that_is_cut_stays_a_member() -> None:
+    contact, tips = ("k_1", "k_2.1", "k_2.2", "a"), ("k_1", "k_2.2")
+    names = Names((), contact, tips, {"k": ("k_1", "k_2"), "k_2": ("k_2.1", "k_2.2")})
+    assert names.find_members("contact", "k") == ("k_1", "k_2.1", "k_2.2")
+    assert names.find_members("tips", "k") == ("k_1", "k_2.2") and names.find_members("contact", "a") == ("a",)
+    with pytest.raises(AbsentNameError, match="no 'b' with contact"):
+        names.find_members("contact", "b")
+
+
+def test_integrals_are_those_of_results_beside_tips(folder: Path) -> None:
+    fields = ("slip", "opening", "traction_n", "traction_s")
+    wanted = [f"contact.{name}.{field}.{what}" for name in ("one", "two") for field in fields
+              for what in ("integral", "mean")]
+    row = next(iter(pbem.sweep("cracked.toml", {"remote.syy": [1.0]}, wanted)))
+    results = pbem.run("cracked.toml", "x.h5", set={"remote.syy": 1.0})
+    length = {"one": math.hypot(2, 0.2), "two": 1.5}
+    for name in length:
+        for field in fields:
+            whole = results.contact[name].integrate(field)[-1]
+            found = [row[f"contact.{name}.{field}.{what}"] for what in ("integral", "mean")]
+            assert found == pytest.approx([whole, whole / length[name]], rel=1e-7, abs=1e-12)
+
+
+def test_a_pressed_crack_alone_opens_by_the_area_of_an_ellipse(folder: Path) -> None:
+    text = CRACKED.replace('cracks = ["one", "two"]', 'cracks = ["one"]').replace("points = [[-1, 0], [1, 0.2]]",
+                                                                              "points = [[-1, 0], [1, 0]]")
+    lines = [line for line in text.splitlines() if not line.startswith("two = ")]
+    Path("alone.toml").write_text("\n".join(lines))
+    row = next(iter(pbem.sweep("alone.toml", {"remote.syy": [2.0]}, ["contact.one.opening.integral"])))
+    # Plane strain: the area is 2 pi (1 - poisson^2) stress a^2 / young.
+    assert row["contact.one.opening.integral"] == pytest.approx(2 * math.pi * 0.96 * 2.0 / 1e3, rel=1e-4)
 
 
 def test_reactions_have_moments(folder: Path) -> None:
@@ -230,6 +360,12 @@ def test_what_is_wrong_is_said_before_anything_is_computed(
 def test_wrong_arguments_are_refused(folder: Path, values: Any, quantities: Any) -> None:
     with pytest.raises(CaseError):
         pbem.sweep("blocks.toml", values, quantities)
+
+
+def test_no_values_are_said_as_a_program_gives_them(folder: Path) -> None:
+    with pytest.raises(CaseError, match="values: found nothing; expected what is to be varied") as caught:
+        pbem.sweep("blocks.toml", {})
+    assert "--set" not in str(caught.value)
 
 
 def test_values_of_the_command_line() -> None:

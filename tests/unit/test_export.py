@@ -8,6 +8,7 @@ import json
 import math
 import os
 from pathlib import Path
+from typing import Any
 
 import h5py
 import matplotlib
@@ -239,6 +240,31 @@ def test_tables_by_the_command(cracks: Results, tmp_path: Path, capsys: pytest.C
     assert {row["crack"] for row in tips if row["KI"]} <= set(cracks.tips)
     with pytest.raises(pbem.ResultFileError, match="no table 'othr'; did you mean 'other'"):
         make_table(cracks, "othr")
+
+
+def test_a_trace_stands_for_its_pieces(
+    cracks: Results, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    pieces = [cracks.contact[name] for name in ("t1.1", "t1.2")]
+    table = make_table(cracks, "contact.t1")
+    assert list(table) == ["step", "stage", "factor", "interface", *list(make_table(cracks, "t1.1"))[3:]]
+    assert table["slip"].tolist() == np.concatenate([each.slip for each in pieces], axis=1).ravel().tolist()
+    names = [each.name for each in pieces for _ in range(each.pairs)]
+    assert table["interface"].tolist() == 3 * names
+    assert table["step"].tolist() == np.repeat([1, 2, 3], len(names)).tolist()
+    assert table["x"][: len(names)].tolist() == [x for each in pieces for x in each.position[:, 0].tolist()]
+    assert cracks.to_dataframe("t1")["pair"].tolist() == table["pair"].tolist()
+    assert set(make_table(cracks, "*")["interface"]) == set(cracks.contact)
+    assert main(["export", str(cracks.path), "-o", str(tmp_path / "t.csv"), "--what", "contact.t1"]) == 0
+    assert f"{3 * len(names)} rows" in capsys.readouterr().out
+    with pytest.raises(pbem.ResultFileError, match=r"no table 't1\.3'; did you mean"):
+        make_table(cracks, "t1.3")
+
+
+@pytest.mark.parametrize("what", [None, 3, ["steps"]])
+def test_what_is_no_name_of_a_table_is_refused(cracks: Results, what: Any) -> None:
+    with pytest.raises(TypeError, match=r"what: found .*; expected the name of a table: "):
+        cracks.to_dataframe(what)
 
 
 @pytest.mark.parametrize(("output", "options", "said"), [

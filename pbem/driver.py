@@ -31,6 +31,7 @@ from pbem.parallel import (
     world,
 )
 from pbem.results.accuracy import Decision, Pass, decide
+from pbem.results.doubts import find_smooth
 from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
@@ -164,7 +165,7 @@ def _refine_and_solve(
     if target.resume and model.analysis.accuracy is not None:
         read = do_on_first(watch.comm, PbemError, lambda: read_refinement(target.path))
         model, one = (model, one) if read is None else (impose_fractions(model, read.fractions), read.one)
-    notes: Sequence[str] = (*model.notes,)
+    notes: Sequence[str] = (*model.notes, *find_smooth(model))
     for number in count(one.number):
         with clock.piece("reading"):
             mesh = generate_mesh(model)

@@ -25,7 +25,7 @@ def add_import_options(parser: argparse.ArgumentParser) -> None:
     add("file", metavar="FILE")
     add("-o", "--output", required=True, metavar="CASE.toml", help="case file to be written")
     add("--force", action="store_true", help="write over a file that is there")
-    add("--size", type=_read_positive, metavar="H", help="largest length of an element (default: a quarter of the "
+    add("--size", type=_read_positive, metavar="H", help="largest length of an element (default: a sixth of the "
         "traces' median length; of a mesh its own)")
     add("--snap", type=_read_distance, metavar="D",
         help="points no further apart are one (default: a thousandth of the median length)")

@@ -11,23 +11,28 @@ from pbem.geometry.network import Change
 from pbem.geometry.network.parts import Kind
 from pbem.importing.options import Imported
 
-# In this order, each with its title and the words of a line.
-TITLES: Mapping[Kind, tuple[str, str]] = {
-    "dropped": ("traces dropped, which are no longer than the snap distance", "{trace} at {place}: {distance} long"),
-    "thinned": ("vertices left out, no further than the snap distance from another one of their trace",
+# In this order, each with its title for one and for several, and the words of a line.
+TITLES: Mapping[Kind, tuple[str, str, str]] = {
+    "dropped": ("trace dropped, which is no longer than the snap distance",
+                "traces dropped, which are no longer than the snap distance", "{trace} at {place}: {distance} long"),
+    "thinned": ("vertex left out, no further than the snap distance from another one of its trace",
+                "vertices left out, no further than the snap distance from another one of their trace",
                 "{trace} at {place}: {distance} from the next"),
-    "joined": ("ends and vertices joined to what they all but reach",
+    "joined": ("end or vertex joined to what it all but reaches", "ends and vertices joined to what they all but reach",
                "{trace} at {place}: moved by {distance} to {other}"),
-    "cut off": ("ends cut off that poke through another trace", "{trace} at {place}: {distance} beyond {other}"),
-    "bent": ("traces moved sideways to pass through a point of another one",
+    "cut off": ("end cut off that pokes through another trace", "ends cut off that poke through another trace",
+                "{trace} at {place}: {distance} beyond {other}"),
+    "bent": ("trace moved sideways to pass through a point of another one",
+             "traces moved sideways to pass through a point of another one",
              "{trace} at {place}: by {distance}, to {other}"),
-    "merged": ("stretches that lie on another trace, which keeps them",
+    "merged": ("stretch that lies on another trace, which keeps it",
+               "stretches that lie on another trace, which keeps them",
                "{trace} from {place} on: {distance} long, on {other}"),
-    "cut": ("cuts, where traces cross or meet", "{trace} at {place}, by {other}"),
+    "cut": ("cut, where traces cross or meet", "cuts, where traces cross or meet", "{trace} at {place}, by {other}"),
 }
 # Lines of each kind that the terminal shows; of cuts, which change no shape, the number will do.
 MOST_SHOWN = 5
-CUTS = TITLES["cut"][0]
+CUTS = TITLES["cut"][:2]
 
 
 def format_place(point: complex) -> str:
@@ -38,7 +43,7 @@ def format_place(point: complex) -> str:
 def list_changes(changes: Sequence[Change]) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Titles, with counts, and lines."""
     groups = []
-    for kind, (title, form) in TITLES.items():
+    for kind, (single, several, form) in TITLES.items():
         lines = tuple(
             form.format(trace=each.trace, place=format_place(each.place), distance=f"{each.distance:.3g}",
                         other="itself" if each.other == each.trace else each.other)
@@ -47,7 +52,7 @@ def list_changes(changes: Sequence[Change]) -> tuple[tuple[str, tuple[str, ...]]
         if lines:
             most = max(each.distance for each in changes if each.kind == kind)
             largest = f", by {most:.3g} at most" if kind in ("joined", "cut off", "bent") else ""
-            groups.append((f"{len(lines)} {title}{largest}", lines))
+            groups.append((f"{len(lines)} {single if len(lines) == 1 else several}{largest}", lines))
     return tuple(groups)
 
 

@@ -26,7 +26,7 @@ from pbem.importing.options import FRICTION, POISSON, YOUNG, Imported, Options
 from pbem.importing.reading import Reading, Trace, fail
 
 # Of the median length of the traces.
-SNAP, SIZE = 1e-3, 0.25
+SNAP, SIZE = 1e-3, 1 / 6
 # Faces nearer to each other than half of this part of their legs are refused by `pbem check` as meant to be one,
 # whatever the snap distance (`COINCIDENT` of pbem.model.coincidence; ends that miss a leg by a tenth of that as well).
 LEAST_SNAP = 2e-5
@@ -156,9 +156,11 @@ def _simplify_singly(traces: Sequence[Trace], distance: float, scale: _Scale) ->
     notes = [f"Simplified by {distance:g}: of {before} straight or circular parts {after} remain."]
     touching = _find_touching(traces, scale.snap) - _find_touching(simpler, max(scale.snap, scale.rounding))
     if touching:
+        lay = "1 end that lay on another trace now misses it or pokes through it"
+        if len(touching) > 1:
+            lay = f"{len(touching)} ends that lay on another trace now miss it or poke through it"
         notes.append(
-            f"{len(touching)} ends that lay on another trace now miss it or poke through it, by up to {distance:g}, as "
-            "that one was simplified: --keep-junctions keeps them there."
+            f"{lay}, by up to {distance:g}, as that one was simplified: --keep-junctions keeps them there."
         )
     return simpler, notes
 
@@ -285,7 +287,7 @@ def _summarise(
 def _tell_defaults(options: Options, scale: _Scale) -> list[str]:
     told = []
     if options.size is None:
-        told.append(f"--size {scale.size:.4g} (a quarter of the traces' median length, {scale.median:.4g})")
+        told.append(f"--size {scale.size:.4g} (a sixth of the traces' median length, {scale.median:.4g})")
     if options.snap is None and scale.snap <= SNAP * scale.median:
         told.append(f"--snap {scale.snap:.4g} (a thousandth of it)")
     told += [

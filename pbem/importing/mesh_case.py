@@ -62,7 +62,8 @@ def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Im
         for use in ("outer curve", "interface", "crack") if uses[use]
     ]
     notes = [*grid.notes, *_tell_defaults(options, uses)]
-    groups = [(f"{len(left_out)} parts of the mesh left out", tuple(left_out))] if left_out else []
+    parts = f"{len(left_out)} part{'s' * (len(left_out) != 1)}"
+    groups = [(f"{parts} of the mesh left out", tuple(left_out))] if left_out else []
     text = write_case(path.name, tables, summary, notes, groups, command)
     for use, comment in (("outer curve", CONDITIONS), ("interface", LAWS)):
         first = next((name for name, side, _, _ in names if side.use == use), None)
@@ -72,7 +73,8 @@ def make_mesh_case(path: Path, grid: Grid, options: Options, command: str) -> Im
 
 
 def _refuse(path: Path, options: Options) -> None:
-    for key, reason in (("sxx", "the mesh has an end"), ("syy", "the mesh has an end"), ("sxy", "the mesh has an end"),
+    finite = "finite regions have no stress far away"
+    for key, reason in (("sxx", finite), ("syy", finite), ("sxy", finite),
                         ("snap", "nodes are joined by the mesh"), ("simplify", "curves are what the nodes lie on")):
         if getattr(options, key) is not None:
             raise PbemError(f"{path}: found --{key} with a mesh of surfaces; expected no such option: {reason}")

@@ -37,6 +37,7 @@ from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_transla
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
+from pbem.model.varying import Varying
 from pbem.wording import list_names
 
 # Faults shown of what one table [[generate]] made.
@@ -210,12 +211,6 @@ def _note_choices(case: Case) -> list[str]:
     unused = [f"'{name}'" for name in case.materials if name not in used]
     if unused:
         notes.append(f"Materials that no region uses: {list_names(unused)}.")
-    strength = {"friction", "friction_angle", "cohesion"}
-    smooth = [f"'{name}'" for laws in (case.interfaces, case.contacts) for name, law in laws.items()
-              if law.law == "coulomb" and not strength & law.model_fields_set]
-    if smooth:
-        notes.append(f"No friction or cohesion is given with law = \"coulomb\" for {list_names(smooth)}: their faces "
-                     "slide freely; law = \"frictionless\" says so.")
     return notes
 
 
@@ -227,8 +222,12 @@ def _note_loads(model: Model) -> list[str]:
         *(stage.gravity if weights else ()))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
-    return [] if any(loads) else ["No load: all prescribed displacements and tractions, pressures, stresses far away, "
-                                  "weights, in-situ stresses and swellings are zero, and so will be the results."]
+    laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
+    loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]
+    return [] if any(loads) else [
+        "No load: all prescribed displacements and tractions, pressures, stresses far away, weights, in-situ stresses, "
+        "swellings and interferences are zero, and so will be the results."
+    ]
 
 
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:

@@ -14,11 +14,12 @@ from pbem.results.law_text import find_trace, name_many
 
 
 def list_doubts(model: Model, mesh: Mesh) -> list[str]:
-    """A sentence for each: friction that was forgotten, no load at all, contact on fewer elements than resolve it."""
-    return [*_find_smooth(model), *_find_unloaded(model), *_find_sparse(model, mesh)]
+    """A sentence for each: friction that was forgotten, contact on fewer elements than resolve it."""
+    return [*find_smooth(model), *_find_sparse(model, mesh)]
 
 
-def _find_smooth(model: Model) -> list[str]:
+def find_smooth(model: Model) -> list[str]:
+    """A sentence if friction was forgotten."""
     names = [
         name for name in [*model.interfaces, *model.contacts]
         if (law := find_joint(model, name).law).kind == "coulomb"
@@ -28,22 +29,6 @@ def _find_smooth(model: Model) -> list[str]:
         return []
     return [f"{name_many(names)}: Coulomb's law without friction, the default; closed faces slide freely. Give "
             "`friction` or `friction_angle`, or say law = \"frictionless\" if that is meant."]
-
-
-def _find_unloaded(model: Model) -> list[str]:
-    loads = [
-        [*(value for values in stage.boundary.values() for value in values), *stage.pressure.values(), *stage.remote]
-        for stage in model.stages
-    ]
-    heavy = any(any(stage.gravity) for stage in model.stages) and any(
-        region.material.density for region in model.regions
-    )
-    stressed = not all(stress.is_zero for stress in model.initial_stress.values())
-    stressed |= any(not each.is_zero for stage in model.stages for each in stage.swelling.values())
-    if heavy or stressed or any(map(any, loads)):
-        return []
-    return ["nothing loads the model: no prescribed displacement, traction, pressure, remote stress, weight or in-situ "
-            "stress other than zero. All results will be zero."]
 
 
 def _find_sparse(model: Model, mesh: Mesh) -> list[str]:

@@ -88,6 +88,8 @@ class FieldPicture:
     def __init__(self, results: Results, name: str, options: FieldOptions, steps: Sequence[int]) -> None:
         if name not in FIELDS:
             raise ValueError(f"there is no field '{name}'{suggest(name, FIELDS)}; there are: {', '.join(FIELDS)}")
+        if not len(results.steps):
+            raise ResultFileError(str(results.path), "holds no load step yet")
         self._results, self._name, self._options = results, name, options
         self._box = choose_box(results, options.box)
         self._triangles = self._triangulate()

@@ -90,8 +90,9 @@ def write_around(figure: Figure, title: str, notes: Sequence[str] = ()) -> None:
 def add_legend_row(
     figure: Figure, cell: SubplotSpec, handles: Sequence[Line2D], page: Page, columns: int = 4
 ) -> None:
-    """A legend in a row of its own, each entry once."""
-    unique = list({str(handle.get_label()): handle for handle in handles}.values())
+    """A legend in a row of its own, each entry once; a line and a mark of the same label are two."""
+    unique = list({(str(each.get_label()), str(each.get_linestyle()), str(each.get_marker())): each
+                   for each in handles}.values())
     axes = figure.add_subplot(cell)
     axes.set_axis_off()
     axes.legend(handles=unique, loc="center", ncol=min(columns, 2) if page.is_narrow else columns, borderaxespad=0.0)

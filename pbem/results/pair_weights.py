@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pbem.arrays import Real
+from pbem.arrays import Integer, Real
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.shape_functions import integrate_shapes, tip_shapes
 from pbem.results.contents import Elements
@@ -23,7 +23,7 @@ def weigh_pairs(elements: Elements, position: Real, order: int, pairs: Real) -> 
     if not len(pairs):
         return np.zeros(0), np.zeros(0)
     plain, rooted = _weigh_nodes(elements, position, order)
-    _, node = cKDTree(position).query(pairs)
+    node = find_nodes(position, pairs)
     return plain[node], rooted[node]
 
 
@@ -35,6 +35,12 @@ def weigh_mesh_pairs(mesh: Mesh) -> tuple[Real, Real]:
         mesh.tip.astype(np.int64))
     position, pairs = (np.column_stack([each.real, each.imag]) for each in (mesh.position, mesh.pairs.position))
     return weigh_pairs(elements, position, mesh.order, pairs)
+
+
+def find_nodes(position: Real, pairs: Real) -> Integer:
+    """The numbers (m,) of the nodes, of either side, that the pairs lie on; as for `weigh_pairs`."""
+    _, node = cKDTree(position).query(pairs)
+    return np.asarray(node)
 
 
 def _weigh_nodes(elements: Elements, position: Real, order: int) -> tuple[Real, Real]:

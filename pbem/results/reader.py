@@ -124,10 +124,12 @@ class Results:
         infinite there. Needs the result file alone.
 
         Raises ValueError for points of another shape or another side, IndexError for no such step, ResultFileError for
-        files of earlier versions.
+        files that hold no step yet and those of earlier versions.
         """
         if side not in get_args(Side):
             raise ValueError(f"side: found {side!r}; expected one of {', '.join(get_args(Side))}")
+        if not len(self.steps):
+            raise ResultFileError(str(self.path), "holds no load step yet")
         tips = find_tips(self.elements, self.nodes.curve_names, self.tips)
         places = np.array([complex(*tip) for tip in sorted(tips)], dtype=complex)
         return self._evaluator.evaluate(points, self.choose_steps(steps), places, side)

@@ -14,12 +14,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from pbem.arrays import Bool, Integer, Real
+from pbem.arrays import Bool, Real
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.errors import ResultFileError
 from pbem.results.body_plot import write_names
 from pbem.results.outline import trace_outlines
 from pbem.results.page import Page, add_legend_row, choose_box, describe_box, finish_plane, save, write_around
+from pbem.results.pair_weights import find_nodes, weigh_pairs
 from pbem.results.picture_limits import format_number, limit_field
 from pbem.results.plot_style import MODES, describe_step, label, scale_axis, style
 from pbem.results.reader import Results
@@ -37,6 +38,8 @@ TRACES = (*TRACE_QUANTITIES, "status")
 WIDTHS = {STICK: 0.7, SLIP: 1.5, OPEN: 2.0}
 # Bins of the orientations, from 0 to 180 degrees.
 BINS = 18
+# Middles of elements no further apart than this part of their length are one: two faces of one place.
+SAME_MIDDLE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -107,11 +110,13 @@ class TracePicture:
 
     def _draw_values(self, figure: Figure, axes: Axes, values: Real) -> list[str]:
         """Few first, so that what is large is seen on top."""
-        title, is_length, _ = TRACE_QUANTITIES[self._quantity]
+        title, is_length, unsigned = TRACE_QUANTITIES[self._quantity]
         limits = self._limits
         low, high = self._options.limits or (limits.low, limits.high)
         if not high > low:
-            low, high = low - (0.5 * abs(low) or 1.0), high + (0.5 * abs(high) or 1.0)
+            # Of what has no sign, zero is the least.
+            least = 0.0 if unsigned and low >= 0 else low - (0.5 * abs(low) or 1.0)
+            low, high = least, high + (0.5 * abs(high) or 1.0)
         strong = -values if self._quantity == "traction_n" else values
         order = np.argsort(strong, kind="stable")
         lines = LineCollection(
@@ -218,39 +223,37 @@ def make_line_colours(reverse: bool) -> Colormap:
 
 
 def list_segments(results: Results) -> tuple[Real, Real]:
-    """A piece of the line for every pair, (m, 3, 2): from the middle to the pair before to that to the one after; and
-    their lengths (m,)."""
-    pairs = results.pairs
-    place, arc = pairs.position, pairs.arc_length
-    m = len(arc)
-    first: Bool = np.r_[True, pairs.interface[1:] != pairs.interface[:-1]]
+    """A piece of the line for every pair, (m, 3, 2), and the lengths (m,) that the pairs stand for.
+
+    In its element a piece goes from the middle to the pair before, or the vertex, to that to the pair after.
+    """
+    nodes, place = results.nodes, results.pairs.position
+    lengths, _ = weigh_pairs(results.elements, nodes.position, nodes.order, place)
+    element = find_nodes(nodes.position, place) // (nodes.order + 1)
+    geometry = results.elements.geometry.select(element)
+    middle = geometry.place(np.zeros((len(element), 1)))[:, 0]
+    # Either of the faces may own the node that was found: an element is known by its middle.
+    new = np.abs(np.diff(middle)) > SAME_MIDDLE * geometry.lengths[1:]
+    first: Bool = np.r_[True, new | (np.diff(results.pairs.interface) != 0)]
     last: Bool = np.r_[first[1:], True]
-    before: Integer = np.where(first, np.arange(m), np.arange(m) - 1)
-    after: Integer = np.where(last, np.arange(m), np.arange(m) + 1)
-    start, end = 0.5 * (place + place[before]), 0.5 * (place + place[after])
-    # At both ends to the end of the curve, which is as far from the last pair as its beginning from the first one.
-    starts = np.flatnonzero(first)
-    owner = np.cumsum(first) - 1
-    begins_at = np.maximum(arc[starts], 0.0)[owner]
-    for ends, beyond, line in ((first, after, start), (last, before, end)):
-        chosen = np.flatnonzero(ends & (beyond != np.arange(m)))
-        step = place[chosen] - place[beyond[chosen]]
-        length = np.hypot(*step.T)
-        share = np.minimum(begins_at[chosen] / np.maximum(length, 1e-300), 1.0)
-        line[chosen] = place[chosen] + share[:, None] * step
-    segments = np.stack([start, place, end], axis=1)
-    return segments, np.hypot(*(place - start).T) + np.hypot(*(end - place).T)
+    start, end = (0.5 * (place + np.roll(place, by, axis=0)) for by in (1, -1))
+    # The pairs of an element go from one of its vertices, the nearer one to the first pair, to the other one.
+    vertices = results.elements.vertices[element[first]]
+    near = np.argmin(np.hypot(*np.moveaxis(vertices - place[first][:, None], 2, 0)), axis=1)
+    every = np.arange(len(near))
+    start[first], end[last] = vertices[every, near], vertices[every, 1 - near]
+    return np.stack([start, place, end], axis=1), lengths
 
 
 def sum_orientations(results: Results, step: int) -> Orientations:
     """Lengths and integrals of |slip| of all pairs at a stored step, by their orientation."""
-    normal = results.pairs.normal
-    _, lengths = list_segments(results)
+    normal, nodes = results.pairs.normal, results.nodes
+    lengths, rooted = weigh_pairs(results.elements, nodes.position, nodes.order, results.pairs.position)
     angle = np.degrees(np.arctan2(normal[:, 0], -normal[:, 1])) % 180.0
     # Directions that are 0 but for rounding are 0.
     number = np.floor((angle + 1e-9) / (180.0 / BINS)).astype(int) % BINS
     slip = np.abs(results.pairs.at("slip", step))
-    sums = (np.asarray(np.bincount(number, each, BINS), dtype=float) for each in (lengths, lengths * slip))
+    sums = (np.asarray(np.bincount(number, each, BINS), dtype=float) for each in (lengths, rooted * slip))
     return Orientations(*sums)
 
 

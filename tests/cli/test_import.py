@@ -77,10 +77,25 @@ def test_options_say_what_stands_in_the_case() -> None:
 
 def test_defaults_are_told_and_follow_the_median_length(capsys: Capture) -> None:
     tables = bring_in("map.geojson", write_map([[0, 0], [2, 0]], [[0, 5], [4, 5]], [[0, 9], [40, 9]]))
-    assert tables["curves"]["t1"]["size"] == 1.0 and tables["remote"]["syy"] == -1.0
+    assert tables["curves"]["t1"]["size"] == pytest.approx(4 / 6) and tables["remote"]["syy"] == -1.0
     said = capsys.readouterr().out
-    for part in ("--size 1 (a quarter", "--snap 0.004 (a thousandth", "--friction 0.6", "--young 1000",
+    for part in ("--size 0.6667 (a sixth", "--snap 0.004 (a thousandth", "--friction 0.6", "--young 1000",
                  "--poisson 0.2", "--syy -1"):
+        assert part in said
+
+
+def test_the_default_size_is_one_that_check_does_not_doubt(capsys: Capture) -> None:
+    bring_in("map.geojson", write_map([[0, 0], [3, 0]], [[0, 5], [3, 5]], [[0, 9], [3, 10]]))
+    capsys.readouterr()
+    assert main(["check", "made.toml", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["doubts"] == []
+
+
+def test_one_change_is_told_of_in_the_singular(capsys: Capture) -> None:
+    bring_in("map.geojson", write_map([[0, 0], [2, 0]], [[1, 0.001], [1, 1]], [[5, 5], [5, 5]]), "--snap", "0.002")
+    said = capsys.readouterr().out
+    for part in ("1 trace dropped, which is no longer", "1 end or vertex joined to what it all but reaches, by 0.001",
+                 "1 cut, where traces cross or meet: listed in"):
         assert part in said
 
 
@@ -290,6 +305,13 @@ def test_a_missing_library_is_named(capsys: Capture, monkeypatch: pytest.MonkeyP
     Path("map.dxf").write_text(write_dxf())
     assert main(["import", "map.dxf", "-o", "made.toml"]) == 2
     assert "install python3-ezdxf" in capsys.readouterr().err
+
+
+def test_a_mesh_has_no_stress_far_away(capsys: Capture) -> None:
+    Path("ring.msh").write_text(write_4(make_ring(24, 3, 1.0, 2.0)))
+    assert main(["import", "ring.msh", "-o", "made.toml", "--syy", "-1"]) == 2
+    assert "found --syy with a mesh of surfaces; expected no such option: finite regions have no stress far away" in (
+        capsys.readouterr().err)
 
 
 @pytest.mark.parametrize("version", WRITERS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pbem.case.build import parse_model
+from pbem.results.doubts import find_smooth
 from tests.unit.case_sample import BLOCKS, change
 
 CRACK = """\
@@ -20,6 +21,10 @@ analysis.steps = 1
     [
         ("", True), ("remote.syy = 0.0", True), ("remote.syy = -1.0", False),
         ("initial_stress.m = { sxy = 1.0 }", False), ("interfaces.crack = { pressure = 2.0 }", False),
+        # Faces that are made to fit by force, and those that may be.
+        ("interfaces.crack = { gap = -0.02 }", False), ("interfaces.crack = { gap = 0.02 }", True),
+        ('interfaces.crack = { gap = { expression = "0.1 - x" } }', False),
+        ('interfaces.crack = { law = "bonded" }', True),
         ('[[stages]]\nname = "a"\n[[stages]]\nremote.sxx = 1e-12', False), ('[[stages]]\nname = "a"', True),
     ],
 )  # fmt: skip
@@ -38,6 +43,7 @@ def test_a_case_without_loads_is_noted(load: str, noted: bool) -> None:
 )  # fmt: skip
 def test_a_coulomb_law_without_friction_is_noted(law: str, noted: bool) -> None:
     _, model = parse_model(change(BLOCKS, ('law = "coulomb"\nfriction = 0.5', law)))
-    found = [note for note in model.notes if note.startswith("No friction or cohesion")]
+    found = find_smooth(model)
     assert len(found) == noted
-    assert all("'interface'" in note and "frictionless" in note for note in found)
+    assert all(text.startswith("interface: Coulomb's law without friction, the default") for text in found)
+    assert not [note for note in model.notes if "friction" in note]

@@ -122,7 +122,11 @@ def test_pictures_of_curves_have_the_same_limits_at_all_steps(results: Results) 
     titles = [axes.get_title(loc="left") for axes in first.axes[:-1]]
     assert titles == ["joint", "joint", "hole", "hole"]
     entries = [text.get_text() for text in first.axes[-1].get_legend().get_texts()]
-    assert len(entries) == len(set(entries)) >= 6
+    # Slip is a quantity, drawn as a line, and what pairs do, a mark.
+    lines = last.axes[-1].get_legend().get_lines()
+    drawn = [(line.get_label(), line.get_linestyle() == "None") for line in lines]
+    assert ("slip", False) in drawn and ("slip", True) in drawn
+    assert len(drawn) == len(set(drawn)) == len(entries) >= 7
 
 
 def test_numbers_of_pictures() -> None:

@@ -210,6 +210,11 @@ def test_wrong_fields_and_boxes(sample: Results, tmp_path: Path) -> None:
         draw_field(sample, "ux", options=FieldOptions(box=(0, 0, 0, 1)))
     with pytest.raises(ResultFileError, match="holds no load step"):
         draw_field(write_results(tmp_path / "b.h5", steps=0), "ux")
+    empty = open_results(tmp_path / "b.h5")
+    with pytest.raises(ResultFileError, match="holds no load step"):
+        empty.evaluate([[0.5, 0.5]])
+    with pytest.raises(ResultFileError, match="holds no load step"):
+        FieldPicture(empty, "mises", FieldOptions(), [])
     with pytest.raises(IndexError):
         draw_field(sample, "ux", step=6)
 

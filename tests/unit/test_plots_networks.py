@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
+from pbem.case.build import parse_model
 from pbem.results.animation import animate
 from pbem.results.page import Page
+from pbem.results.picture_limits import Limits
 from pbem.results.plots import BodyOptions, BodyPicture
 from pbem.results.reader import Results, open_results
 from pbem.results.trace_names import find_names, name_trace
@@ -39,6 +41,30 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     return open_results(path)
 
 
+@pytest.fixture(scope="module")
+def cut(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """A crack from -1 to 2 crossed at 0 by another one, and an arc that ends on the first: tips at one end only."""
+    tables = """
+        materials.m = { young = 1000.0, poisson = 0.2 }
+        curves.long = { points = [[-1, 0], [2, 0]], elements = 9, grading = "end" }
+        curves.short = { points = [[0, -1], [0, 1]], elements = 4 }
+        curves.arc = { center = [1.5, 0], radius = 0.5, angles = [90, 180], elements = 5 }
+        regions.plane = { material = "m", infinite = true, cracks = ["long", "short", "arc"] }
+        interfaces.long = { friction = 0.1 }
+        interfaces.short = { friction = 0.2 }
+        interfaces.arc = { friction = 0.2 }
+        remote.syy = -1.0
+        analysis.steps = 1
+    """
+    _, model = parse_model("\n".join(line.strip() for line in tables.splitlines()))
+    path = tmp_path_factory.mktemp("cut") / "a.h5"
+    mesh = make_mesh(model)
+    with ResultWriter(path, model, mesh, 1, "") as writer:
+        for step in make_steps(model, mesh):
+            writer.append(step)
+    return open_results(path)
+
+
 def test_segments_are_as_long_as_the_curves(results: Results) -> None:
     segments, lengths = list_segments(results)
     owner = results.pairs.interface
@@ -48,6 +74,44 @@ def test_segments_are_as_long_as_the_curves(results: Results) -> None:
         np.testing.assert_allclose(own[1:, 0], own[:-1, 2], atol=1e-14)
         ends = np.array([MODEL.curves[name].start, MODEL.curves[name].end])
         np.testing.assert_allclose(own[[0, -1], [0, 2]] @ [1, 1j], ends, atol=1e-12)
+
+
+def test_segments_of_cut_traces_end_where_the_traces_do(cut: Results) -> None:
+    segments, lengths = list_segments(cut)
+    trace = np.array([name_trace(name) for name in cut.pairs.names])[cut.pairs.interface]
+    expected = {
+        "long": ([-1, 2], [0, 0], 3.0), "short": ([0, 0], [-1, 1], 2.0), "arc": ([1, 1.5], [0, 0.5], np.pi / 4),
+    }  # fmt: skip
+    assert len(cut.pairs.names) > len(expected) == len(set(trace))
+    for name, (x, y, length) in expected.items():
+        own = segments[trace == name]
+        low, high = own.min(axis=(0, 1)), own.max(axis=(0, 1))
+        np.testing.assert_allclose([low[1], high[1]], y, atol=1e-9)
+        np.testing.assert_allclose([low[0], high[0]], x, atol=1e-9)
+        # The quadrature of arcs is not exact.
+        assert lengths[trace == name].sum() == pytest.approx(length, rel=1e-4 if name == "arc" else 1e-9)
+        drawn = np.hypot(*np.moveaxis(np.diff(own, axis=1), 2, 0)).sum(axis=1)
+        assert drawn.sum() == pytest.approx(length, rel=1e-2 if name == "arc" else 1e-9)
+    touching = cut.pairs.interface[1:] == cut.pairs.interface[:-1]
+    np.testing.assert_allclose(segments[1:, 0][touching], segments[:-1, 2][touching], atol=1e-9)
+    assert sum_orientations(cut, 0).length.sum() == pytest.approx(5 + np.pi / 4, rel=1e-5)
+
+
+def test_integrals_of_slip_are_those_of_the_results(cut: Results) -> None:
+    assert all((each.slip >= 0).all() for each in cut.contact.values())
+    integral = sum(each.integrate("slip")[0] for each in cut.contact.values())
+    assert sum_orientations(cut, 0).slip.sum() == pytest.approx(integral, rel=1e-12)
+
+
+@pytest.mark.parametrize(("values", "low"), [(0.0, 0.0), (2.0, 0.0), (-2.0, -3.0)])
+def test_colours_of_magnitudes_begin_at_zero(results: Results, values: float, low: float) -> None:
+    quantity = "slip" if values >= 0 else "traction_n"
+    picture = TracePicture(results, quantity, TraceOptions(), [5])
+    picture._values = {5: np.full(results.pairs.count, values)}
+    picture._limits = Limits(values, values, values, values)
+    figure = picture.draw(5)
+    lines = next(each for each in figure.axes[0].collections if each.get_array() is not None)
+    assert lines.get_clim()[0] == low < lines.get_clim()[1]
 
 
 @pytest.mark.parametrize("quantity", TRACES)
@@ -76,7 +140,9 @@ def test_orientations_sum_up_to_all(results: Results) -> None:
     found = sum_orientations(results, 5)
     _, lengths = list_segments(results)
     assert found.length.sum() == pytest.approx(lengths.sum())
-    assert found.slip.sum() == pytest.approx((lengths * np.abs(results.pairs.at("slip", 5))).sum())
+    # No slip changes its sign along a trace of the sample.
+    slip = sum(abs(each.integrate("slip")[5]) for each in results.contact.values())
+    assert found.slip.sum() == pytest.approx(slip)
     expected = np.zeros(BINS)
     for name in results.contact:
         along = MODEL.curves[name].end - MODEL.curves[name].start

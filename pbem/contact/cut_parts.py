@@ -9,6 +9,7 @@ between bodies.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -168,9 +169,12 @@ def name_block(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
 def _place(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
     own = (parts.first == body) | (parts.second == body)
     middles = 0.5 * (mesh.start[own] + mesh.end[own])
-    middle, least = complex(middles.mean()) + origin, ROUNDED * np.abs(middles - middles[0]).max()
+    size = float(np.abs(middles - middles[0]).max())
+    middle, least = complex(middles.mean()) + origin, ROUNDED * size
     x, y = (0.0 if abs(part) < least else part for part in (middle.real, middle.imag))
-    return f"({x:.4g}, {y:.4g})"
+    # On a map far from its origin a block is found by the digits behind.
+    digits = max(4, 2 + math.ceil(math.log10(max(abs(x), abs(y), size) / size)))
+    return f"({x:.{digits}g}, {y:.{digits}g})"
 
 
 def _move(points: Complex, directions: Complex, center: complex, scale: float) -> Real:

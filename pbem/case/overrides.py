@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeVar
 
 from pbem.case.writer import write_value
 from pbem.description.plain import make_plain
 from pbem.description.replacement import WRITTEN, split_key
 from pbem.errors import CaseError, Fault
 from pbem.wording import show
+
+T = TypeVar("T")
 
 # What is not TOML's notation is a text if it is one word, such as a name, a law or the path of a file.
 WORD = re.compile(r"[A-Za-z_][\w./-]*\Z")
@@ -46,7 +48,17 @@ def read_value(text: str) -> Any:
 
 def read_options(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:
     """Values by keys of options `KEY=VALUE`. Raises CaseError with all that are wrong."""
-    changes: dict[str, Any] = {}
+    return read_keyed(texts, read_value, NOTATION, option)
+
+
+def read_keyed(
+    texts: Iterable[str], read: Callable[[str], T], notation: str, option: str = "--set"
+) -> dict[str, T]:
+    """What `read` makes of the values of options `KEY=VALUE`, by keys; it raises WrongValueError.
+
+    notation: what is expected instead. Raises CaseError with all that are wrong.
+    """
+    found: dict[str, T] = {}
     faults = []
     for text in texts:
         place = f"{option} {text}"
@@ -54,15 +66,15 @@ def read_options(texts: Iterable[str], option: str = "--set") -> dict[str, Any]:
             key, value = split_override(text)
             if split_key(key) is None:
                 faults.append(Fault(place, f"the key {show(key)}", WRITTEN))
-            elif key in changes:
+            elif key in found:
                 faults.append(Fault(place, f"the key {show(key)} again", "each key once"))
             else:
-                changes[key] = read_value(value)
+                found[key] = read(value)
         except WrongValueError as error:
-            faults.append(Fault(place, str(error), NOTATION))
+            faults.append(Fault(place, str(error), notation))
     if faults:
         raise CaseError(COMMAND_LINE, tuple(faults))
-    return changes
+    return found
 
 
 def write_overrides(changes: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pbem.case.overrides import COMMAND_LINE, WrongValueError, read_value, split_override
+from pbem.case.overrides import WrongValueError, read_keyed, read_value
 from pbem.case.writer import write_value
 from pbem.description.plain import make_plain
 from pbem.description.replacement import WRITTEN, split_key
@@ -26,23 +26,7 @@ _RANGE = re.compile(r"([^:]+):([^:]+):([^:]+)\Z")
 
 def read_values(texts: Iterable[str]) -> dict[str, list[Any]]:
     """Values by keys of options `KEY=a,b,c` and `KEY=from:to:count`. Raises CaseError with all that are wrong."""
-    found: dict[str, list[Any]] = {}
-    faults = []
-    for text in texts:
-        place = f"--set {text}"
-        try:
-            key, value = split_override(text)
-            if split_key(key) is None:
-                faults.append(Fault(place, f"the key {show(key)}", WRITTEN))
-            elif key in found:
-                faults.append(Fault(place, f"the key {show(key)} again", "each key once"))
-            else:
-                found[key] = [each for part in split_list(value) for each in _read_part(part)]
-        except WrongValueError as error:
-            faults.append(Fault(place, str(error), SEVERAL))
-    if faults:
-        raise CaseError(COMMAND_LINE, tuple(faults))
-    return found
+    return read_keyed(texts, lambda value: [each for part in split_list(value) for each in _read_part(part)], SEVERAL)
 
 
 def _read_part(text: str) -> list[Any]:

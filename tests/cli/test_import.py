@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 import pytest
 
@@ -214,7 +215,6 @@ def write_dxf(*entities: Sequence[object]) -> str:
 
 
 def test_drawings_of_all_kinds(capsys: Capture) -> None:
-    pytest.importorskip("ezdxf")
     line = (0, "LINE", 8, 0, 10, 0, 20, 0, 11, 2, 21, 0)
     polyline = (0, "POLYLINE", 8, 0, 66, 1, 70, 0, 0, "VERTEX", 8, 0, 10, 0, 20, 5, 42, 1,
                 0, "VERTEX", 8, 0, 10, 2, 20, 5, 0, "VERTEX", 8, 0, 10, 4, 20, 5, 0, "SEQEND")
@@ -265,8 +265,6 @@ def test_drawings_of_all_kinds(capsys: Capture) -> None:
     ("map.shp", "x", "found a file name that ends in '.shp'; expected .geojson"),
 ])  # fmt: skip
 def test_wrong_files_are_refused_with_their_place(name: str, text: str, expected: str, capsys: Capture) -> None:
-    if name.endswith(".dxf"):
-        pytest.importorskip("ezdxf")
     Path(name).write_text(text, encoding="utf-8")
     if "of type 5" in expected:
         Path(name).write_text(write_2(make_block(2, 2)).replace(" 3 2 1 1 ", " 5 2 1 1 ", 1), encoding="utf-8")
@@ -376,7 +374,6 @@ def test_a_wide_plate_with_a_hole_has_kirschs_stresses() -> None:
 
 @pytest.mark.filterwarnings("ignore")  # of the library that writes the file
 def test_binary_meshes_are_read_by_meshio() -> None:
-    meshio = pytest.importorskip("meshio")
     expected = bring_in("ring.msh", write_2(make_ring(24, 3, 1.0, 2.0)))
     meshio.gmsh.write("binary.msh", meshio.gmsh.read("ring.msh"), fmt_version="2.2", binary=True)
     assert main(["import", "binary.msh", "-o", "binary.toml"]) == 0
@@ -419,6 +416,5 @@ def test_options_of_maps_are_refused_for_meshes(capsys: Capture) -> None:
 def test_mutants(folder: Path) -> None:
     from scripts.fuzz_import import try_mutant
 
-    pytest.importorskip("ezdxf")
     ends = [try_mutant(seed, folder) for seed in range(1000, 1012)]
     assert {end for end, _ in ends} == {"accepted", "refused"}, [said for end, said in ends if end == "wrong"]

@@ -49,8 +49,8 @@ from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
-from pbem.solve.problem.step import Reporter, SilentReporter, Step
-from pbem.solve.steps.march import march, start_from
+from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
+from pbem.solve.steps.march import go_on, march, note_place, resume_modes, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
@@ -253,6 +253,7 @@ def _fill(
     if model.analysis.accuracy is not None:
         do_on_first(comm, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
     last: Step | None = broadcast(comm, writer.last_step if writer else None)
+    unfinished: Unfinished | None = broadcast(comm, writer.unfinished if writer else None)
     signals.at_once = comm.size == 1
     with clock.piece("assembly"):
         problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
@@ -266,10 +267,10 @@ def _fill(
             interior.prepare(problem.system)
     start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
     with clock.piece("estimate"):
-        estimator = make_estimator(model, mesh, last, comm, kept)
+        estimator = make_estimator(model, mesh, last, comm, kept, signals)
     tangent = kept.take_tangent(problem) if kept else None
     try:
-        steps = clock.each("steps", march(problem, watch, start, tangent))
+        steps = clock.each("steps", march(problem, watch, start, tangent, go_on(unfinished)))
         store_steps(steps, model.output_every, interior, writer, watch, estimator, comm)
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
@@ -337,9 +338,7 @@ def _end_pass(writer: ResultWriter, decision: Decision) -> None:
         writer.fail("accuracy", "a finer mesh was to follow", "stopped")
 
 
-def _append(
-    writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | None, missing: str
-) -> tuple[str, ...]:
+def _append(writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | None, missing: str) -> tuple[str, ...]:
     if writer is None:
         return ()
     notes = writer.append(step, rows)
@@ -349,7 +348,8 @@ def _append(
 
 
 def make_estimator(
-    model: Model, mesh: Mesh, start: Step | None = None, comm: Comm = world, kept: KeptProblems | None = None
+    model: Model, mesh: Mesh, start: Step | None = None, comm: Comm = world, kept: KeptProblems | None = None,
+    signals: StopSignals | None = None,
 ) -> Estimator:
     """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
     beside, second, missing = None, None, ""
@@ -357,7 +357,7 @@ def make_estimator(
         beside = put_beside(model, mesh)
         if beside is not None:  # it has fewer nodes, perhaps fewer than there are ranks
             check_shares(beside.model, beside.mesh, comm.size)
-        second = None if beside is None else SecondSolution(beside, comm, start, kept)
+        second = None if beside is None else SecondSolution(beside, comm, start, kept, signals)
         missing = NOTHING_COARSER if beside is None else ""
     except PbemError as error:
         missing = f"the second solution cannot be computed ({error})"
@@ -379,7 +379,7 @@ def store_steps(
             if interior is not None and stored:
                 with clock.piece("evaluation"):
                     step = replace(step, interior=interior.evaluate(step))
-            with clock.piece("estimate"):
+            with clock.piece("estimate"), note_place(step.stage, step.factor, resume_modes(step.contact)):
                 rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
             missing = "" if estimator is None else estimator.missing

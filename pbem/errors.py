@@ -98,13 +98,15 @@ class ConvergenceError(PbemError):
 class StopError(PbemError):
     """A run was told to stop, or cannot go on here; a later one can go on from its file.
 
-    reason: a short name, e.g. "SIGTERM"; detail: a sentence; code: the exit code of the program.
+    reason: a short name, e.g. "SIGTERM"; detail: a sentence; code: the exit code of the program. unfinished: where the
+    search for the contact statuses was (`pbem.solve.problem.step.Unfinished`), once those who know have said it.
     """
 
     def __init__(self, reason: str, detail: str, code: int = 1) -> None:
         self.reason = reason
         self.detail = detail
         self.code = code
+        self.unfinished: Any = None
         super().__init__(f"{reason}: {detail}")
 
 

@@ -24,7 +24,8 @@ T = TypeVar("T")
 PETSC_ERR_MEM, PETSC_ERR_LIB = 55, 76
 # How PETSc tells that MUMPS could not allocate what it needs to solve.
 MUMPS_LACKS_MEMORY = re.compile(r"\bMUMPS\b.*INFOG\(1\) ?= ?-(5|7|13|19|22|29)\b")
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
+# SIGUSR1 is what batch systems send some time before the end, where they are asked to.
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGXCPU)
 
 Comm = MPI.Intracomm
 

@@ -34,7 +34,7 @@ exit code: 0 finished; 1 unexpected error; 2 the case, the command line or the l
 3 not converged at the smallest step, the file holds every step reached (see `pbem help convergence`);
 1 also: out of memory, no room on the disk, a custom law that failed, or nobody reads the progress any more;
 128 + n stopped by signal n (130: SIGINT, Ctrl-C; 143: SIGTERM). After 1, 3 and 128 + n --resume goes on after the
-last step that the file holds."""
+last step that the file holds; after a signal with the contact statuses that the search in the next step had reached."""
 
 
 def add_run_options(run: argparse.ArgumentParser) -> None:

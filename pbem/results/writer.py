@@ -42,8 +42,9 @@ from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, name_stages, read_last_energy, read_last_step, truncate
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
+from pbem.results.unfinished import drop_unfinished, read_unfinished, write_unfinished
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
-from pbem.solve.problem.step import Interior, Iteration, Step
+from pbem.solve.problem.step import Interior, Iteration, Step, Unfinished
 
 # What ends a run though nothing is wrong with it.
 STOPPED = (MemoryError, StorageError, BrokenPipeError)
@@ -64,7 +65,8 @@ class ResultWriter:
     interior_region (q,): index of the region of every interior point (-1 outside of all), from `InteriorField`; needed
     if the model has such points.
 
-    last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one.
+    last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one. unfinished: the
+    step after it in which the run was stopped, or None.
     """
 
     def __init__(
@@ -117,6 +119,8 @@ class ResultWriter:
                 name_stages(file, model)
             writer = cls.__new__(cls)
             writer._start(target, storage, model, mesh, last_step, reached)
+            with refuse_damage(target):
+                writer.unfinished = read_unfinished(file, writer._pairs)
             storage.commit()
         except OSError as error:
             storage.drop()
@@ -132,6 +136,7 @@ class ResultWriter:
         self.path = path
         self._model, self._mesh = model, mesh
         self.last_step = last_step
+        self.unfinished: Unfinished | None = None
         self._storage = storage
         self._every = max(1, model.output_every)
         faces = list_faces(mesh)
@@ -159,6 +164,7 @@ class ResultWriter:
         Raises StorageError if the disk has no room for it, LawError if a custom law fails; the file then holds the
         steps before.
         """
+        drop_unfinished(self._file)
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         table = self._file["convergence"]
         # Files of earlier versions that are resumed have fewer columns.
@@ -308,6 +314,8 @@ class ResultWriter:
         with suppress(Exception):
             if self._storage.is_open and self._storage.dirty:
                 self._storage.roll_back()  # it ended within a step
+            if self._storage.is_open and isinstance(error, StopError) and error.unfinished is not None:
+                write_unfinished(self._file, error.unfinished, self._pairs)
             self._close(reasons["status"], reasons)
         self._storage.drop()
         return reasons

@@ -32,9 +32,12 @@ class SecondSolution:
     """Marches on the coarser mesh behind a run; all ranks together, with the same numbers on all."""
 
     def __init__(
-        self, beside: Beside, comm: MPI.Intracomm, start: Step | None = None, kept: KeptProblems | None = None
+        self, beside: Beside, comm: MPI.Intracomm, start: Step | None = None, kept: KeptProblems | None = None,
+        signals: StopSignals | None = None,
     ) -> None:
         """Begins at rest, or with the memory of a step of the run, carried over; with what earlier ones have kept.
+
+        signals: those by which the run is stopped; then StopError leaves `follow`.
 
         Raises ConvergenceError where the operator cannot be assembled well enough.
         """
@@ -44,7 +47,7 @@ class SecondSolution:
         self.tangent: TangentOperator = kept.take_tangent(self.problem) if kept else self.problem.make_tangent()
         self._kept = kept is not None
         self.memory: Memory = start_memory(self.problem.laws)
-        self._watch = Watch(comm, SilentReporter(), StopSignals())
+        self._watch = Watch(comm, SilentReporter(), signals or StopSignals())
         self._watch.look_after(self.problem.laws)
         if start is not None:
             self._take_over(start.contact)

@@ -25,7 +25,7 @@ from pbem.contact.modes import (
     update_active_set,
 )
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import run_cascade
 from pbem.solve.nonlinear.fixed_point import FixedPoint
@@ -165,7 +165,7 @@ def _search_modes(
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin, problem, products))
         products = problem.system.products
-        reporter.iterate(iterations[-1])
+        _tell(reporter, iterations[-1], modes)
         driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
         if driven:
             search.restart()
@@ -211,6 +211,15 @@ def _search_modes(
         slip = choose_slip(laws, modes, memory, slip, found, former)
         if search.just_returned:
             kept = (modes, normal_traction, slip)
+
+
+def _tell(reporter: Reporter, iteration: Iteration, modes: ModeState) -> None:
+    """Report an iteration; where the run is stopped by that, say with which modes a search can go on."""
+    try:
+        reporter.iterate(iteration)
+    except StopError as stop:
+        stop.unfinished = modes
+        raise
 
 
 def _go_on(forcing: Forcing, search: Search) -> bool:

@@ -34,6 +34,20 @@ class Iteration:
 
 
 @dataclass(frozen=True)
+class Unfinished:
+    """Where the search for the contact statuses of a load step was when the run was stopped.
+
+    stage: index; factor: of the step, the fraction of the stage at its end; mode (m,) int8 and sign (m,) of the
+    friction traction, in the order of Mesh.pairs: with them the search goes on.
+    """
+
+    stage: int
+    factor: float
+    mode: NDArray[np.int8]
+    sign: Real
+
+
+@dataclass(frozen=True)
 class ContactState:
     """State of all m contact pairs, in the order of Mesh.pairs.
 

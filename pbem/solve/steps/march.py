@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,10 +11,10 @@ import numpy as np
 
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.contact.loads import Load
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, StopError
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.step import ContactState, Reporter, Step
+from pbem.solve.problem.step import ContactState, Reporter, Step, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.ceiling import SAFE, Ceiling
 from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, refuse_load
@@ -44,12 +45,30 @@ def start_from_rest(problem: Problem) -> Start:
     return Start(0, 0, 0.0, start_memory(problem.laws))
 
 
+def resume_modes(contact: ContactState) -> ModeState:
+    """The modes of a step that was reached."""
+    return ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
+
+
 def start_from(problem: Problem, number: int, stage: int, factor: float, contact: ContactState) -> Start:
     """The state of a stored step."""
-    modes = ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
+    modes = resume_modes(contact)
     elastic = problem.laws.compliance_s * contact.traction_s
     memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n)
     return Start(number, stage, factor, memory)
+
+
+def go_on(unfinished: Unfinished | None) -> Guess | None:
+    """The modes with which the step begins in which a run was stopped."""
+    if unfinished is None:
+        return None
+    modes = ModeState(unfinished.mode, unfinished.sign)
+
+    def guess(stage: int, factor: float) -> ModeState | None:
+        same = stage == unfinished.stage and abs(factor - unfinished.factor) <= 1e-12
+        return modes if same else None
+
+    return guess
 
 
 def march(
@@ -84,7 +103,8 @@ def march(
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)
                 depth = note_passing(problem, step, depth, reporter)
-                reporter.accept(step)
+                with note_place(stage, reached, solution.modes):
+                    reporter.accept(step)
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
@@ -115,8 +135,9 @@ def _advance(
         try:
             load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
             begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
-            solution = _solve_guessed(problem, tangent, begin, load, reporter, guess and guess(stage, target))
-            solution = solution or solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
+            with note_place(stage, target):
+                solution = _solve_guessed(problem, tangent, begin, load, reporter, guess and guess(stage, target))
+                solution = solution or solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
             balanced = find_balanced(problem, memory, stage, reached, target)
@@ -147,6 +168,18 @@ def _solve_guessed(
     except ConvergenceError:
         return None
     return replace(solution, memory=replace(solution.memory, modes=begin.modes))
+
+
+@contextmanager
+def note_place(stage: int, factor: float, modes: ModeState | None = None) -> Iterator[None]:
+    """Where the run is stopped within, say in which step, and with which modes of the pairs it can go on."""
+    try:
+        yield
+    except StopError as stop:
+        known = modes or stop.unfinished
+        if known is not None:
+            stop.unfinished = Unfinished(stage, factor, known.mode, known.sign)
+        raise
 
 
 def _never(_: Memory) -> ConvergenceError | None:

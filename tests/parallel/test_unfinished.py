@@ -1,0 +1,103 @@
+"""A run that is stopped within a load step goes on with the contact statuses that the search had reached."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import pbem
+from pbem.cli import main
+from pbem.results.reader import Results, open_results
+from tests.parallel.launch import launch_snippet
+
+# Cracks in one load step: their statuses take a number of iterations.
+MAKE = ("make", "cracks", "-o", "case.toml", "--count", "40", "--density", "0.15", "--orientation", "30",
+        "--orientation-spread", "40", "--sxx", "-1", "--syy", "-3", "--sxy", "1", "--friction", "0.4",
+        "--elements", "4")
+
+# The command line, with a signal to one rank in its Newton iteration of this number, counted through the process.
+STOPPING = """
+import os, signal, sys
+from pbem.cli import main
+import pbem.solve.nonlinear.newton as newton
+from pbem.parallel import world
+
+name, number, rank, *arguments = sys.argv[1:]
+whole = newton._judge
+done = 0
+
+def judge(*given):
+    global done
+    done += 1
+    if done == int(number) and world.rank == int(rank):
+        os.kill(os.getpid(), getattr(signal, name))
+    return whole(*given)
+
+newton._judge = judge
+sys.exit(main(arguments))
+"""
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
+    """The results of the uninterrupted run, on one rank."""
+    folder = tmp_path_factory.mktemp("whole")
+    make_case(folder)
+    yield pbem.run(folder / "case.toml", folder / "case.h5")
+
+
+def make_case(folder: Path) -> None:
+    words = list(MAKE)
+    words[3] = str(folder / words[3])
+    assert main(words) == 0
+
+
+def count_iterations(path: Path) -> int:
+    with h5py.File(path) as file:
+        return len(file["convergence"])
+
+
+@pytest.mark.parametrize(("name", "ranks", "rank", "others"), [("SIGUSR1", 1, 0, 2), ("SIGTERM", 2, 1, 1)])
+def test_the_search_goes_on_with_the_statuses_that_it_had(
+    name: str, ranks: int, rank: int, others: int, tmp_path: Path, whole: Results
+) -> None:
+    make_case(tmp_path)
+    path, before = tmp_path / "case.h5", count_iterations(whole.path)
+    assert before >= 4
+    done = launch_snippet(ranks, STOPPING, name, str(before), str(rank), "run", "case.toml", "--quiet", cwd=tmp_path)
+    assert done.returncode == 128 + int(getattr(signal, name)), done.stderr
+    assert (open_results(path).status, len(open_results(path).steps)) == ("stopped", 0)
+    again = launch_snippet(others, STOPPING, name, "999", "0", "run", "case.toml", "--resume", "--quiet", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert count_iterations(path) <= 2
+    expect_alike(open_results(path), whole)
+    with h5py.File(path) as file:
+        assert "unfinished" not in file
+
+
+def test_a_run_that_is_stopped_during_the_estimate_does_not_lose_the_step(tmp_path: Path, whole: Results) -> None:
+    """The estimate is made before the step is stored: that of the resumed run is that of the whole one."""
+    make_case(tmp_path)
+    path, before = tmp_path / "case.h5", count_iterations(whole.path)
+    done = launch_snippet(
+        1, STOPPING, "SIGTERM", str(before + 1), "0", "run", "case.toml", "--quiet", cwd=tmp_path)
+    assert done.returncode == 143, done.stderr
+    assert len(open_results(path).steps) == 0
+    pbem.run(tmp_path / "case.toml", path, resume=True)
+    assert count_iterations(path) == 1
+    expect_alike(open_results(path), whole)
+    for kind, values in whole.errors.relative.items():
+        np.testing.assert_allclose(open_results(path).errors.relative[kind], values, rtol=1e-6)
+
+
+def expect_alike(results: Results, whole: Results) -> None:
+    assert (results.status, len(results.steps)) == ("finished", len(whole.steps))
+    for name in whole.contact:
+        one, other = results.contact[name], whole.contact[name]
+        np.testing.assert_array_equal(one.mode, other.mode)
+        np.testing.assert_allclose(one.slip, other.slip, atol=1e-9 * np.abs(other.slip).max())

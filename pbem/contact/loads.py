@@ -9,6 +9,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
+from pbem.bem.point_field import PointField
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.in_situ import AT_REST
@@ -41,6 +42,7 @@ class Load:
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
+    point_force: of the point loads on an infinite region (complex); net_force: that of their fields far away.
     """
 
     values: Real
@@ -48,6 +50,8 @@ class Load:
     known: Real
     far: Complex
     background: Complex
+    point_force: complex = 0j
+    net_force: complex = 0j
 
 
 def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
@@ -98,7 +102,10 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
                  for name in model.conditions]
         values[:, direction] = _blend_all(pairs, outer.condition, outer.places, moment)
     remote = interpolate(before.remote, after.remote)
-    balanced = _sample(mesh, [balanced_background(model, region, stage, factor) for region in model.regions])
+    backgrounds = [balanced_background(model, region, stage, factor) for region in model.regions]
+    balanced = _sample(mesh, backgrounds)
+    points = [each for region, background in zip(model.regions, backgrounds, strict=True) if region.infinite
+              for each in background.points]
     far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
@@ -107,6 +114,8 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
+        point_force=sum((each.force for each in points), 0j),
+        net_force=sum((each.net_force for each in points), 0j),
     )
 
 
@@ -146,7 +155,7 @@ def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
 
 
 def balanced_background(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:
-    """In-situ stress, weight and swelling of a region at the fraction `factor` of a stage.
+    """In-situ stress, weight, swelling and point loads of a region at the fraction `factor` of a stage.
 
     Where the stress grows with the coordinates it balances a weight that acts from the start (theory, 6).
     """
@@ -160,8 +169,20 @@ def balanced_background(model: Model, region: Region, stage: int, factor: float)
     before = model.stages[stage - 1].swelling if stage > 0 else {}
     grown = before.get(region.name, NO_SWELLING).mix(model.stages[stage].swelling.get(region.name, NO_SWELLING), factor)
     return ParticularSolution(
-        region.material, initial=initial, force=force, carried=carried, center=center, swelling=grown
+        region.material, initial=initial, force=force, carried=carried, center=center, swelling=grown,
+        points=_find_points(model, region, stage, factor),
     )
+
+
+def _find_points(model: Model, region: Region, stage: int, factor: float) -> tuple[PointField, ...]:
+    """The fields of the point loads of a region at the fraction `factor` of a stage."""
+    before = model.stages[stage - 1].point_forces if stage > 0 else {}
+    after, fields = model.stages[stage].point_forces, []
+    for load in model.point_loads_by_region.get(region.name, ()):
+        start, end = np.array(before.get(load.name, (0.0, 0.0, 0.0))), np.array(after[load.name])
+        x, y, moment = (float(value) for value in start + factor * (end - start))
+        fields.append(PointField(load, complex(x, y), moment, model.logarithm_lengths[region.name]))
+    return tuple(each for each in fields if not each.is_zero)
 
 
 def _find_center(model: Model, region: Region) -> complex:

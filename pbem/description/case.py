@@ -28,6 +28,7 @@ from pbem.description.schema import (
     LawTable,
     MaterialTable,
     OutputTable,
+    PointLoadTable,
     RegionTable,
     SolverTable,
     StageTable,
@@ -70,6 +71,7 @@ class Case:
     initial_stress: Mapping[str, InSituTable]
     temperature: Mapping[str, float | ExpressionTable]
     eigenstrain: Mapping[str, EigenstrainTable]
+    point_loads: Mapping[str, PointLoadTable]
     analysis: AnalysisTable
     stages: tuple[StageTable, ...]
     solver: SolverTable
@@ -263,5 +265,5 @@ def _concerns_loads(path: KeyPath) -> bool:
     """Whether a fault here leaves open what holds and what loads the bodies."""
     if path and path[0] == "materials":
         return path[-1] == "density"
-    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
+    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads") or
                            path[0] not in CaseFile.model_fields)

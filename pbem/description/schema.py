@@ -267,6 +267,20 @@ class EigenstrainTable(Table):
     ezz: Number = Field(0.0, description="across the plane; without effect in plane stress")
 
 
+class PointForceTable(Table):
+    """Force and moment at a point, per thickness."""
+
+    fx: Number = Field(0.0, description="force along x")
+    fy: Number = Field(0.0, description="force along y")
+    moment: Number = Field(0.0, description="moment, counter-clockwise; inside regions only")
+
+
+class PointLoadTable(PointForceTable):
+    """A force at a point inside a region or on the boundary of one. NAME is of your choice."""
+
+    at: Point = Field(description="x, y of the point")
+
+
 class GravityTable(Table):
     """Acceleration; a region's weight per volume is its density times this."""
 
@@ -320,6 +334,7 @@ class StageTable(Table):
     gravity: GravityTable | None = Field(None, description="`gx`, `gy` at the end of the stage")
     temperature: Mapping[str, LinearValue] = Field({}, description="of a region at the end of the stage")
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
+    point_loads: Mapping[str, PointForceTable] = Field({}, description="`fx`, `fy`, `moment` at the end of the stage")
 
 
 class SolverTable(Table):
@@ -384,6 +399,10 @@ class CaseFile(Table):
     )
     eigenstrain: Mapping[str, EigenstrainTable] = Field(
         {}, description="Strain of a region that has no stress by itself (misfit, swelling, shrinkage), times the load."
+    )
+    point_loads: Mapping[str, PointLoadTable] = Field(
+        {}, description="A force, and inside a region a moment, at a single point: inside a region, or on the boundary "
+        "of one where no displacement is prescribed. Values are those at the end of the load. NAME is of your choice."
     )
     analysis: AnalysisTable = AnalysisTable()
     stages: tuple[StageTable, ...] = ()

@@ -26,10 +26,11 @@ from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
 from pbem.model.law import check_along
-from pbem.model.loading import Loading, read_loading
+from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.resultants import describe_unbalance
@@ -52,6 +53,7 @@ class _Topology:
     loops: Loops
     tips: Mapping[str, tuple[bool, bool]]
     size: float
+    points: PointLoads
     notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
@@ -92,7 +94,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     cut = cut_cracks(case, roles, shape_curves(case, roles))
     case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
-    topology = _find_topology(cut)
+    topology = _find_topology(cut, loading)
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
@@ -119,10 +121,11 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     return model, case, faults
 
 
-def _find_topology(cut: Cut) -> _Topology:
+def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     case, roles, shapes = cut.case, cut.roles, cut.shapes
     split = split_at_junctions(shapes.curves, shapes.tolerance)
-    curves = split.curves
+    loaded = [complex(*table.at) for table in case.point_loads.values()]
+    curves, places = split_at_points(split.curves, shapes.tolerance, loaded)
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
     # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.
@@ -147,11 +150,16 @@ def _find_topology(cut: Cut) -> _Topology:
         seats = split_opposite_ends(curves, loops, roles.contacts, written)
         curves, opposite = seats.curves, seats.opposite
         notes += seats.notes
+    points = PointLoads({}, (), ())
+    if not faults:
+        points = place_point_loads(case, roles, curves, loops, places, list_held(loading.conditions))
+        faults += points.faults
+        notes += points.notes
     tips = find_tips(curves, cracks)
     curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))
+    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, tuple(notes), tuple(faults))
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
@@ -201,6 +209,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         contacts=loading.contacts,
         groups=case.groups,
         ties=fitted.ties,
+        point_loads=topology.points.loads,
     )
     return replace(model, notes=(*model.notes, *_note_loads(model))), list(fitted.faults)
 
@@ -221,12 +230,13 @@ def _note_loads(model: Model) -> list[str]:
         *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
         *(stage.gravity if weights else ()))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
+    loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
     loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]
     return [] if any(loads) else [
         "No load: all prescribed displacements and tractions, pressures, stresses far away, weights, in-situ stresses, "
-        "swellings and interferences are zero, and so will be the results."
+        "swellings, point loads and interferences are zero, and so will be the results."
     ]
 
 
@@ -235,6 +245,14 @@ def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
               for loop in region.loops for side in loop.sides}
     return any(0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
                for stiffness in condition.stiffness)
+
+
+def _leave_out_point_loads(model: Model) -> Model:
+    """The model without weight and point loads, which may have a net force on an infinite region."""
+    none = {name: (0.0, 0.0, 0.0) for name in model.point_loads}
+    return replace(model, stages=tuple(
+        replace(stage, gravity=(0.0, 0.0), point_forces=none) for stage in model.stages
+    ))
 
 
 def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
@@ -255,13 +273,17 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
         name = next(each.name for each in moving if each.infinite)
-        weightless = replace(model, stages=tuple(replace(stage, gravity=(0.0, 0.0)) for stage in model.stages))
-        unbalance = describe_unbalance(weightless, motion, moving)
-        if unbalance is None and describe_unbalance(model, motion, moving):
-            notes.append(f"The weight of what lies in the infinite region '{name}' is a net force on it: its "
+        unbalance = describe_unbalance(model, motion, moving)
+        if unbalance is None:
+            continue
+        if describe_unbalance(_leave_out_point_loads(model), motion, moving) is None:
+            what = "Point loads on" if any(load.region in motion.regions for load in model.point_loads.values()) else (
+                "The weight of what lies in")
+            verb = "are" if what.startswith("Point") else "is"
+            notes.append(f"{what} the infinite region '{name}' {verb} a net force on it: its "
                          "displacement grows with the logarithm of the distance, so that only stresses, and "
                          "displacements of one point against another, mean anything.")
-        elif unbalance is not None:
+        else:
             found = f"a net force on the infinite region '{name}': {unbalance}"
             expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "
                         "logarithm of the distance and has no value; or a finite region that is held")

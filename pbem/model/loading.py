@@ -15,6 +15,7 @@ from pbem.model.given import read_value
 from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
+from pbem.model.point_loads import read_point_forces
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
@@ -75,9 +76,13 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     faults += backgrounds.faults
     swellings = read_swellings(case, find_corners(case))
     faults += swellings.faults
+    point_forces, wrong = read_point_forces(case)
+    faults += wrong
     stages = tuple(
-        replace(stage, swelling=swelling) for stage, swelling in
-        zip(_find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, strict=True)
+        replace(stage, swelling=swelling, point_forces=forces) for stage, swelling, forces in zip(
+            _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, point_forces,
+            strict=True,
+        )
     )
     faults += _check_durations(case, joints, stages)
     return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress,
@@ -189,6 +194,16 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
             if known[direction] is None:
                 known[direction], where[direction] = quantity, str(written[-1])
     return Condition(curve, frame or "global", (known[0] or "traction", known[1] or "traction"), stiffness), faults
+
+
+def list_held(conditions: Mapping[str, Condition]) -> dict[str, tuple[str, ...]]:
+    """The curves on which displacements are prescribed, with the keys that do."""
+    held = {
+        name: tuple(key for key, (frame, direction, quantity) in _KEYS.items() if quantity == "displacement"
+                    and frame == condition.frame and condition.known[direction] == quantity)
+        for name, condition in conditions.items()
+    }
+    return {name: keys for name, keys in held.items() if keys}
 
 
 def _is_late(case: Case, curve: str, order: int) -> bool:

@@ -8,10 +8,11 @@ from functools import cached_property
 from typing import Literal
 
 from pbem.description.generation import GeneratedGroup
-from pbem.geometry.curve import Curve, find_middle
+from pbem.geometry.curve import Curve, find_middle, measure_spread
 from pbem.geometry.loop import Loop
 from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
+from pbem.model.point_loads import Force, PointLoad
 from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
@@ -113,6 +114,7 @@ class Stage:
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
     infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
+    point_forces: force along x and y and moment of every point load.
     """
 
     name: str
@@ -123,6 +125,7 @@ class Stage:
     gravity: tuple[float, float] = (0.0, 0.0)
     duration: float = 0.0
     swelling: Mapping[str, Swelling] = field(default_factory=dict)
+    point_forces: Mapping[str, Force] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:
@@ -178,7 +181,7 @@ class Model:
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
     were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
-    notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
+    point_loads: where forces act at single points. notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
     title: str
@@ -206,6 +209,7 @@ class Model:
     law_texts: Mapping[str, str] = field(default_factory=dict)
     overrides: str = ""
     origin: complex = 0j
+    point_loads: Mapping[str, PointLoad] = field(default_factory=dict)
 
     @cached_property
     def timed(self) -> bool:
@@ -221,6 +225,24 @@ class Model:
     def middle(self) -> complex:
         """The mean place of all curves, which the strain of stress far away does not move."""
         return find_middle(self.curves)
+
+    @cached_property
+    def point_loads_by_region(self) -> dict[str, tuple[PointLoad, ...]]:
+        """The point loads of every region that has any."""
+        regions = dict.fromkeys(load.region for load in self.point_loads.values())
+        return {
+            name: tuple(load for load in self.point_loads.values() if load.region == name) for name in regions
+        }
+
+    @cached_property
+    def logarithm_lengths(self) -> dict[str, float]:
+        """The unit of the logarithm in the equations of every region with point loads: `bem.operator.collect_sources`.
+        """
+        return {
+            region.name: 8 * measure_spread(self.curves, (
+                *(side.curve for loop in region.loops for side in loop.sides), *region.cracks))
+            for region in self.regions if region.name in self.point_loads_by_region
+        }  # fmt: skip
 
     @property
     def finite_regions(self) -> list[int]:

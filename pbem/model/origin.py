@@ -74,5 +74,6 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
             replace(stage, swelling={name: each.move(origin) for name, each in stage.swelling.items()})
             for stage in model.stages
         ),
+        point_loads={name: load.move(origin) for name, load in model.point_loads.items()},
         initial_stress={name: stress.move(origin) for name, stress in model.initial_stress.items()},
     )

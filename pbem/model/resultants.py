@@ -15,6 +15,7 @@ from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.model.varying import Places, Value, Varying, evaluate, negate
+from pbem.wording import list_names
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
 BALANCED = 1e-9
@@ -39,7 +40,9 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
             if abs(power) <= least * scale:
                 continue
             about = format_point(model.origin)
-            loads = "tractions and weight" if any(stage.gravity) else "tractions"
+            kinds = ["tractions", *(["weight"] if any(stage.gravity) else []),
+                     *(["point loads"] if any(map(any, stage.point_forces.values())) else [])]
+            loads = list_names(kinds)
             return (
                 f"the {loads} of stage '{stage.name}' drive it, with resultant "
                 f"{format_point(force)} and moment {moment:.6g} about {about}"
@@ -62,6 +65,13 @@ def _sum_tractions(
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
     for region in moving:
         a, spin = motion.velocities[region.name]
+        for load in model.point_loads_by_region.get(region.name, ()):
+            x, y, own_moment = stage.point_forces[load.name]
+            own, moved = complex(x, y), a + 1j * spin * load.place
+            force += own
+            moment += float((np.conj(load.place) * own).imag) + own_moment
+            power += float((np.conj(own) * moved).real) + own_moment * spin
+            scale += abs(own) * (abs(a) + abs(spin * load.place)) + abs(own_moment * spin)
         weight, lever = _weigh(model, region, stage)
         force += weight
         moment += float((np.conj(lever) * weight).imag)

@@ -251,7 +251,7 @@ class ResultWriter:
         """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
         initial = [balanced for balanced, _ in evaluate_particular_solutions(self._model, step.stage, step.factor)]
         kinds: dict[Hashable, int] = {}
-        kind_of = [kinds.setdefault((each.material, each.initial, each.swelling), len(kinds)) for each in initial]
+        kind_of = [kinds.setdefault((each.material, each.initial, each.swelling, each.points), len(kinds)) for each in initial]
         mesh = self._mesh
         if mesh.order > 0:  # else the stretch is told by neighbours of the same region
             mesh = replace(mesh, region=np.array(kind_of)[mesh.region])

@@ -42,7 +42,7 @@ class Load:
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
-    point_force: of the point loads on an infinite region (complex); net_force: that of their fields far away.
+    of_points (nodes,): the displacement of point loads' fields, a part of the background. point_force: of those on an infinite region (complex); net_force: that of their fields far away.
     """
 
     values: Real
@@ -50,6 +50,7 @@ class Load:
     known: Real
     far: Complex
     background: Complex
+    of_points: Complex
     point_force: complex = 0j
     net_force: complex = 0j
 
@@ -114,6 +115,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
+        of_points=_sample(mesh, [each.of_points for each in backgrounds])[0],
         point_force=sum((each.force for each in points), 0j),
         net_force=sum((each.net_force for each in points), 0j),
     )

@@ -29,6 +29,7 @@ from pbem.description.schema import (
     MaterialTable,
     OutputTable,
     PointLoadTable,
+    PointSupportTable,
     RegionTable,
     SolverTable,
     StageTable,
@@ -72,6 +73,7 @@ class Case:
     temperature: Mapping[str, float | ExpressionTable]
     eigenstrain: Mapping[str, EigenstrainTable]
     point_loads: Mapping[str, PointLoadTable]
+    point_supports: Mapping[str, PointSupportTable]
     analysis: AnalysisTable
     stages: tuple[StageTable, ...]
     solver: SolverTable
@@ -265,5 +267,5 @@ def _concerns_loads(path: KeyPath) -> bool:
     """Whether a fault here leaves open what holds and what loads the bodies."""
     if path and path[0] == "materials":
         return path[-1] == "density"
-    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads") or
+    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads", "point_supports") or
                            path[0] not in CaseFile.model_fields)

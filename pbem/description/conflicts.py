@@ -39,7 +39,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
     findings += _check_stages(raw)
     findings += _check_solver(raw)
     findings += _check_options(raw)
-    for name in ("materials", "curves", "regions", "contacts", "point_loads"):
+    for name in ("materials", "curves", "regions", "contacts", "point_loads", "point_supports"):
         findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc, str(loc[-1]))]
     return findings
 

@@ -281,6 +281,19 @@ class PointLoadTable(PointForceTable):
     at: Point = Field(description="x, y of the point")
 
 
+class PointShiftTable(Table):
+    """Displacement of a point."""
+
+    ux: Number | None = Field(None, description="displacement along x")
+    uy: Number | None = Field(None, description="displacement along y")
+
+
+class PointSupportTable(PointShiftTable):
+    """A point of a boundary whose displacement is given. NAME is of your choice."""
+
+    at: Point = Field(description="x, y of the point")
+
+
 class GravityTable(Table):
     """Acceleration; a region's weight per volume is its density times this."""
 
@@ -335,6 +348,7 @@ class StageTable(Table):
     temperature: Mapping[str, LinearValue] = Field({}, description="of a region at the end of the stage")
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
     point_loads: Mapping[str, PointForceTable] = Field({}, description="`fx`, `fy`, `moment` at the end of the stage")
+    point_supports: Mapping[str, PointShiftTable] = Field({}, description="`ux`, `uy` at the end of the stage")
 
 
 class SolverTable(Table):
@@ -403,6 +417,11 @@ class CaseFile(Table):
     point_loads: Mapping[str, PointLoadTable] = Field(
         {}, description="A force, and inside a region a moment, at a single point: inside a region, or on the boundary "
         "of one where no displacement is prescribed. Values are those at the end of the load. NAME is of your choice."
+    )
+    point_supports: Mapping[str, PointSupportTable] = Field(
+        {}, description="Displacement of a point of a boundary, for bodies that can move freely and whose loads "
+        "balance: it chooses their rigid motion (three conditions for one body) and carries nothing but the error of "
+        "the mesh, which is stored as its reaction. NAME is of your choice, and no curve's."
     )
     analysis: AnalysisTable = AnalysisTable()
     stages: tuple[StageTable, ...] = ()

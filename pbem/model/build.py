@@ -31,6 +31,8 @@ from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
+from pbem.model.point_supports import PointSupport, place_point_supports
+from pbem.model.support_motions import check_independent
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.resultants import describe_unbalance
@@ -54,6 +56,7 @@ class _Topology:
     tips: Mapping[str, tuple[bool, bool]]
     size: float
     points: PointLoads
+    supports: Mapping[str, PointSupport]
     notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
@@ -155,11 +158,13 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
         points = place_point_loads(case, roles, curves, loops, places, list_held(loading.conditions))
         faults += points.faults
         notes += points.notes
+    supports, wrong = place_point_supports(case, roles, curves)
+    faults += wrong
     tips = find_tips(curves, cracks)
     curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, tuple(notes), tuple(faults))
+    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults))
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
@@ -210,6 +215,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         groups=case.groups,
         ties=fitted.ties,
         point_loads=topology.points.loads,
+        point_supports=topology.supports,
     )
     return replace(model, notes=(*model.notes, *_note_loads(model))), list(fitted.faults)
 
@@ -259,7 +265,8 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults, balanced = [], []
     regions = {region.name: region for region in model.regions}
-    for motion in find_rigid_body_modes(model):
+    motions = find_rigid_body_modes(model)
+    for motion in motions:
         found = f"a free rigid motion ({motion.text})"
         unbalance = describe_unbalance(model, motion, [regions[name] for name in motion.regions])
         if unbalance is None:
@@ -269,6 +276,7 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
         faults.append(Fault.at(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+    faults += check_independent(list(model.point_supports.values()), motions)
     notes = []
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
@@ -288,6 +296,8 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
             expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "
                         "logarithm of the distance and has no value; or a finite region that is held")
             faults.append(Fault.at(("regions", name), found, expected))
-    sentence = "Nothing prevents: {}. The loads balance, and the mean displacement and rotation are set to zero."
+    chosen = "as far as no point support says otherwise, " if model.point_supports else ""
+    sentence = ("Nothing prevents: {}. The loads balance, and " + chosen +
+                "the mean displacement and rotation are set to zero.")
     listed = [*balanced[:6], *([f"and {len(balanced) - 6} more"] if len(balanced) > 6 else [])]
     return faults, [*([sentence.format("; ".join(listed))] if balanced else []), *dict.fromkeys(notes)]

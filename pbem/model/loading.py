@@ -16,6 +16,7 @@ from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
 from pbem.model.point_loads import read_point_forces
+from pbem.model.point_supports import read_support_values
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
@@ -78,10 +79,13 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     faults += swellings.faults
     point_forces, wrong = read_point_forces(case)
     faults += wrong
+    support_values, wrong = read_support_values(case)
+    faults += wrong
     stages = tuple(
-        replace(stage, swelling=swelling, point_forces=forces) for stage, swelling, forces in zip(
+        replace(stage, swelling=swelling, point_forces=forces, support_values=shifts)
+        for stage, swelling, forces, shifts in zip(
             _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, point_forces,
-            strict=True,
+            support_values, strict=True,
         )
     )
     faults += _check_durations(case, joints, stages)

@@ -13,6 +13,7 @@ from pbem.geometry.loop import Loop
 from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.point_loads import Force, PointLoad
+from pbem.model.point_supports import PointSupport, Shift
 from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
@@ -114,7 +115,8 @@ class Stage:
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
     infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
-    point_forces: force along x and y and moment of every point load.
+    point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
+    point support.
     """
 
     name: str
@@ -126,6 +128,7 @@ class Stage:
     duration: float = 0.0
     swelling: Mapping[str, Swelling] = field(default_factory=dict)
     point_forces: Mapping[str, Force] = field(default_factory=dict)
+    support_values: Mapping[str, Shift] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:
@@ -181,7 +184,7 @@ class Model:
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
     were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
-    point_loads: where forces act at single points. notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
+    point_loads: where forces act at single points. point_supports: where points of free bodies are. notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
     title: str
@@ -210,6 +213,7 @@ class Model:
     overrides: str = ""
     origin: complex = 0j
     point_loads: Mapping[str, PointLoad] = field(default_factory=dict)
+    point_supports: Mapping[str, PointSupport] = field(default_factory=dict)
 
     @cached_property
     def timed(self) -> bool:

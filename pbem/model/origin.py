@@ -75,5 +75,6 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
             for stage in model.stages
         ),
         point_loads={name: load.move(origin) for name, load in model.point_loads.items()},
+        point_supports={name: support.move(origin) for name, support in model.point_supports.items()},
         initial_stress={name: stress.move(origin) for name, stress in model.initial_stress.items()},
     )

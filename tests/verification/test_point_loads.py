@@ -29,7 +29,7 @@ def kelvin(force: complex, moment: float, away: Complex, kappa: float = 2.2) -> 
     along, across = (np.conj(e) * force).real, (np.conj(e) * force).imag
     # Radial, hoop and shear stress in polar coordinates.
     rr, tt = -(3 + kappa) * along / (2 * np.pi * (1 + kappa) * r), (kappa - 1) * along / (2 * np.pi * (1 + kappa) * r)
-    rt = (kappa - 1) * across / (2 * np.pi * (1 + kappa) * r) - moment / (2 * np.pi * r**2)
+    rt = -(kappa - 1) * across / (2 * np.pi * (1 + kappa) * r) - moment / (2 * np.pi * r**2)
     return combine(rr + tt, (tt - rr + 2j * rt) * np.conj(e) ** 2)
 
 
@@ -131,7 +131,7 @@ def test_flamant_on_a_half_disc(center: complex, turn: complex, along: complex, 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_a_disc_pressed_by_two_forces(order: int, tmp_path: Path) -> None:
-    """Hertz: two Flamant fields and a uniform stress, which are in the space of the elements; the forces move later."""
+    """Hertz: two Flamant fields and a uniform stress, near the loads too; the forces grow in a second stage."""
     case = {
         "materials": {"m": {**MATERIAL, "plane": "stress"}},
         "curves": {"rim": {"center": [5, 1], "radius": 2.0, "elements": 16}},
@@ -145,8 +145,9 @@ def test_a_disc_pressed_by_two_forces(order: int, tmp_path: Path) -> None:
     exact = wedge(-2j, -1j, 0.5 * np.pi, z - 5 - 3j) + wedge(2j, 1j, 0.5 * np.pi, z - 5 + 1j) + [1 / np.pi, 1 / np.pi, 0]
     scale = np.abs(exact).max(axis=1, keepdims=True)
     np.testing.assert_allclose(exact[0], [2 * 2 / (np.pi * 4), -6 * 2 / (np.pi * 4), 0], atol=1e-12)
-    assert (np.abs(results.interior.stress[0] - exact) < 1e-9 * scale).all()
-    assert (np.abs(results.interior.stress[1] - 1.5 * exact) < 1e-9 * scale).all()
+    accuracy = {1: 2e-3, 2: 2e-4, 3: 1e-5}[order]
+    assert (np.abs(results.interior.stress[0] - exact) < accuracy * scale).all()
+    assert (np.abs(results.interior.stress[1] - 1.5 * exact) < 1.5 * accuracy * scale).all()
     # No traction is left on the rim but at the two points; energies grow with the square.
     assert np.abs(results.traction).max() == 0
     np.testing.assert_allclose(results.energy.external, results.energy.elastic, rtol=1e-6)
@@ -168,7 +169,7 @@ def test_a_force_in_a_corner(half_angle: float, tmp_path: Path) -> None:
         "materials": {"m": MATERIAL},
         "curves": {"a": {"points": [[0, 0], *to_pairs(ends[:1])], "elements": 6},
                    "b": {"points": [*to_pairs(ends[1:]), [0, 0]], "elements": 6},
-                   "arc": {"center": [0, 0], "radius": 1.0, "angles": [-degrees, degrees], "elements": 12}},
+                   "arc": {"center": [0, 0], "radius": 1.0, "angles": [-degrees, degrees], "elements": 24}},
         "regions": {"sector": {"material": "m", "boundary": ["a", "arc", "b"]}},
         "boundary": {"arc": {"tn": {"expression": rr}}},
         "point_loads": {"apex": {"at": [0, 0], "fx": 1.0, "fy": 0.6}},
@@ -191,7 +192,7 @@ def test_forces_on_the_edge_of_a_hole(infinite: bool, tmp_path: Path) -> None:
         hole = {name: {"center": [1, 2], "radius": 1.0, "angles": at, "elements": 3 if name == "lump" else 32}
                 for name, at in arcs.items()} if spread else {"rest": {"center": [1, 2], "radius": 1.0, "elements": 32}}
         length = 2 * np.radians(half)
-        boundary: dict[str, Any] = {"rest": {"tx": -1.0 / (2 * np.pi)}}
+        boundary: dict[str, Any] = {"rest": {"tx": -1.0 / (2 * np.pi - (length if spread else 0.0))}}
         loads: dict[str, Any] = {"lump": {"at": [2, 2], "fx": 1.0, "fy": 0.0}}
         if spread:
             boundary["lump"], loads = {"tx": 1.0 / length}, {}

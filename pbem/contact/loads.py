@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,17 +66,20 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     local = np.array([condition.frame == "local" for condition in conditions], dtype=bool)[which]
     first = np.where(local, mesh.normal[node], 1.0)
     known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
-    stiffness = np.array([value for c in conditions for value in c.stiffness], dtype=float)
     places = Places(mesh.position[node] + model.origin, _measure_along(model, mesh)[node])
+    at_rest = Moment(0.0, 0.0, 1.0)
+    stiffness = [_blend_all([(0.0, c.stiffness[k]) for c in conditions], which, places, at_rest) for k in (0, 1)]
+    # Rounding of an expression that is zero somewhere.
     return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
-                      stiffness.reshape(-1, 2)[which], places)
+                      np.maximum(np.stack(stiffness, axis=1), 0.0), places)
 
 
 def _measure_along(model: Model, mesh: Mesh) -> Real:
     """The length (nodes,) from the first point of its curve to every node where a condition varies; 0 elsewhere."""
     along = np.zeros((mesh.elements, mesh.order + 1))
-    varying = {name for stage in model.stages for name, pair in stage.boundary.items()
-               if any(isinstance(value, Varying) for value in pair)}
+    given = [*((name, condition.stiffness) for name, condition in model.conditions.items()),
+             *(each for stage in model.stages for pairs in (stage.boundary, stage.ends) for each in pairs.items())]
+    varying = {name for name, pair in given if any(isinstance(value, Varying) for value in pair)}
     number = {name: k for k, name in enumerate(mesh.curve_names) if name in varying}
     for side in (side for region in model.regions for loop in region.loops for side in loop.sides):
         if side.curve in number:
@@ -95,13 +98,13 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         start, end = np.array(old, dtype=float), np.array(new, dtype=float)
         return start + factor * (end - start)
 
-    none: tuple[Value, Value] = (0.0, 0.0)
-    values = np.zeros((len(outer.node), 2))
-    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
-    for direction in (0, 1):
-        pairs = [(before.boundary.get(name, none)[direction], after.boundary.get(name, none)[direction])
-                 for name in model.conditions]
-        values[:, direction] = _blend_all(pairs, outer.condition, outer.places, moment)
+    values = _evaluate_pairs(model, outer, (before.boundary, after.boundary), stage, factor)
+    in_axes = np.array([condition.in_axes for condition in model.conditions.values()], dtype=bool)[outer.condition]
+    if in_axes.any():
+        vector = values[in_axes, 0] + 1j * values[in_axes, 1]
+        values[in_axes] = (np.conj(outer.direction[in_axes]) * vector[:, None]).real
+    if after.ends:
+        values += outer.stiffness * evaluate_ends(model, outer, stage, factor)
     remote = interpolate(before.remote, after.remote)
     backgrounds = [balanced_background(model, region, stage, factor) for region in model.regions]
     balanced = _sample(mesh, backgrounds)
@@ -119,6 +122,27 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         point_force=sum((each.force for each in points), 0j),
         net_force=sum((each.net_force for each in points), 0j),
     )
+
+
+def _evaluate_pairs(
+    model: Model, outer: OuterNodes, pairs: tuple[Mapping[str, tuple[Value, Value]], Mapping[str, tuple[Value, Value]]],
+    stage: int, factor: float,
+) -> Real:
+    """Of two values (k, 2) for each curve, at the end of the stage before and of this one, those at a fraction of it."""
+    none: tuple[Value, Value] = (0.0, 0.0)
+    values = np.zeros((len(outer.node), 2))
+    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
+    before, after = pairs
+    for direction in (0, 1):
+        own = [(before.get(name, none)[direction], after.get(name, none)[direction]) for name in model.conditions]
+        values[:, direction] = _blend_all(own, outer.condition, outer.places, moment)
+    return values
+
+
+def evaluate_ends(model: Model, outer: OuterNodes, stage: int, factor: float) -> Real:
+    """Displacement (k, 2) of the far ends of springs along the outer nodes' directions."""
+    before = model.stages[stage - 1].ends if stage > 0 else {}
+    return _evaluate_pairs(model, outer, (before, model.stages[stage].ends), stage, factor)
 
 
 def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:

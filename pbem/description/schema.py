@@ -111,8 +111,10 @@ class RegionTable(Table):
 class SpringTable(Table):
     """An elastic support, through all stages: stress per displacement, along the normal and along the curve."""
 
-    kn: NotNegative = Field(0.0, description="elastic support: adds -kn un to tn, through all stages")
-    ks: NotNegative = Field(0.0, description="the same along the curve: adds -ks us to ts")
+    kn: Strength = Field(
+        0.0, description="elastic support: adds -kn (un - end_n) to tn, through all stages; may vary with `x`, `y` and `s`"
+    )
+    ks: Strength = Field(0.0, description="the same along the curve: adds -ks (us - end_s) to ts")
 
 
 class StageConditionTable(Table):
@@ -129,13 +131,15 @@ class StageConditionTable(Table):
     tn: Value | None = Field(None, description="or traction along the outward normal")
     ts: Value | None = Field(None, description="or traction along the normal turned by +90 degrees")
     pressure: Value | None = Field(None, description="`tn = -pressure`, `ts = 0`")
+    end_n: Value | None = Field(None, description="displacement of the far end of a spring `kn`, along the normal")
+    end_s: Value | None = Field(None, description="of the far end of a spring `ks`, along the normal turned by +90")
 
 
 class ConditionTable(StageConditionTable):
     """Conditions on a curve of one region: displacement or traction in two directions. What is not given is free of
     traction."""
 
-    spring: SpringTable | None = Field(None, description="an elastic support in place of displacements")
+    spring: SpringTable | None = Field(None, description="an elastic support, beside tractions, in place of displacements")
 
 
 class LawTable(Table):

@@ -171,7 +171,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,
-               tuple(stage.boundary.get(name, (0.0, 0.0)) for stage in loading.stages))
+               tuple((stage.boundary.get(name, (0.0, 0.0)), stage.ends.get(name)) for stage in loading.stages))
         for name, condition in loading.conditions.items()
     }
     behaviour |= {
@@ -233,7 +233,7 @@ def _note_loads(model: Model) -> list[str]:
     """A model whose answer is zero everywhere has probably lost its loads."""
     weights = any(region.material.density for region in model.regions)
     loads = [value for stage in model.stages for value in (
-        *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
+        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair), *stage.pressure.values(), *stage.remote,
         *(stage.gravity if weights else ()))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
@@ -249,7 +249,7 @@ def _note_loads(model: Model) -> list[str]:
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
     curves = {side.curve for region in model.regions if region.name in names
               for loop in region.loops for side in loop.sides}
-    return any(0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
+    return any(not isinstance(stiffness, Varying) and 0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
                for stiffness in condition.stiffness)
 
 

@@ -96,14 +96,21 @@ class Condition:
     """What is known on an outer curve, in two directions: x, y (global) or normal (outward), tangential (local).
 
     known: per direction the quantity whose values the stages give; the other one is unknown.
-    stiffness: Winkler springs per direction (stress/length): the traction is the known one minus stiffness times
-    displacement; zero where the displacement is known.
+    stiffness: Winkler springs per direction (stress/length), which may vary along the curve: the traction is the known
+    one minus stiffness times the displacement against the springs' far ends; zero where the displacement is known.
+    in_axes: the known tractions are given along x and y all the same, beside springs in the local frame.
     """
 
     curve: str
     frame: Literal["global", "local"] = "global"
     known: tuple[Quantity, Quantity] = ("traction", "traction")
-    stiffness: tuple[float, float] = (0.0, 0.0)
+    stiffness: tuple[Value, Value] = (0.0, 0.0)
+    in_axes: bool = False
+
+    @property
+    def value_frame(self) -> Literal["global", "local"]:
+        """The directions along which values are given."""
+        return "global" if self.in_axes else self.frame
 
 
 @dataclass(frozen=True)
@@ -116,7 +123,7 @@ class Stage:
     infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
     point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
-    point support.
+    point support. ends: of the curves whose springs' far ends move: by how much, along the normal and the curve.
     """
 
     name: str
@@ -129,11 +136,13 @@ class Stage:
     swelling: Mapping[str, Swelling] = field(default_factory=dict)
     point_forces: Mapping[str, Force] = field(default_factory=dict)
     support_values: Mapping[str, Shift] = field(default_factory=dict)
+    ends: Mapping[str, tuple[Value, Value]] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:
     """The loads of a stage that depend on time by themselves."""
-    values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
+    values = [*(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
+              *stage.pressure.values()]
     return [value for value in values if isinstance(value, Varying) and value.timed]
 
 

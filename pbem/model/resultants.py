@@ -147,5 +147,5 @@ def _tractions(
         evaluate(value, places, time) if quantity == "traction" else np.zeros(places.point.shape)
         for value, quantity in zip(values, condition.known, strict=True)
     )
-    frame = normals if condition.frame == "local" else np.ones_like(normals)
+    frame = normals if condition.value_frame == "local" else np.ones_like(normals)
     return np.asarray((first + 1j * second) * frame)

@@ -33,7 +33,7 @@ import numpy as np
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.laws import collect_laws
-from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load
 from pbem.mesh.interpolation import interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.model.model import Model
@@ -256,15 +256,17 @@ class EnergyBalance:
             loads.append(initial + remote)
             conjugates.append(strained)
             stored += 0.5 * float((2 * initial + remote) @ strained)
-        springs = 0.5 * self._measure_springs(displacement + swollen)
+        springs = 0.5 * self._measure_springs(displacement + swollen, stage, factor)
         return _State(
             traction, displacement + swollen, swollen, np.concatenate(loads), np.concatenate(conjugates), stored,
             springs, pairs,
         )
 
-    def _measure_springs(self, displacement: Complex) -> float:
+    def _measure_springs(self, displacement: Complex, stage: int, factor: float) -> float:
         outer = self._outer
         along = (np.conj(outer.direction) * displacement[outer.node][:, None]).real
+        if self._model.stages[stage].ends:
+            along -= evaluate_ends(self._model, outer, stage, factor)
         return float(self._weight[outer.node] @ (outer.stiffness * along**2).sum(axis=1))
 
     def _sample_in_situ(self) -> Complex:

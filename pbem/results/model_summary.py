@@ -82,10 +82,10 @@ def _list_region(region: Region) -> dict[str, Any]:
 
 def _list_condition(model: Model, condition: Condition) -> dict[str, Any]:
     """By direction what is known, its values at the ends of the stages, and the stiffness of a spring."""
-    names = ("n", "s") if condition.frame == "local" else ("x", "y")
+    names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
     return {
         names[i]: {
-            "known": condition.known[i], "stiffness": condition.stiffness[i],
+            "known": condition.known[i], "stiffness": to_plain(condition.stiffness[i]),
             "values": [to_plain(stage.boundary.get(condition.curve, (0.0, 0.0))[i]) for stage in model.stages],
         }
         for i in range(2)

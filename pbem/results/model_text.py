@@ -97,7 +97,7 @@ def _direction_titles(model: Model) -> list[str]:
 
 def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     """What is prescribed in each direction: one value, or those at the end of every stage where they differ."""
-    names = ("n", "s") if condition.frame == "local" else ("x", "y")
+    names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
     if condition.known == ("traction", "traction") and not any(map(any, [*values, condition.stiffness])):
         return "free", "free"
@@ -105,7 +105,7 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     for i, quantity in enumerate(condition.known):
         given = [f"{value[i]:g}" for value in values]
         given = given[:1] if len(set(given)) == 1 else shorten(given, 6)
-        spring = f", spring {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
+        spring = f", spring k{'ns'[i]} = {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
         texts.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}{spring}")
     return texts[0], texts[1]
 
@@ -171,7 +171,7 @@ def _describe_boundary(model: Model, stage: Stage) -> list[str]:
     """What is prescribed on outer curves at the end of a stage, other than zero."""
     texts = []
     for curve, condition in model.conditions.items():
-        names = ("n", "s") if condition.frame == "local" else ("x", "y")
+        names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
         values = stage.boundary.get(curve, (0.0, 0.0))
         given = [
             f"{'u' if quantity == 'displacement' else 't'}{name} = {value:g}"

@@ -26,7 +26,8 @@ class ParticularSolution:
     center: where the displacement of remote stress and force vanishes, and the stress of the force. One near the region
     keeps rounding as small as the region. Any will do for the force, as fields of uniform pressure obey the integral
     equations too. To the remote strain it is the place that does not move. swelling: strain without stress. points:
-    fields of forces and moments at single points.
+    fields of forces and moments at single points. growth: a stress that grows from 0, with the displacement of its
+    strain.
     """
 
     material: Material
@@ -37,11 +38,12 @@ class ParticularSolution:
     center: complex = 0.0
     swelling: Swelling = NO_SWELLING
     points: tuple[PointField, ...] = ()
+    growth: LinearStress = AT_REST
 
     @property
     def is_zero(self) -> bool:
         fields = any(self.remote) or self.force or self.points
-        return not fields and self.initial.is_zero and self.swelling.is_zero
+        return not fields and self.initial.is_zero and self.swelling.is_zero and self.growth.is_zero
 
     @property
     def of_points(self) -> ParticularSolution:
@@ -59,14 +61,26 @@ class ParticularSolution:
         lever = point - self.center
         linear = 0.5 * (kappa - 1) * mean * lever - np.conj(deviator * lever)
         weight = -0.25 * (kappa - 1) * np.conj(self.force) * lever**2
-        smooth = (linear + weight) / (2 * shear_modulus) + self.swelling.displacement(point)
+        grown = 0j if self.growth.is_zero else self._integrate_growth(point)
+        smooth = (linear + weight + grown) / (2 * shear_modulus) + self.swelling.displacement(point)
         return smooth + sum(each.displacement(point, self.material) for each in self.points)
 
     def stress(self, point: Complex) -> Real:
         """sxx, syy, sxy (n, 3) at points (theory, 6)."""
         isotropic = -(np.conj(self.force) * (point - self.center)).real
-        smooth = np.array(self.remote) + self.initial.evaluate(point) + isotropic[:, None] * np.array([1.0, 1.0, 0.0])
+        linear = self.initial.evaluate(point) + (0.0 if self.growth.is_zero else self.growth.evaluate(point))
+        smooth = np.array(self.remote) + linear + isotropic[:, None] * np.array([1.0, 1.0, 0.0])
         return np.asarray(smooth + sum(each.stress(point, self.material) for each in self.points))
+
+    def _integrate_growth(self, point: Complex) -> Complex:
+        """2 G u of the strain of the growing stress, which neither moves nor turns its center (theory, 96)."""
+        (xx, xy), (yx, yy) = (((0.5 * (by[0] + by[1])), 0.5 * (by[0] - by[1]) + 1j * by[2])
+                              for by in (self.growth.by_x, self.growth.by_y))
+        p, q, mean = 0.5 * (xy - 1j * yy), 0.5 * (xy + 1j * yy), complex(xx, yx)
+        away = point - self.growth.center
+        back = np.conj(away)
+        analytic = 0.5 * (self.material.kappa - 1) * np.conj(mean) - np.conj(p)
+        return np.asarray(p * away * back + 0.5 * q * back**2 + 0.5 * analytic * away**2)
 
     def traction(self, point: Complex, normal: Complex) -> Complex:
         """Traction (complex) on unit normals at points."""

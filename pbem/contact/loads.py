@@ -12,7 +12,7 @@ from pbem.bem.particular_solution import ParticularSolution
 from pbem.bem.point_field import PointField
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
-from pbem.model.in_situ import AT_REST
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.model import Model, Region, Stage
 from pbem.model.swelling import NO_SWELLING
 from pbem.model.varying import Moment, Places, Value, Varying, blend
@@ -42,7 +42,8 @@ class Load:
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
-    of_points (nodes,): the displacement of point loads' fields, a part of the background. point_force: of those on an infinite region (complex); net_force: that of their fields far away.
+    of_points (nodes,): the displacement of point loads' fields, a part of the background. net_force: of those on an
+    infinite region, that of their fields far away (complex).
     """
 
     values: Real
@@ -51,7 +52,6 @@ class Load:
     far: Complex
     background: Complex
     of_points: Complex
-    point_force: complex = 0j
     net_force: complex = 0j
 
 
@@ -119,7 +119,6 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         far=far,
         background=balanced[0] + far[0],
         of_points=_sample(mesh, [each.of_points for each in backgrounds])[0],
-        point_force=sum((each.force for each in points), 0j),
         net_force=sum((each.net_force for each in points), 0j),
     )
 
@@ -190,14 +189,22 @@ def balanced_background(model: Model, region: Region, stage: int, factor: float)
     start = complex(*model.stages[stage - 1].gravity) if stage > 0 else at_rest
     gravity = start + factor * (complex(*model.stages[stage].gravity) - start)
     carried = region.material.density * at_rest
-    force = region.material.density * gravity - carried
+    # The weight of an infinite region is carried by the stress far away.
+    force = 0j if region.infinite else region.material.density * gravity - carried
     center = _find_center(model, region) if force else 0
     before = model.stages[stage - 1].swelling if stage > 0 else {}
     grown = before.get(region.name, NO_SWELLING).mix(model.stages[stage].swelling.get(region.name, NO_SWELLING), factor)
     return ParticularSolution(
         region.material, initial=initial, force=force, carried=carried, center=center, swelling=grown,
         points=_find_points(model, region, stage, factor),
+        growth=_find_growth(model, stage, factor) if region.infinite else AT_REST,
     )
+
+
+def _find_growth(model: Model, stage: int, factor: float) -> LinearStress:
+    """What the stress far away grows by from the model's middle."""
+    before = model.stages[stage - 1].remote_growth if stage > 0 else AT_REST
+    return before.mix(model.stages[stage].remote_growth, factor)
 
 
 def _find_points(model: Model, region: Region, stage: int, factor: float) -> tuple[PointField, ...]:

@@ -31,9 +31,9 @@ from pbem.description.schema import (
     PointLoadTable,
     PointSupportTable,
     RegionTable,
+    RemoteTable,
     SolverTable,
     StageTable,
-    StressTable,
     UnitsTable,
 )
 from pbem.description.summary import print_case, print_case_as_html
@@ -67,7 +67,7 @@ class Case:
     boundary: Mapping[str, ConditionTable]
     interfaces: Mapping[str, LawTable]
     contacts: Mapping[str, ContactTable]
-    remote: StressTable | None
+    remote: RemoteTable | None
     gravity: GravityTable | None
     initial_stress: Mapping[str, InSituTable]
     temperature: Mapping[str, float | ExpressionTable]

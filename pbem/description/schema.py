@@ -246,12 +246,12 @@ class GenerateTable(LawTable):
     )
 
 
-class StressTable(Table):
-    """Components of a stress."""
+class RemoteTable(Table):
+    """Components of the stress at infinity."""
 
-    sxx: Number = 0.0
-    syy: Number = 0.0
-    sxy: Number = 0.0
+    sxx: LinearValue = 0.0
+    syy: LinearValue = 0.0
+    sxy: LinearValue = 0.0
 
 
 class InSituTable(Table):
@@ -347,7 +347,7 @@ class StageTable(Table):
     )
     interfaces: Mapping[str, StageInterfaceTable] = Field({}, description="of an interface or a crack")
     contacts: Mapping[str, StageInterfaceTable] = Field({}, description="of a contact")
-    remote: StressTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
+    remote: RemoteTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
     gravity: GravityTable | None = Field(None, description="`gx`, `gy` at the end of the stage")
     temperature: Mapping[str, LinearValue] = Field({}, description="of a region at the end of the stage")
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
@@ -404,7 +404,10 @@ class CaseFile(Table):
     boundary: Mapping[str, ConditionTable] = {}
     interfaces: Mapping[str, LawTable] = {}
     contacts: Mapping[str, ContactTable] = {}
-    remote: StressTable | None = Field(None, description="Stress at infinity, for infinite regions.")
+    remote: RemoteTable | None = Field(
+        None, description="Stress at infinity, for infinite regions: uniform, or linear in x and y and in balance with "
+        "the region's weight under `[gravity]`."
+    )
     gravity: GravityTable | None = None
     initial_stress: Mapping[str, InSituTable] = Field(
         {}, description="In-situ stress of a material, there before any load; tractions and stresses include it. It is "

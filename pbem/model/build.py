@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pbem.description.case import Case
 from pbem.errors import CaseError, Fault
 from pbem.geometry.curve import Curve
-from pbem.geometry.junction import find_crossings, split_at_junctions
+from pbem.geometry.junction import find_crossings, format_point, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
@@ -29,13 +31,14 @@ from pbem.model.law import check_along
 from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
-from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.in_situ import AT_REST, LinearStress
+from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
 from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.support_motions import check_independent
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
-from pbem.model.resultants import describe_unbalance
+from pbem.model.resultants import describe_unbalance, find_unbalanced_force
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
@@ -217,7 +220,19 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         point_loads=topology.points.loads,
         point_supports=topology.supports,
     )
+    stages = tuple(_center_remote(stage, model.middle) for stage in model.stages)
+    model = replace(model, stages=stages)
     return replace(model, notes=(*model.notes, *_note_loads(model))), list(fitted.faults)
+
+
+def _center_remote(stage: Stage, middle: complex) -> Stage:
+    """The stress far away as that at the middle of the model and what it grows by from there."""
+    growth = stage.remote_growth
+    if growth.is_uniform:
+        return replace(stage, remote_growth=AT_REST)
+    value = growth.evaluate(np.array([middle]))[0]
+    remote = (float(value[0]), float(value[1]), float(value[2]))
+    return replace(stage, remote=remote, remote_growth=LinearStress((0.0, 0.0, 0.0), growth.by_x, growth.by_y, middle))
 
 
 def _note_choices(case: Case) -> list[str]:
@@ -285,10 +300,9 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         if unbalance is None:
             continue
         if describe_unbalance(_leave_out_point_loads(model), motion, moving) is None:
-            what = "Point loads on" if any(load.region in motion.regions for load in model.point_loads.values()) else (
-                "The weight of what lies in")
-            verb = "are" if what.startswith("Point") else "is"
-            notes.append(f"{what} the infinite region '{name}' {verb} a net force on it: its "
+            force = find_unbalanced_force(model, motion, moving)
+            notes.append(f"Weight and point loads have a net force of {format_point(force)} on the infinite region "
+                         f"'{name}', with what lies in it and without what is dug out of it: its "
                          "displacement grows with the logarithm of the distance, so that only stresses, and "
                          "displacements of one point against another, mean anything.")
         else:

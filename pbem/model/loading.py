@@ -85,10 +85,10 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     support_values, wrong = read_support_values(case)
     faults += wrong
     stages = tuple(
-        replace(stage, swelling=swelling, point_forces=forces, support_values=shifts)
-        for stage, swelling, forces, shifts in zip(
+        replace(stage, swelling=swelling, point_forces=forces, support_values=shifts, remote_growth=growth)
+        for stage, swelling, forces, shifts, growth in zip(
             _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, point_forces,
-            support_values, strict=True,
+            support_values, backgrounds.remote, strict=True,
         )
     )
     faults += _check_durations(case, joints, stages)
@@ -261,7 +261,7 @@ def _find_stages(
     for name in joints:
         if name in laws:
             pressure[name] = _read(laws[name].pressure)
-    fields = list(zip(backgrounds.remote, backgrounds.gravity, strict=True))
+    fields = [(stress.value, gravity) for stress, gravity in zip(backgrounds.remote, backgrounds.gravity, strict=True)]
     if not case.stages:
         return (Stage("load", case.analysis.steps, _freeze(values), dict(pressure), *fields[0], ends=_freeze(ends)),)
     stages = []

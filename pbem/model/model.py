@@ -10,7 +10,7 @@ from typing import Literal
 from pbem.description.generation import GeneratedGroup
 from pbem.geometry.curve import Curve, find_middle, measure_spread
 from pbem.geometry.loop import Loop
-from pbem.model.in_situ import LinearStress
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.material import Material
 from pbem.model.point_loads import Force, PointLoad
 from pbem.model.point_supports import PointSupport, Shift
@@ -120,7 +120,7 @@ class Stage:
 
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
-    infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
+    infinity, for infinite regions, at the model's middle; remote_growth: how it grows from there; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
     point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
     point support. ends: of the curves whose springs' far ends move: by how much, along the normal and the curve.
@@ -137,6 +137,7 @@ class Stage:
     point_forces: Mapping[str, Force] = field(default_factory=dict)
     support_values: Mapping[str, Shift] = field(default_factory=dict)
     ends: Mapping[str, tuple[Value, Value]] = field(default_factory=dict)
+    remote_growth: LinearStress = AT_REST
 
 
 def list_timed(stage: Stage) -> list[Varying]:
@@ -238,6 +239,13 @@ class Model:
     def middle(self) -> complex:
         """The mean place of all curves, which the strain of stress far away does not move."""
         return find_middle(self.curves)
+
+    @cached_property
+    def grows_without_end(self) -> bool:
+        """Whether the stress of an infinite region does, so that its energy has no bounds."""
+        infinite = [region.material.name for region in self.regions if region.infinite]
+        grown = [self.initial_stress[name] for name in infinite if name in self.initial_stress]
+        return not all(each.is_uniform for each in (*grown, *(stage.remote_growth for stage in self.stages)))
 
     @cached_property
     def point_loads_by_region(self) -> dict[str, tuple[PointLoad, ...]]:

@@ -71,7 +71,8 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
         ties=tuple(replace(tie, corner=tie.corner - origin) for tie in model.ties),
         interior_points=tuple(point - origin for point in model.interior_points),
         stages=tuple(
-            replace(stage, swelling={name: each.move(origin) for name, each in stage.swelling.items()})
+            replace(stage, swelling={name: each.move(origin) for name, each in stage.swelling.items()},
+                    remote_growth=stage.remote_growth.move(origin))
             for stage in model.stages
         ),
         point_loads={name: load.move(origin) for name, load in model.point_loads.items()},

@@ -50,6 +50,15 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
     return None
 
 
+def find_unbalanced_force(model: Model, motion: RigidBodyMode, moving: Sequence[Region]) -> complex:
+    """The resultant of the loads on what moves at the end of the first stage in which they drive it."""
+    for number, stage in enumerate(model.stages):
+        force, _, power, scale = _sum_tractions(model, motion, moving, stage, model.find_time(number, 1.0))
+        if abs(power) > BALANCED * scale:
+            return force
+    return 0j
+
+
 def _has_expressions(stage: Stage) -> bool:
     values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
     return any(isinstance(value, Varying) and value.expression for value in values)
@@ -118,10 +127,13 @@ def _divide_side(curves: Mapping[str, Curve], side: Side, values: tuple[Value, V
 
 
 def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex]:
-    """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops."""
-    if region.infinite or not any(stage.gravity):
-        return 0j, 0j
+    """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops.
+
+    Of an infinite region, which stress far away carries, minus the weight that its holes would have.
+    """
     legs = loop_legs(model.curves, region.loops)
+    if not any(stage.gravity) or not legs:
+        return 0j, 0j
     origin = legs[0].start
     area, first_moment = 0.0, 0j
     for leg in legs:

@@ -40,7 +40,7 @@ NO_BOUND = 1e100
 # Tables that accept the keys of [interfaces.CURVE] too, which are told there.
 WITH_LAW = ("ContactTable", "GenerateTable")
 # Values of stages, told with the table that they are values of.
-VALUES = ("StageConditionTable", "StressTable", "GravityTable", "PointForceTable", "PointShiftTable")
+VALUES = ("StageConditionTable", "RemoteTable", "GravityTable", "PointForceTable", "PointShiftTable")
 
 
 def write_key_page() -> str:

@@ -26,7 +26,7 @@ is more it was set free, under loads that hardly change, and the trapezoid on th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -178,6 +178,8 @@ class EnergyBalance:
             dissipated=before.dissipated + dissipated,
             released=before.released + released,
         )
+        if self._model.grows_without_end:  # so would the energy
+            return replace(self._reached, external=np.nan, elastic=np.nan)
         return self._reached
 
     def _find_runaway(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
@@ -151,8 +152,9 @@ def _describe_loads(model: Model) -> list[str]:
         parts = [f"{stage.name}: {count(stage.steps, 'step')}"]
         if stage.duration:
             parts.append(f"duration {stage.duration:g}")
-        if any(stage.remote):
-            parts.append("remote stress sxx, syy, sxy = {:g}, {:g}, {:g}".format(*stage.remote))
+        if any(stage.remote) or not stage.remote_growth.is_zero:
+            given = (f"{value:g}" if isinstance(value, float) else value for value in describe_remote(stage, model.origin))
+            parts.append("remote stress sxx, syy, sxy = {}, {}, {}".format(*given))
         if any(stage.gravity):
             parts.append("gravity {:g}, {:g}".format(*stage.gravity))
         pressure = {name: value for name, value in stage.pressure.items() if value}
@@ -165,6 +167,13 @@ def _describe_loads(model: Model) -> list[str]:
     for name, stress in model.initial_stress.items():
         lines.append("in-situ stress of {}: sxx, syy, sxy = {}, {}, {}".format(name, *stress.describe(model.origin)))
     return lines
+
+
+def describe_remote(stage: Stage, origin: complex) -> tuple[float | str, ...]:
+    """The stress far away: numbers, or texts where it grows; origin: of the model, in the user's coordinates."""
+    if stage.remote_growth.is_zero:
+        return stage.remote
+    return replace(stage.remote_growth, value=stage.remote).describe(origin)
 
 
 def _describe_boundary(model: Model, stage: Stage) -> list[str]:

@@ -17,7 +17,7 @@ from pbem.geometry.loop import Loop, Side
 from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
-from pbem.model.in_situ import LinearStress
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.point_loads import PointLoad
@@ -105,7 +105,8 @@ def read_model(configuration: str) -> Model:
     stages = tuple(
         Stage(each["name"], each["steps"], {}, {}, tuple(each["remote"]), tuple(each["gravity"]),
               swelling={name: _read_swelling(one) for name, one in each.get("swelling", {}).items()},
-              point_forces={name: tuple(force) for name, force in each.get("point_forces", {}).items()})
+              point_forces={name: tuple(force) for name, force in each.get("point_forces", {}).items()},
+              remote_growth=_read_stress(each["remote_growth"]) if "remote_growth" in each else AT_REST)
         for each in stored["stages"]
     )
     return Model(

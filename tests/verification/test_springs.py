@@ -63,7 +63,7 @@ def test_far_ends_and_tractions_along_axes(tmp_path: Path) -> None:
     np.testing.assert_allclose(results.traction[1][bottom], [[0.7, 10.0]] * int(bottom.sum()), rtol=1e-6)
     strain = 10 * (1 - 0.2**2) / 3e3
     assert np.abs(results.displacement[1][bottom][:, 1]).max() < 1e-6 * strain
-    np.testing.assert_allclose(results.energy.external, results.energy.elastic, rtol=1e-6)
+    np.testing.assert_allclose(results.energy.external, results.energy.elastic, rtol=1e-4)
     np.testing.assert_allclose(results.reactions["bottom"][:, 1], [10, 20, 20, 20], rtol=1e-6)
     # The springs hold 1/2 p^2/kn in all: of the mean of 1/kn over the bottom.
     block = 0.5 * 2 * (10 * strain + 2 * 0.7**2 * 1.2 / 3e3)

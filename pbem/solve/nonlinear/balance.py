@@ -105,13 +105,13 @@ def _find_carried_force(problem: Problem, whole: Complex, known: Complex, load: 
     """The net force that an infinite region carries, as nothing else holds it along its direction, less that of the
     fields of its own point loads; 0 if none.
 
-    It is that of what acts from outside on all bodies that move with the region: weight, point loads and tractions on
-    outer curves. whole, known (nodes,): tractions, and those of fields in finite balance; those of in-situ stress do no
-    work on rigid motions.
+    It is that of what acts from outside on all bodies that move with the region: weight, less that of what holes have
+    taken out of the region, point loads, and tractions on outer curves. whole, known (nodes,): tractions, and those of
+    fields in finite balance, which are minus the forces that they balance.
     """
     mesh, regions = problem.mesh, problem.model.regions
     plane = next((region.name for region in regions if region.infinite), None)
-    if plane is None or not (known.any() and problem.plane_translations or load.net_force):
+    if plane is None or not (known.any() or load.net_force):
         return 0j
     directions, powers = [], []
     outer = np.zeros(mesh.nodes, dtype=bool)
@@ -119,19 +119,21 @@ def _find_carried_force(problem: Problem, whole: Complex, known: Complex, load: 
     for motion in problem.plane_translations:
         direction, power = motion.velocities[plane][0], 0.0
         for number, name in enumerate(mesh.region_names):
-            if name not in motion.velocities:
-                continue
-            own = np.flatnonzero((mesh.node_region == number) & ~mesh.node_crack)
-            shift, spin = motion.velocities[name]
-            velocity = shift + 1j * spin * mesh.position[own]
-            # Fields in finite balance with a source pull at the boundary as much as that acts.
-            acting = np.where(outer[own], whole[own], 0.0) - (known[own] if name != plane else 0.0)
-            power += float(mesh.weight[own] @ (np.conj(acting) * velocity).real)
+            if name in motion.velocities:
+                own = np.flatnonzero((mesh.node_region == number) & ~mesh.node_crack)
+                shift, spin = motion.velocities[name]
+                velocity = shift + 1j * spin * mesh.position[own]
+                acting = np.where(outer[own], whole[own], 0.0) - known[own]
+                power += float(mesh.weight[own] @ (np.conj(acting) * velocity).real)
         directions.append([direction.real, direction.imag])
-        powers.append(power + (np.conj(load.point_force) * direction).real)
-    # Along a direction in which something holds the region, nothing is known of its force.
-    force = complex(*np.linalg.lstsq(np.array(directions), np.array(powers), rcond=SAME)[0]) if directions else 0j
-    return force - load.net_force
+        powers.append(power)
+    # Along a direction in which something holds the region nothing acts on it, or nothing is known of it.
+    fields = np.array([load.net_force.real, load.net_force.imag])
+    if not directions:
+        return complex(*-fields)
+    free = np.array(directions)
+    force, held = (np.linalg.lstsq(free, each, rcond=SAME)[0] for each in (np.array(powers), free @ fields))
+    return complex(*(force - (fields - held)))
 
 
 def _add_up(

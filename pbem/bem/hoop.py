@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +30,13 @@ def evaluate_hoop_stress(
     their own: there it is the difference between neighbours on the same curve.
     """
     second = second_face_nodes(mesh)
+    of_points = sample_points(mesh, initial)
+    if of_points is not None:  # what is singular at a point is no polynomial
+        rest = evaluate_hoop_stress(
+            mesh, [replace(each, points=()) for each in initial], displacement - of_points.displacement,
+            traction - of_points.traction,
+        )
+        return rest + of_points.hoop_stress
     stretch, direction = evaluate_stretch(mesh, displacement)
     region = np.concatenate([mesh.node_region, mesh.node_region[second]])
     position = np.concatenate([mesh.position, mesh.position[second]])
@@ -49,6 +57,35 @@ def evaluate_hoop_stress(
         pressed = (np.conj(n) * traction[own]).real - rest_n
         stress[own] = rest_s + background.material.plane_modulus * elastic + lateral * pressed
     return stress
+
+
+@dataclass(frozen=True)
+class PointFields:
+    """What the fields of point loads have at the nodes (f,) of `list_faces(mesh)`: displacement and traction (complex),
+    and the normal stress along the boundary."""
+
+    displacement: Complex
+    traction: Complex
+    hoop_stress: Real
+
+
+def sample_points(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> PointFields | None:
+    """The fields of the regions' point loads on all faces; None if there are none."""
+    if not any(each.points for each in backgrounds):
+        return None
+    second = second_face_nodes(mesh)
+    region = np.concatenate([mesh.node_region, mesh.node_region[second]])
+    position = np.concatenate([mesh.position, mesh.position[second]])
+    normal = np.concatenate([mesh.normal, -mesh.normal[second]])
+    moved, carried, along = np.zeros(len(region), complex), np.zeros(len(region), complex), np.zeros(len(region))
+    for number, background in enumerate(backgrounds):
+        own = np.flatnonzero(region == number)
+        if background.points and len(own):
+            fields, n = background.of_points, normal[own]
+            moved[own] = fields.displacement(position[own])
+            carried[own] = fields.traction(position[own], n)
+            along[own] = (np.conj(1j * n) * fields.traction(position[own], 1j * n)).real
+    return PointFields(moved, carried, along)
 
 
 def evaluate_stretch(mesh: Mesh, displacement: Complex) -> tuple[Complex, Complex]:

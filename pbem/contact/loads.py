@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
+from pbem.bem.point_field import PointField
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
-from pbem.model.in_situ import AT_REST
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.model import Model, Region, Stage
 from pbem.model.swelling import NO_SWELLING
 from pbem.model.varying import Moment, Places, Value, Varying, blend
@@ -41,6 +42,8 @@ class Load:
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
+    of_points (nodes,): the displacement of point loads' fields, a part of the background. net_force: of those on an
+    infinite region, that of their fields far away (complex).
     """
 
     values: Real
@@ -48,6 +51,8 @@ class Load:
     known: Real
     far: Complex
     background: Complex
+    of_points: Complex
+    net_force: complex = 0j
 
 
 def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
@@ -61,17 +66,20 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     local = np.array([condition.frame == "local" for condition in conditions], dtype=bool)[which]
     first = np.where(local, mesh.normal[node], 1.0)
     known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
-    stiffness = np.array([value for c in conditions for value in c.stiffness], dtype=float)
     places = Places(mesh.position[node] + model.origin, _measure_along(model, mesh)[node])
+    at_rest = Moment(0.0, 0.0, 1.0)
+    stiffness = [_blend_all([(0.0, c.stiffness[k]) for c in conditions], which, places, at_rest) for k in (0, 1)]
+    # Rounding of an expression that is zero somewhere.
     return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
-                      stiffness.reshape(-1, 2)[which], places)
+                      np.maximum(np.stack(stiffness, axis=1), 0.0), places)
 
 
 def _measure_along(model: Model, mesh: Mesh) -> Real:
     """The length (nodes,) from the first point of its curve to every node where a condition varies; 0 elsewhere."""
     along = np.zeros((mesh.elements, mesh.order + 1))
-    varying = {name for stage in model.stages for name, pair in stage.boundary.items()
-               if any(isinstance(value, Varying) for value in pair)}
+    given = [*((name, condition.stiffness) for name, condition in model.conditions.items()),
+             *(each for stage in model.stages for pairs in (stage.boundary, stage.ends) for each in pairs.items())]
+    varying = {name for name, pair in given if any(isinstance(value, Varying) for value in pair)}
     number = {name: k for k, name in enumerate(mesh.curve_names) if name in varying}
     for side in (side for region in model.regions for loop in region.loops for side in loop.sides):
         if side.curve in number:
@@ -90,15 +98,18 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         start, end = np.array(old, dtype=float), np.array(new, dtype=float)
         return start + factor * (end - start)
 
-    none: tuple[Value, Value] = (0.0, 0.0)
-    values = np.zeros((len(outer.node), 2))
-    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
-    for direction in (0, 1):
-        pairs = [(before.boundary.get(name, none)[direction], after.boundary.get(name, none)[direction])
-                 for name in model.conditions]
-        values[:, direction] = _blend_all(pairs, outer.condition, outer.places, moment)
+    values = _evaluate_pairs(model, outer, (before.boundary, after.boundary), stage, factor)
+    in_axes = np.array([condition.in_axes for condition in model.conditions.values()], dtype=bool)[outer.condition]
+    if in_axes.any():
+        vector = values[in_axes, 0] + 1j * values[in_axes, 1]
+        values[in_axes] = (np.conj(outer.direction[in_axes]) * vector[:, None]).real
+    if after.ends:
+        values += outer.stiffness * evaluate_ends(model, outer, stage, factor)
     remote = interpolate(before.remote, after.remote)
-    balanced = _sample(mesh, [balanced_background(model, region, stage, factor) for region in model.regions])
+    backgrounds = [balanced_background(model, region, stage, factor) for region in model.regions]
+    balanced = _sample(mesh, backgrounds)
+    points = [each for region, background in zip(model.regions, backgrounds, strict=True) if region.infinite
+              for each in background.points]
     far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
@@ -107,7 +118,30 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
+        of_points=_sample(mesh, [each.of_points for each in backgrounds])[0],
+        net_force=sum((each.net_force for each in points), 0j),
     )
+
+
+def _evaluate_pairs(
+    model: Model, outer: OuterNodes, pairs: tuple[Mapping[str, tuple[Value, Value]], Mapping[str, tuple[Value, Value]]],
+    stage: int, factor: float,
+) -> Real:
+    """Of two values (k, 2) for each curve, at the end of the stage before and of this one, those at a fraction of it."""
+    none: tuple[Value, Value] = (0.0, 0.0)
+    values = np.zeros((len(outer.node), 2))
+    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
+    before, after = pairs
+    for direction in (0, 1):
+        own = [(before.get(name, none)[direction], after.get(name, none)[direction]) for name in model.conditions]
+        values[:, direction] = _blend_all(own, outer.condition, outer.places, moment)
+    return values
+
+
+def evaluate_ends(model: Model, outer: OuterNodes, stage: int, factor: float) -> Real:
+    """Displacement (k, 2) of the far ends of springs along the outer nodes' directions."""
+    before = model.stages[stage - 1].ends if stage > 0 else {}
+    return _evaluate_pairs(model, outer, (before, model.stages[stage].ends), stage, factor)
 
 
 def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
@@ -146,7 +180,7 @@ def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
 
 
 def balanced_background(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:
-    """In-situ stress, weight and swelling of a region at the fraction `factor` of a stage.
+    """In-situ stress, weight, swelling and point loads of a region at the fraction `factor` of a stage.
 
     Where the stress grows with the coordinates it balances a weight that acts from the start (theory, 6).
     """
@@ -155,13 +189,33 @@ def balanced_background(model: Model, region: Region, stage: int, factor: float)
     start = complex(*model.stages[stage - 1].gravity) if stage > 0 else at_rest
     gravity = start + factor * (complex(*model.stages[stage].gravity) - start)
     carried = region.material.density * at_rest
-    force = region.material.density * gravity - carried
+    # The weight of an infinite region is carried by the stress far away.
+    force = 0j if region.infinite else region.material.density * gravity - carried
     center = _find_center(model, region) if force else 0
     before = model.stages[stage - 1].swelling if stage > 0 else {}
     grown = before.get(region.name, NO_SWELLING).mix(model.stages[stage].swelling.get(region.name, NO_SWELLING), factor)
     return ParticularSolution(
-        region.material, initial=initial, force=force, carried=carried, center=center, swelling=grown
+        region.material, initial=initial, force=force, carried=carried, center=center, swelling=grown,
+        points=_find_points(model, region, stage, factor),
+        growth=_find_growth(model, stage, factor) if region.infinite else AT_REST,
     )
+
+
+def _find_growth(model: Model, stage: int, factor: float) -> LinearStress:
+    """What the stress far away grows by from the model's middle."""
+    before = model.stages[stage - 1].remote_growth if stage > 0 else AT_REST
+    return before.mix(model.stages[stage].remote_growth, factor)
+
+
+def _find_points(model: Model, region: Region, stage: int, factor: float) -> tuple[PointField, ...]:
+    """The fields of the point loads of a region at the fraction `factor` of a stage."""
+    before = model.stages[stage - 1].point_forces if stage > 0 else {}
+    after, fields = model.stages[stage].point_forces, []
+    for load in model.point_loads_by_region.get(region.name, ()):
+        start, end = np.array(before.get(load.name, (0.0, 0.0, 0.0))), np.array(after[load.name])
+        x, y, moment = (float(value) for value in start + factor * (end - start))
+        fields.append(PointField(load, complex(x, y), moment, model.logarithm_lengths[region.name]))
+    return tuple(each for each in fields if not each.is_zero)
 
 
 def _find_center(model: Model, region: Region) -> complex:

@@ -28,10 +28,12 @@ from pbem.description.schema import (
     LawTable,
     MaterialTable,
     OutputTable,
+    PointLoadTable,
+    PointSupportTable,
     RegionTable,
+    RemoteTable,
     SolverTable,
     StageTable,
-    StressTable,
     UnitsTable,
 )
 from pbem.description.summary import print_case, print_case_as_html
@@ -65,11 +67,13 @@ class Case:
     boundary: Mapping[str, ConditionTable]
     interfaces: Mapping[str, LawTable]
     contacts: Mapping[str, ContactTable]
-    remote: StressTable | None
+    remote: RemoteTable | None
     gravity: GravityTable | None
     initial_stress: Mapping[str, InSituTable]
     temperature: Mapping[str, float | ExpressionTable]
     eigenstrain: Mapping[str, EigenstrainTable]
+    point_loads: Mapping[str, PointLoadTable]
+    point_supports: Mapping[str, PointSupportTable]
     analysis: AnalysisTable
     stages: tuple[StageTable, ...]
     solver: SolverTable
@@ -263,5 +267,5 @@ def _concerns_loads(path: KeyPath) -> bool:
     """Whether a fault here leaves open what holds and what loads the bodies."""
     if path and path[0] == "materials":
         return path[-1] == "density"
-    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
+    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads", "point_supports") or
                            path[0] not in CaseFile.model_fields)

@@ -39,7 +39,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
     findings += _check_stages(raw)
     findings += _check_solver(raw)
     findings += _check_options(raw)
-    for name in ("materials", "curves", "regions", "contacts"):
+    for name in ("materials", "curves", "regions", "contacts", "point_loads", "point_supports"):
         findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc, str(loc[-1]))]
     return findings
 
@@ -157,14 +157,16 @@ def _check_spring(loc: KeyPath, table: Mapping[str, Any], in_axes: Sequence[str]
     if not isinstance(spring, dict):
         return []
     findings = []
-    if in_axes:
-        expected = "local conditions beside a spring (tn, ts or pressure, or un or us where it has no stiffness)"
-        findings.append(Finding((*loc, "spring"), f"{in_axes[0]} together with spring", expected))
+    moved = [key for key in in_axes if key in ("ux", "uy")]
+    if moved:
+        expected = "tractions beside a spring, or un or us where it has no stiffness"
+        findings.append(Finding((*loc, "spring"), f"{moved[0]} together with spring", expected))
     if all(type(value) in (int, float) and value == 0 for value in (spring.get("kn", 0), spring.get("ks", 0))):
         findings.append(Finding((*loc, "spring"), "a spring without stiffness", "kn > 0 or ks > 0"))
     for key, displacement in (("kn", "un"), ("ks", "us")):
         if displacement in table and spring.get(key):
-            findings.append(Finding((*loc, displacement), f"both spring.{key} and {displacement}", "only one of them"))
+            expected = f"only one of them; end_{key[-1]} is the displacement of the spring's far end"
+            findings.append(Finding((*loc, displacement), f"both spring.{key} and {displacement}", expected))
     return findings
 
 

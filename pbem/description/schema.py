@@ -111,8 +111,10 @@ class RegionTable(Table):
 class SpringTable(Table):
     """An elastic support, through all stages: stress per displacement, along the normal and along the curve."""
 
-    kn: NotNegative = Field(0.0, description="elastic support: adds -kn un to tn, through all stages")
-    ks: NotNegative = Field(0.0, description="the same along the curve: adds -ks us to ts")
+    kn: Strength = Field(
+        0.0, description="elastic support: adds -kn (un - end_n) to tn, through all stages; may vary with `x`, `y` and `s`"
+    )
+    ks: Strength = Field(0.0, description="the same along the curve: adds -ks (us - end_s) to ts")
 
 
 class StageConditionTable(Table):
@@ -129,13 +131,15 @@ class StageConditionTable(Table):
     tn: Value | None = Field(None, description="or traction along the outward normal")
     ts: Value | None = Field(None, description="or traction along the normal turned by +90 degrees")
     pressure: Value | None = Field(None, description="`tn = -pressure`, `ts = 0`")
+    end_n: Value | None = Field(None, description="displacement of the far end of a spring `kn`, along the normal")
+    end_s: Value | None = Field(None, description="of the far end of a spring `ks`, along the normal turned by +90")
 
 
 class ConditionTable(StageConditionTable):
     """Conditions on a curve of one region: displacement or traction in two directions. What is not given is free of
     traction."""
 
-    spring: SpringTable | None = Field(None, description="an elastic support in place of displacements")
+    spring: SpringTable | None = Field(None, description="an elastic support, beside tractions, in place of displacements")
 
 
 class LawTable(Table):
@@ -242,12 +246,12 @@ class GenerateTable(LawTable):
     )
 
 
-class StressTable(Table):
-    """Components of a stress."""
+class RemoteTable(Table):
+    """Components of the stress at infinity."""
 
-    sxx: Number = 0.0
-    syy: Number = 0.0
-    sxy: Number = 0.0
+    sxx: LinearValue = 0.0
+    syy: LinearValue = 0.0
+    sxy: LinearValue = 0.0
 
 
 class InSituTable(Table):
@@ -265,6 +269,33 @@ class EigenstrainTable(Table):
     eyy: Number = 0.0
     exy: Number = Field(0.0, description="shear component of the tensor, half the change of the right angle")
     ezz: Number = Field(0.0, description="across the plane; without effect in plane stress")
+
+
+class PointForceTable(Table):
+    """Force and moment at a point, per thickness."""
+
+    fx: Number = Field(0.0, description="force along x")
+    fy: Number = Field(0.0, description="force along y")
+    moment: Number = Field(0.0, description="moment, counter-clockwise; inside regions only")
+
+
+class PointLoadTable(PointForceTable):
+    """A force at a point inside a region or on the boundary of one. NAME is of your choice."""
+
+    at: Point = Field(description="x, y of the point")
+
+
+class PointShiftTable(Table):
+    """Displacement of a point."""
+
+    ux: Number | None = Field(None, description="displacement along x")
+    uy: Number | None = Field(None, description="displacement along y")
+
+
+class PointSupportTable(PointShiftTable):
+    """A point of a boundary whose displacement is given. NAME is of your choice."""
+
+    at: Point = Field(description="x, y of the point")
 
 
 class GravityTable(Table):
@@ -316,10 +347,12 @@ class StageTable(Table):
     )
     interfaces: Mapping[str, StageInterfaceTable] = Field({}, description="of an interface or a crack")
     contacts: Mapping[str, StageInterfaceTable] = Field({}, description="of a contact")
-    remote: StressTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
+    remote: RemoteTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
     gravity: GravityTable | None = Field(None, description="`gx`, `gy` at the end of the stage")
     temperature: Mapping[str, LinearValue] = Field({}, description="of a region at the end of the stage")
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
+    point_loads: Mapping[str, PointForceTable] = Field({}, description="`fx`, `fy`, `moment` at the end of the stage")
+    point_supports: Mapping[str, PointShiftTable] = Field({}, description="`ux`, `uy` at the end of the stage")
 
 
 class SolverTable(Table):
@@ -371,7 +404,10 @@ class CaseFile(Table):
     boundary: Mapping[str, ConditionTable] = {}
     interfaces: Mapping[str, LawTable] = {}
     contacts: Mapping[str, ContactTable] = {}
-    remote: StressTable | None = Field(None, description="Stress at infinity, for infinite regions.")
+    remote: RemoteTable | None = Field(
+        None, description="Stress at infinity, for infinite regions: uniform, or linear in x and y and in balance with "
+        "the region's weight under `[gravity]`."
+    )
     gravity: GravityTable | None = None
     initial_stress: Mapping[str, InSituTable] = Field(
         {}, description="In-situ stress of a material, there before any load; tractions and stresses include it. It is "
@@ -384,6 +420,15 @@ class CaseFile(Table):
     )
     eigenstrain: Mapping[str, EigenstrainTable] = Field(
         {}, description="Strain of a region that has no stress by itself (misfit, swelling, shrinkage), times the load."
+    )
+    point_loads: Mapping[str, PointLoadTable] = Field(
+        {}, description="A force, and inside a region a moment, at a single point: inside a region, or on the boundary "
+        "of one where no displacement is prescribed. Values are those at the end of the load. NAME is of your choice."
+    )
+    point_supports: Mapping[str, PointSupportTable] = Field(
+        {}, description="Displacement of a point of a boundary, for bodies that can move freely and whose loads "
+        "balance: it chooses their rigid motion (three conditions for one body) and carries nothing but the error of "
+        "the mesh, which is stored as its reaction. NAME is of your choice, and no curve's."
     )
     analysis: AnalysisTable = AnalysisTable()
     stages: tuple[StageTable, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -154,6 +154,13 @@ def find_middle(curves: Mapping[str, Curve]) -> complex:
     return first + sum(length * (_find_centroid(leg) - first) for leg, length in zip(legs, lengths, strict=True)) / sum(
         lengths
     )
+
+
+def measure_spread(curves: Mapping[str, Curve], names: Iterable[str]) -> float:
+    """Twice the largest distance of the ends of some curves' elements from their mean."""
+    ends = [leg.element_ends() for name in names for leg in curves[name].legs]
+    points = np.concatenate([each[part] for part in (slice(None, -1), slice(1, None)) for each in ends])
+    return float(2 * np.abs(points - points.mean()).max())
 
 
 def _find_centroid(leg: Leg) -> complex:

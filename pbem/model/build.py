@@ -6,10 +6,12 @@ from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pbem.description.case import Case
 from pbem.errors import CaseError, Fault
 from pbem.geometry.curve import Curve
-from pbem.geometry.junction import find_crossings, split_at_junctions
+from pbem.geometry.junction import find_crossings, format_point, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
@@ -26,13 +28,17 @@ from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.interior import list_interior_points
 from pbem.model.law import check_along
-from pbem.model.loading import Loading, read_loading
+from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
-from pbem.model.model import Analysis, Model, Region, SolverOptions
+from pbem.model.in_situ import AT_REST, LinearStress
+from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
+from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
+from pbem.model.point_supports import PointSupport, place_point_supports
+from pbem.model.support_motions import check_independent
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
-from pbem.model.resultants import describe_unbalance
+from pbem.model.resultants import describe_unbalance, find_unbalanced_force
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
@@ -52,6 +58,8 @@ class _Topology:
     loops: Loops
     tips: Mapping[str, tuple[bool, bool]]
     size: float
+    points: PointLoads
+    supports: Mapping[str, PointSupport]
     notes: tuple[str, ...]
     faults: tuple[Fault, ...]
 
@@ -92,7 +100,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     cut = cut_cracks(case, roles, shape_curves(case, roles))
     case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
-    topology = _find_topology(cut)
+    topology = _find_topology(cut, loading)
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
@@ -119,10 +127,11 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     return model, case, faults
 
 
-def _find_topology(cut: Cut) -> _Topology:
+def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     case, roles, shapes = cut.case, cut.roles, cut.shapes
     split = split_at_junctions(shapes.curves, shapes.tolerance)
-    curves = split.curves
+    loaded = [complex(*table.at) for table in case.point_loads.values()]
+    curves, places = split_at_points(split.curves, shapes.tolerance, loaded)
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
     # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.
@@ -147,18 +156,25 @@ def _find_topology(cut: Cut) -> _Topology:
         seats = split_opposite_ends(curves, loops, roles.contacts, written)
         curves, opposite = seats.curves, seats.opposite
         notes += seats.notes
+    points = PointLoads({}, (), ())
+    if not faults:
+        points = place_point_loads(case, roles, curves, loops, places, list_held(loading.conditions))
+        faults += points.faults
+        notes += points.notes
+    supports, wrong = place_point_supports(case, roles, curves)
+    faults += wrong
     tips = find_tips(curves, cracks)
     curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))
+    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults))
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,
-               tuple(stage.boundary.get(name, (0.0, 0.0)) for stage in loading.stages))
+               tuple((stage.boundary.get(name, (0.0, 0.0)), stage.ends.get(name)) for stage in loading.stages))
         for name, condition in loading.conditions.items()
     }
     behaviour |= {
@@ -201,8 +217,22 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         contacts=loading.contacts,
         groups=case.groups,
         ties=fitted.ties,
+        point_loads=topology.points.loads,
+        point_supports=topology.supports,
     )
+    stages = tuple(_center_remote(stage, model.middle) for stage in model.stages)
+    model = replace(model, stages=stages)
     return replace(model, notes=(*model.notes, *_note_loads(model))), list(fitted.faults)
+
+
+def _center_remote(stage: Stage, middle: complex) -> Stage:
+    """The stress far away as that at the middle of the model and what it grows by from there."""
+    growth = stage.remote_growth
+    if growth.is_uniform:
+        return replace(stage, remote_growth=AT_REST)
+    value = growth.evaluate(np.array([middle]))[0]
+    remote = (float(value[0]), float(value[1]), float(value[2]))
+    return replace(stage, remote=remote, remote_growth=LinearStress((0.0, 0.0, 0.0), growth.by_x, growth.by_y, middle))
 
 
 def _note_choices(case: Case) -> list[str]:
@@ -218,30 +248,40 @@ def _note_loads(model: Model) -> list[str]:
     """A model whose answer is zero everywhere has probably lost its loads."""
     weights = any(region.material.density for region in model.regions)
     loads = [value for stage in model.stages for value in (
-        *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
+        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair), *stage.pressure.values(), *stage.remote,
         *(stage.gravity if weights else ()))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
+    loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
     loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]
     return [] if any(loads) else [
         "No load: all prescribed displacements and tractions, pressures, stresses far away, weights, in-situ stresses, "
-        "swellings and interferences are zero, and so will be the results."
+        "swellings, point loads and interferences are zero, and so will be the results."
     ]
 
 
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
     curves = {side.curve for region in model.regions if region.name in names
               for loop in region.loops for side in loop.sides}
-    return any(0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
+    return any(not isinstance(stiffness, Varying) and 0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
                for stiffness in condition.stiffness)
+
+
+def _leave_out_point_loads(model: Model) -> Model:
+    """The model without weight and point loads, which may have a net force on an infinite region."""
+    none = {name: (0.0, 0.0, 0.0) for name in model.point_loads}
+    return replace(model, stages=tuple(
+        replace(stage, gravity=(0.0, 0.0), point_forces=none) for stage in model.stages
+    ))
 
 
 def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults, balanced = [], []
     regions = {region.name: region for region in model.regions}
-    for motion in find_rigid_body_modes(model):
+    motions = find_rigid_body_modes(model)
+    for motion in motions:
         found = f"a free rigid motion ({motion.text})"
         unbalance = describe_unbalance(model, motion, [regions[name] for name in motion.regions])
         if unbalance is None:
@@ -251,21 +291,27 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
         faults.append(Fault.at(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+    faults += check_independent(list(model.point_supports.values()), motions)
     notes = []
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
         name = next(each.name for each in moving if each.infinite)
-        weightless = replace(model, stages=tuple(replace(stage, gravity=(0.0, 0.0)) for stage in model.stages))
-        unbalance = describe_unbalance(weightless, motion, moving)
-        if unbalance is None and describe_unbalance(model, motion, moving):
-            notes.append(f"The weight of what lies in the infinite region '{name}' is a net force on it: its "
+        unbalance = describe_unbalance(model, motion, moving)
+        if unbalance is None:
+            continue
+        if describe_unbalance(_leave_out_point_loads(model), motion, moving) is None:
+            force = find_unbalanced_force(model, motion, moving)
+            notes.append(f"Weight and point loads have a net force of {format_point(force)} on the infinite region "
+                         f"'{name}', with what lies in it and without what is dug out of it: its "
                          "displacement grows with the logarithm of the distance, so that only stresses, and "
                          "displacements of one point against another, mean anything.")
-        elif unbalance is not None:
+        else:
             found = f"a net force on the infinite region '{name}': {unbalance}"
             expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "
                         "logarithm of the distance and has no value; or a finite region that is held")
             faults.append(Fault.at(("regions", name), found, expected))
-    sentence = "Nothing prevents: {}. The loads balance, and the mean displacement and rotation are set to zero."
+    chosen = "as far as no point support says otherwise, " if model.point_supports else ""
+    sentence = ("Nothing prevents: {}. The loads balance, and " + chosen +
+                "the mean displacement and rotation are set to zero.")
     listed = [*balanced[:6], *([f"and {len(balanced) - 6} more"] if len(balanced) > 6 else [])]
     return faults, [*([sentence.format("; ".join(listed))] if balanced else []), *dict.fromkeys(notes)]

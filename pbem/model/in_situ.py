@@ -60,6 +60,14 @@ class LinearStress:
             for value, x, y in zip(self.value, self.by_x, self.by_y, strict=True)
         )
 
+    def mix(self, other: LinearStress, part: float) -> LinearStress:
+        """So much of the way to another one about the same center; one that is zero may have any."""
+        value, by_x, by_y = (
+            tuple(a + part * (b - a) for a, b in zip(one, two, strict=True))
+            for one, two in ((self.value, other.value), (self.by_x, other.by_x), (self.by_y, other.by_y))
+        )
+        return LinearStress(value, by_x, by_y, other.center if self.is_zero else self.center)  # type: ignore[arg-type]
+
     def move(self, shift: complex) -> LinearStress:
         """The same about another origin: the places of the model have become less by the shift."""
         return self if self.is_uniform else replace(self, center=self.center - shift)

@@ -15,6 +15,8 @@ from pbem.model.given import read_value
 from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
+from pbem.model.point_loads import read_point_forces
+from pbem.model.point_supports import read_support_values
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
@@ -28,6 +30,9 @@ _KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {
     "un": ("local", 0, "displacement"), "us": ("local", 1, "displacement"),
     "tn": ("local", 0, "traction"), "ts": ("local", 1, "traction"),
 }
+
+
+ENDS = ("end_n", "end_s")
 
 
 @dataclass(frozen=True)
@@ -75,9 +80,16 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     faults += backgrounds.faults
     swellings = read_swellings(case, find_corners(case))
     faults += swellings.faults
+    point_forces, wrong = read_point_forces(case)
+    faults += wrong
+    support_values, wrong = read_support_values(case)
+    faults += wrong
     stages = tuple(
-        replace(stage, swelling=swelling) for stage, swelling in
-        zip(_find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, strict=True)
+        replace(stage, swelling=swelling, point_forces=forces, support_values=shifts, remote_growth=growth)
+        for stage, swelling, forces, shifts, growth in zip(
+            _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, point_forces,
+            support_values, backgrounds.remote, strict=True,
+        )
     )
     faults += _check_durations(case, joints, stages)
     return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress,
@@ -105,8 +117,10 @@ def _check_values(case: Case) -> Iterator[Fault]:
     for number, stage in enumerate(case.stages):
         for key in ("boundary", "interfaces", "contacts"):
             tables += [(("stages", number, key, name), table) for name, table in getattr(stage, key).items()]
+    for name in case.boundary:
+        yield from read_springs(case, name)[1]
     for loc, table in tables:
-        for key in (*_KEYS, "pressure"):
+        for key in (*_KEYS, "pressure", *ENDS):
             yield from read_value((*loc, key), getattr(table, key, None), timed=True)[1]
 
 
@@ -163,11 +177,11 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
     frame: Literal["global", "local"] | None = None
     known: list[Quantity | None] = [None, None]
     where = ["", ""]
-    spring = case.boundary[curve].spring if curve in case.boundary else None
-    stiffness = (spring.kn, spring.ks) if spring else (0.0, 0.0)
+    stiffness = read_springs(case, curve)[0]
+    sprung = any(stiffness)
     for direction in (0, 1):
         if stiffness[direction]:
-            frame, known[direction], where[direction] = "local", "traction", "spring"
+            known[direction], where[direction] = "traction", "spring"
     for order, (loc, table) in enumerate(_tables(case, curve)):
         for key in _given(table):
             key_frame, direction, quantity = _KEYS[key]
@@ -178,6 +192,10 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
                 faults.append(fault)
                 break
             frame = key_frame
+            if sprung and key_frame == "global" and quantity == "displacement":
+                expected = "tractions beside a spring, or un or us where it has no stiffness"
+                faults.append(Fault.at(written, f"'{key}' beside a spring", expected))
+                continue
             if known[direction] not in (None, quantity):
                 found = f"'{written[-1]}' where '{where[direction]}' was given before"
                 expected = f"the same kind of condition in all stages ({known[direction]} in this direction)"
@@ -188,7 +206,39 @@ def _find_condition(case: Case, curve: str) -> tuple[Condition, list[Fault]]:
                 faults.append(Fault.at(written, found, expected))
             if known[direction] is None:
                 known[direction], where[direction] = quantity, str(written[-1])
-    return Condition(curve, frame or "global", (known[0] or "traction", known[1] or "traction"), stiffness), faults
+    faults += _check_ends(case, curve, stiffness)
+    in_axes = sprung and frame == "global"
+    return Condition(
+        curve, "local" if sprung else frame or "global", (known[0] or "traction", known[1] or "traction"), stiffness,
+        in_axes,
+    ), faults
+
+
+def read_springs(case: Case, curve: str) -> tuple[tuple[Value, Value], list[Fault]]:
+    """The stiffness along the normal and along the curve, with faults of expressions that are none."""
+    spring = case.boundary[curve].spring if curve in case.boundary else None
+    if spring is None:
+        return (0.0, 0.0), []
+    found = [read_value(("boundary", curve, "spring", key), getattr(spring, key), timed=False) for key in ("kn", "ks")]
+    return (found[0][0] or 0.0, found[1][0] or 0.0), [fault for _, faults in found for fault in faults]
+
+
+def _check_ends(case: Case, curve: str, stiffness: tuple[Value, Value]) -> Iterator[Fault]:
+    """Far ends are those of springs."""
+    for loc, table in _tables(case, curve):
+        for key, spring, each in (("end_n", "kn", stiffness[0]), ("end_s", "ks", stiffness[1])):
+            if getattr(table, key) is not None and not each:
+                yield Fault.at((*loc, key), f"'{key}' without a spring", f"spring.{spring} in [boundary.{curve}]")
+
+
+def list_held(conditions: Mapping[str, Condition]) -> dict[str, tuple[str, ...]]:
+    """The curves on which displacements are prescribed, with the keys that do."""
+    held = {
+        name: tuple(key for key, (frame, direction, quantity) in _KEYS.items() if quantity == "displacement"
+                    and frame == condition.frame and condition.known[direction] == quantity)
+        for name, condition in conditions.items()
+    }
+    return {name: keys for name, keys in held.items() if keys}
 
 
 def _is_late(case: Case, curve: str, order: int) -> bool:
@@ -204,25 +254,29 @@ def _find_stages(
     values: dict[str, list[Value]] = {name: [0.0, 0.0] for name in conditions}
     pressure: dict[str, Value] = {name: 0.0 for name in joints}
     laws = {**case.contacts, **case.interfaces}
+    ends: dict[str, list[Value]] = {name: [0.0, 0.0] for name in conditions if _has_ends(case, name)}
     for name in conditions:
         _update(values[name], case.boundary.get(name))
+        _move_ends(ends, name, case.boundary.get(name))
     for name in joints:
         if name in laws:
             pressure[name] = _read(laws[name].pressure)
-    fields = list(zip(backgrounds.remote, backgrounds.gravity, strict=True))
+    fields = [(stress.value, gravity) for stress, gravity in zip(backgrounds.remote, backgrounds.gravity, strict=True)]
     if not case.stages:
-        return (Stage("load", case.analysis.steps, _freeze(values), dict(pressure), *fields[0]),)
+        return (Stage("load", case.analysis.steps, _freeze(values), dict(pressure), *fields[0], ends=_freeze(ends)),)
     stages = []
     for number, stage in enumerate(case.stages):
         for name in conditions:
             _update(values[name], stage.boundary.get(name))
+            _move_ends(ends, name, stage.boundary.get(name))
         changes = {**stage.contacts, **stage.interfaces}
         for name in joints:
             if name in changes:
                 pressure[name] = _read(changes[name].pressure)
         name = stage.name or f"stage {number + 1}"
         duration = stage.duration or 0.0
-        stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number], duration=duration))
+        stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number], duration=duration,
+                            ends=_freeze(ends)))
     return tuple(stages)
 
 
@@ -251,6 +305,16 @@ def _check_durations(case: Case, laws: Mapping[str, Law], stages: Sequence[Stage
 def _update(values: list[Value], table: StageConditionTable | None) -> None:
     for key, value in _given(table).items() if table else ():
         values[_KEYS[key][1]] = value
+
+
+def _has_ends(case: Case, curve: str) -> bool:
+    return any(getattr(table, key) is not None for _, table in _tables(case, curve) for key in ENDS)
+
+
+def _move_ends(ends: Mapping[str, list[Value]], curve: str, table: StageConditionTable | None) -> None:
+    for direction, key in enumerate(ENDS):
+        if table is not None and getattr(table, key) is not None:
+            ends[curve][direction] = _read(getattr(table, key))
 
 
 def _freeze(values: Mapping[str, list[Value]]) -> dict[str, tuple[Value, Value]]:

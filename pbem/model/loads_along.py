@@ -36,7 +36,23 @@ def check_loads(case: Case, model: Model) -> list[Fault]:
         times = [model.find_time(stage, fraction) for stage in stages
                  for fraction in (*FRACTIONS, *_list_steps(model.stages[stage].steps))]
         faults += _check_value(loc, value, model.curves[curve], times if value.timed else times[-1:])
-    return faults
+    return faults + [fault for name, condition in model.conditions.items()
+                     for key, value in zip(("kn", "ks"), condition.stiffness, strict=True) if isinstance(value, Varying)
+                     for fault in _check_spring(("boundary", name, "spring", key), value, model.curves[name])]
+
+
+def _check_spring(loc: KeyPath, value: Varying, curve: Curve) -> Iterator[Fault]:
+    """A stiffness that varies is finite and not negative anywhere."""
+
+    def evaluate(places: Places) -> Real:
+        values = value.evaluate(places)
+        return np.where(np.isfinite(values), values, np.nan)
+
+    least, place = find_least(curve, evaluate)
+    if not least >= 0:
+        what = f"{least:.6g}" if np.isfinite(least) else "no finite value"
+        found = f"a stiffness that is {what} at {format_point(place)} on curve '{curve.name}'"
+        yield Fault.at(loc, found, "a finite stiffness >= 0 everywhere on the curve")
 
 
 def _list_steps(steps: int) -> list[float]:
@@ -54,7 +70,7 @@ def _list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]
     for loc, table, first in tables:
         name = str(loc[-1])
         curve = case.contacts[name].between[0] if loc[-2] == "contacts" and name in case.contacts else name
-        for key in (*CONDITIONS, "pressure"):
+        for key in (*CONDITIONS, "pressure", *ENDS):
             given = getattr(table, key, None)
             if isinstance(given, VaryingTable):
                 yield (*loc, key), curve, given, range(first, _find_next(case, (*loc, key), first))
@@ -72,9 +88,10 @@ def _find_next(case: Case, loc: KeyPath, first: int) -> int:
     return max(len(case.stages), 1)
 
 
+ENDS = ("end_n", "end_s")
 CONDITIONS = ("ux", "uy", "tx", "ty", "un", "us", "tn", "ts")
 # Keys of which one takes the place of another.
-ALIKE = (("ux", "tx", "un", "tn", "pressure"), ("uy", "ty", "us", "ts", "pressure"))
+ALIKE = (("ux", "tx", "un", "tn", "pressure"), ("uy", "ty", "us", "ts", "pressure"), ("end_n",), ("end_s",))
 
 
 def _check_value(loc: KeyPath, value: Varying, curve: Curve, times: list[float]) -> list[Fault]:

@@ -8,10 +8,12 @@ from functools import cached_property
 from typing import Literal
 
 from pbem.description.generation import GeneratedGroup
-from pbem.geometry.curve import Curve, find_middle
+from pbem.geometry.curve import Curve, find_middle, measure_spread
 from pbem.geometry.loop import Loop
-from pbem.model.in_situ import LinearStress
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.material import Material
+from pbem.model.point_loads import Force, PointLoad
+from pbem.model.point_supports import PointSupport, Shift
 from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
@@ -94,14 +96,21 @@ class Condition:
     """What is known on an outer curve, in two directions: x, y (global) or normal (outward), tangential (local).
 
     known: per direction the quantity whose values the stages give; the other one is unknown.
-    stiffness: Winkler springs per direction (stress/length): the traction is the known one minus stiffness times
-    displacement; zero where the displacement is known.
+    stiffness: Winkler springs per direction (stress/length), which may vary along the curve: the traction is the known
+    one minus stiffness times the displacement against the springs' far ends; zero where the displacement is known.
+    in_axes: the known tractions are given along x and y all the same, beside springs in the local frame.
     """
 
     curve: str
     frame: Literal["global", "local"] = "global"
     known: tuple[Quantity, Quantity] = ("traction", "traction")
-    stiffness: tuple[float, float] = (0.0, 0.0)
+    stiffness: tuple[Value, Value] = (0.0, 0.0)
+    in_axes: bool = False
+
+    @property
+    def value_frame(self) -> Literal["global", "local"]:
+        """The directions along which values are given."""
+        return "global" if self.in_axes else self.frame
 
 
 @dataclass(frozen=True)
@@ -111,8 +120,10 @@ class Stage:
 
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
-    infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
+    infinity, for infinite regions, at the model's middle; remote_growth: how it grows from there; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
+    point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
+    point support. ends: of the curves whose springs' far ends move: by how much, along the normal and the curve.
     """
 
     name: str
@@ -123,11 +134,16 @@ class Stage:
     gravity: tuple[float, float] = (0.0, 0.0)
     duration: float = 0.0
     swelling: Mapping[str, Swelling] = field(default_factory=dict)
+    point_forces: Mapping[str, Force] = field(default_factory=dict)
+    support_values: Mapping[str, Shift] = field(default_factory=dict)
+    ends: Mapping[str, tuple[Value, Value]] = field(default_factory=dict)
+    remote_growth: LinearStress = AT_REST
 
 
 def list_timed(stage: Stage) -> list[Varying]:
     """The loads of a stage that depend on time by themselves."""
-    values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
+    values = [*(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
+              *stage.pressure.values()]
     return [value for value in values if isinstance(value, Varying) and value.timed]
 
 
@@ -178,7 +194,7 @@ class Model:
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
     were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
-    notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
+    point_loads: where forces act at single points. point_supports: where points of free bodies are. notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
     title: str
@@ -206,6 +222,8 @@ class Model:
     law_texts: Mapping[str, str] = field(default_factory=dict)
     overrides: str = ""
     origin: complex = 0j
+    point_loads: Mapping[str, PointLoad] = field(default_factory=dict)
+    point_supports: Mapping[str, PointSupport] = field(default_factory=dict)
 
     @cached_property
     def timed(self) -> bool:
@@ -221,6 +239,31 @@ class Model:
     def middle(self) -> complex:
         """The mean place of all curves, which the strain of stress far away does not move."""
         return find_middle(self.curves)
+
+    @cached_property
+    def grows_without_end(self) -> bool:
+        """Whether the stress of an infinite region does, so that its energy has no bounds."""
+        infinite = [region.material.name for region in self.regions if region.infinite]
+        grown = [self.initial_stress[name] for name in infinite if name in self.initial_stress]
+        return not all(each.is_uniform for each in (*grown, *(stage.remote_growth for stage in self.stages)))
+
+    @cached_property
+    def point_loads_by_region(self) -> dict[str, tuple[PointLoad, ...]]:
+        """The point loads of every region that has any."""
+        regions = dict.fromkeys(load.region for load in self.point_loads.values())
+        return {
+            name: tuple(load for load in self.point_loads.values() if load.region == name) for name in regions
+        }
+
+    @cached_property
+    def logarithm_lengths(self) -> dict[str, float]:
+        """The unit of the logarithm in the equations of every region with point loads: `bem.operator.collect_sources`.
+        """
+        return {
+            region.name: 8 * measure_spread(self.curves, (
+                *(side.curve for loop in region.loops for side in loop.sides), *region.cracks))
+            for region in self.regions if region.name in self.point_loads_by_region
+        }  # fmt: skip
 
     @property
     def finite_regions(self) -> list[int]:

@@ -71,8 +71,11 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
         ties=tuple(replace(tie, corner=tie.corner - origin) for tie in model.ties),
         interior_points=tuple(point - origin for point in model.interior_points),
         stages=tuple(
-            replace(stage, swelling={name: each.move(origin) for name, each in stage.swelling.items()})
+            replace(stage, swelling={name: each.move(origin) for name, each in stage.swelling.items()},
+                    remote_growth=stage.remote_growth.move(origin))
             for stage in model.stages
         ),
+        point_loads={name: load.move(origin) for name, load in model.point_loads.items()},
+        point_supports={name: support.move(origin) for name, support in model.point_supports.items()},
         initial_stress={name: stress.move(origin) for name, stress in model.initial_stress.items()},
     )

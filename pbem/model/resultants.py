@@ -15,6 +15,7 @@ from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.model.varying import Places, Value, Varying, evaluate, negate
+from pbem.wording import list_names
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
 BALANCED = 1e-9
@@ -39,12 +40,23 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
             if abs(power) <= least * scale:
                 continue
             about = format_point(model.origin)
-            loads = "tractions and weight" if any(stage.gravity) else "tractions"
+            kinds = ["tractions", *(["weight"] if any(stage.gravity) else []),
+                     *(["point loads"] if any(map(any, stage.point_forces.values())) else [])]
+            loads = list_names(kinds)
             return (
                 f"the {loads} of stage '{stage.name}' drive it, with resultant "
                 f"{format_point(force)} and moment {moment:.6g} about {about}"
             )
     return None
+
+
+def find_unbalanced_force(model: Model, motion: RigidBodyMode, moving: Sequence[Region]) -> complex:
+    """The resultant of the loads on what moves at the end of the first stage in which they drive it."""
+    for number, stage in enumerate(model.stages):
+        force, _, power, scale = _sum_tractions(model, motion, moving, stage, model.find_time(number, 1.0))
+        if abs(power) > BALANCED * scale:
+            return force
+    return 0j
 
 
 def _has_expressions(stage: Stage) -> bool:
@@ -62,6 +74,13 @@ def _sum_tractions(
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
     for region in moving:
         a, spin = motion.velocities[region.name]
+        for load in model.point_loads_by_region.get(region.name, ()):
+            x, y, own_moment = stage.point_forces[load.name]
+            own, moved = complex(x, y), a + 1j * spin * load.place
+            force += own
+            moment += float((np.conj(load.place) * own).imag) + own_moment
+            power += float((np.conj(own) * moved).real) + own_moment * spin
+            scale += abs(own) * (abs(a) + abs(spin * load.place)) + abs(own_moment * spin)
         weight, lever = _weigh(model, region, stage)
         force += weight
         moment += float((np.conj(lever) * weight).imag)
@@ -108,10 +127,13 @@ def _divide_side(curves: Mapping[str, Curve], side: Side, values: tuple[Value, V
 
 
 def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex]:
-    """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops."""
-    if region.infinite or not any(stage.gravity):
-        return 0j, 0j
+    """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops.
+
+    Of an infinite region, which stress far away carries, minus the weight that its holes would have.
+    """
     legs = loop_legs(model.curves, region.loops)
+    if not any(stage.gravity) or not legs:
+        return 0j, 0j
     origin = legs[0].start
     area, first_moment = 0.0, 0j
     for leg in legs:
@@ -137,5 +159,5 @@ def _tractions(
         evaluate(value, places, time) if quantity == "traction" else np.zeros(places.point.shape)
         for value, quantity in zip(values, condition.known, strict=True)
     )
-    frame = normals if condition.frame == "local" else np.ones_like(normals)
+    frame = normals if condition.value_frame == "local" else np.ones_like(normals)
     return np.asarray((first + 1j * second) * frame)

@@ -15,8 +15,8 @@ from pbem.geometry.loop import Side
 from pbem.geometry.sampling import sample_side
 from pbem.model.model import Contact, Interface, Law, Model, Region
 from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
-from pbem.model.touching import measure_opening
-from pbem.model.varying import Varying
+from pbem.model.touching import measure_opening, place_on_leg
+from pbem.model.varying import Places, Varying
 from pbem.wording import list_names
 
 Tie = Literal["both", "normal", "none"]
@@ -129,8 +129,14 @@ def _link_to_ground(model: Model, center: complex, scale: float, plane_held: boo
             condition = model.conditions.get(side.curve)
             if condition is None:
                 continue
+            least = find_least_stiffness(model, region)
+            for k, value in enumerate(condition.stiffness):
+                if isinstance(value, Varying):
+                    points, normals = _find_stiff(model, side.curve, value, least)
+                    if len(points):
+                        yield number, GROUND, _constrain(_motions(points, center, scale), [1j**k * normals])
             held = [
-                quantity == "displacement" or stiffness > find_least_stiffness(model, region)
+                quantity == "displacement" or (not isinstance(stiffness, Varying) and stiffness > least)
                 for quantity, stiffness in zip(condition.known, condition.stiffness, strict=True)
             ]
             if any(held):
@@ -138,6 +144,18 @@ def _link_to_ground(model: Model, center: complex, scale: float, plane_held: boo
                 first = normals if condition.frame == "local" else np.ones_like(normals)
                 directions = [direction for direction, holds in zip((first, 1j * first), held, strict=True) if holds]
                 yield number, GROUND, _constrain(_motions(points, center, scale), directions)
+
+
+def _find_stiff(model: Model, curve: str, stiffness: Varying, least: float) -> tuple[Complex, Complex]:
+    """Points of a curve, and normals there, at which a spring is stiffer than the least that holds."""
+    found, passed = [], 0.0
+    for leg in model.curves[curve].legs:
+        places = place_on_leg(leg, passed, np.linspace(0.0, 1.0, 33))
+        shifted = Places(places.point + model.origin, places.along)
+        stiff = stiffness.evaluate(shifted) > least
+        found.append((places.point[stiff], leg.normals(places.point)[stiff]))
+        passed += leg.length
+    return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
 def _link_regions(

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from pbem.description.case import Case
-from pbem.description.schema import GravityTable, StressTable
+from pbem.description.schema import GravityTable, InSituTable, RemoteTable
+from pbem.description.varying import ExpressionTable
 from pbem.errors import Fault, KeyPath
-from pbem.model.in_situ import LinearStress, check_rest, read_in_situ
+from pbem.model.in_situ import AT_REST, BALANCED, COMPONENTS, LinearStress, check_rest, read_in_situ
 from pbem.model.roles import unknown_name
 from pbem.model.shaping import find_corners
-
-Stress = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -20,7 +19,7 @@ class Backgrounds:
     """remote, gravity: values at the end of every stage; initial_stress: by the names of materials; rest_gravity: of
     [gravity], with which stress that grows with the coordinates is in balance."""
 
-    remote: tuple[Stress, ...]
+    remote: tuple[LinearStress, ...]
     gravity: tuple[tuple[float, float], ...]
     initial_stress: Mapping[str, LinearStress]
     rest_gravity: complex
@@ -29,17 +28,27 @@ class Backgrounds:
 
 def read_backgrounds(case: Case) -> Backgrounds:
     """Complete values for every stage; what a stage leaves out keeps the value reached before."""
-    remote, gravity = [0.0, 0.0, 0.0], [0.0, 0.0]
+    given: dict[str, float | ExpressionTable] = dict.fromkeys(COMPONENTS, 0.0)
+    gravity = [0.0, 0.0]
     stresses, accelerations = [], []
-    _update(remote, case.remote, ("sxx", "syy", "sxy"))
+    faults: list[Fault] = []
+
+    def read(loc: KeyPath, table: RemoteTable | None) -> LinearStress:
+        """What is given so far, with the changes of a table."""
+        given.update({key: getattr(table, key) for key in COMPONENTS if table and key in table.model_fields_set})
+        stress, wrong = read_in_situ(loc, InSituTable.model_construct(**given), find_corners(case))
+        faults.extend(fault for fault in wrong if table and fault.path[-1] in table.model_fields_set)
+        return stress
+
+    remote = read(("remote",), case.remote)
     _update(gravity, case.gravity, ("gx", "gy"))
-    for stage in case.stages or (None,):
+    for number, stage in enumerate(case.stages or (None,)):
         if stage is not None:
-            _update(remote, stage.remote, ("sxx", "syy", "sxy"))
+            remote = read(("stages", number, "remote"), stage.remote)
             _update(gravity, stage.gravity, ("gx", "gy"))
-        stresses.append((remote[0], remote[1], remote[2]))
+        stresses.append(remote)
         accelerations.append((gravity[0], gravity[1]))
-    faults = [*_check_remote(case), *_check_gravity(case), *_check_materials(case)]
+    faults += [*_check_remote(case), *_check_gravity(case), *_check_materials(case)]
     at_rest = complex(case.gravity.gx, case.gravity.gy) if case.gravity else 0j
     initial = {}
     for name, table in case.initial_stress.items():
@@ -47,19 +56,45 @@ def read_backgrounds(case: Case) -> Backgrounds:
         faults += wrong
         if name in case.materials and not wrong:
             faults += _check_rest(case, name, initial[name], at_rest)
+    faults = faults or [*_check_infinite(case, stresses, accelerations, initial)]
     return Backgrounds(tuple(stresses), tuple(accelerations), initial, at_rest, tuple(faults))
 
 
 def _check_rest(case: Case, name: str, stress: LinearStress, at_rest: complex) -> Iterator[Fault]:
     loc: KeyPath = ("initial_stress", name)
     yield from check_rest(loc, stress, case.materials[name].density, at_rest)
-    infinite = next((key for key, table in case.regions.items() if table.infinite and table.material == name), None)
-    if infinite is not None and not stress.is_uniform:
-        found = f"a stress that grows with the coordinates, in the infinite region '{infinite}'"
-        yield Fault.at(loc, found, "a finite region for it: without end it has no bounds, and no energy")
 
 
-def _update(values: list[float], table: StressTable | GravityTable | None, keys: tuple[str, ...]) -> None:
+def _check_infinite(
+    case: Case, remote: Sequence[LinearStress], gravity: Sequence[tuple[float, float]],
+    initial: Mapping[str, LinearStress],
+) -> Iterator[Fault]:
+    """A fault at the first stage at whose end stress far away is not in balance with the weight of an infinite region.
+    """
+    name = next((name for name, table in case.regions.items() if table.infinite), None)
+    if name is None or case.regions[name].material not in case.materials:
+        return
+    density = case.materials[case.regions[name].material].density
+    rest = initial.get(case.regions[name].material, AT_REST)
+    for number, (stress, (x, y)) in enumerate(zip(remote, gravity, strict=True)):
+        weight, held = density * complex(x, y), stress.divergence + rest.divergence
+        if abs(weight + held) <= BALANCED * max(abs(weight), abs(held)):
+            continue
+        stage = case.stages[number] if case.stages else None
+        if stage is not None and (stage.remote or stage.gravity):
+            loc: KeyPath = ("stages", number, "remote" if stage.remote else "gravity")
+        else:
+            loc = ("remote",) if case.remote and not stress.is_uniform else ("gravity",)
+        found = (f"a stress that grows by ({held.real:.6g}, {held.imag:.6g}) per length in the infinite region '{name}' "
+                 f"against a weight of ({weight.real:.6g}, {weight.imag:.6g}) per volume")
+        table_name = f"[initial_stress.{case.regions[name].material}]"
+        expected = (f"a stress in [remote] or {table_name} that grows with x and y in balance with the weight: "
+                    "d sxx/dx + d sxy/dy = -density gx, d sxy/dx + d syy/dy = -density gy; or density = 0 there")
+        yield Fault.at(loc, found, expected)
+        return
+
+
+def _update(values: list[float], table: GravityTable | None, keys: tuple[str, ...]) -> None:
     for index, key in enumerate(keys):
         if table is not None and key in table.model_fields_set:
             values[index] = getattr(table, key)
@@ -86,12 +121,6 @@ def _check_gravity(case: Case) -> Iterator[Fault]:
             continue
         if not any(material.density for material in used.values()):
             yield Fault.at(loc, "gravity on regions without density", "a density > 0 in the material of a region")
-        for name, material in used.items():
-            if case.regions[name].infinite and material.density:
-                found = f"the weight of an infinite region ('{name}', density {material.density:g})"
-                table_name = f"[initial_stress.{case.regions[name].material}]"
-                expected = f"density = 0 there; its stress at rest goes into {table_name}"
-                yield Fault.at(loc, found, expected)
 
 
 def _check_materials(case: Case) -> Iterator[Fault]:

@@ -26,14 +26,14 @@ is more it was set free, under loads that hardly change, and the trapezoid on th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.laws import collect_laws
-from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load
 from pbem.mesh.interpolation import interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.model.model import Model
@@ -45,6 +45,7 @@ from pbem.results.dissipation import (
     record_pairs,
     record_pairs_at_rest,
 )
+from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Step
 
@@ -63,7 +64,8 @@ MOST_NAMES = 4
 class Energy:
     """Per unit of thickness (stress times length squared), since before any load.
 
-    external: work of prescribed tractions and displacements, fluid pressure, weight, stress far away, and swelling.
+    external: work of prescribed tractions and displacements, fluid pressure, weight, stress far away, point loads, and
+    swelling. The energy of point loads is that without the infinite one of each load alone (pbem.results.point_work).
     elastic: stored in the regions, in springs under outer curves and in the elastic joints of interfaces.
     dissipated: by friction and by bonds that parted; it never falls.
     released: set free where faces ran away within a step, as motion that the quasi-static balance does not follow.
@@ -89,17 +91,21 @@ class Runaway:
 @dataclass(frozen=True)
 class _Reference:
     """Fields of unit forces or unit stresses in one region: its faces (k,), their traction and displacement (c, k),
-    and the integral (c,) of the displacement over a finite region."""
+    and the integral (c,) of the displacement over a finite region. at_points (c, l): what they move the model's point
+    loads by, 3 numbers each; 0 for those of other regions."""
 
     faces: Integer
     traction: Complex
     displacement: Complex
     integral: Complex
+    at_points: Real
 
-    def conjugate(self, weight: Real, traction: Complex, displacement: Complex) -> Real:
-        """Betti's sum (c,) for the field with these tractions and displacements on all faces (f,)."""
+    def conjugate(self, weight: Real, traction: Complex, displacement: Complex, point_forces: Real) -> Real:
+        """Betti's sum (c,) for the field with these tractions and displacements on all faces (f,), and point loads (l,).
+        """
         w, t, u = weight[self.faces], traction[self.faces], displacement[self.faces]
-        return np.asarray((w * (t * np.conj(self.displacement) - np.conj(self.traction) * u)).real.sum(axis=1))
+        on_faces = (w * (t * np.conj(self.displacement) - np.conj(self.traction) * u)).real.sum(axis=1)
+        return np.asarray(on_faces + self.at_points @ point_forces)
 
 
 @dataclass(frozen=True)
@@ -172,6 +178,8 @@ class EnergyBalance:
             dissipated=before.dissipated + dissipated,
             released=before.released + released,
         )
+        if self._model.grows_without_end:  # so would the energy
+            return replace(self._reached, external=np.nan, elastic=np.nan)
         return self._reached
 
     def _find_runaway(
@@ -222,10 +230,20 @@ class EnergyBalance:
         loads, conjugates = [np.zeros(0)], [np.zeros(0)]
         swollen = self._sample_swelling([balanced for balanced, _ in backgrounds])
         displacement = displacement - swollen
+        point_forces = np.zeros(0)
+        if self._model.point_loads:
+            point_forces = measure_point_forces(self._model, stage, factor)
+            moved = measure_point_motions(
+                self._model, self._mesh, self._faces, self._weight, (displacement, traction), backgrounds
+            )
+            loads.append(point_forces)
+            conjugates.append(moved)
         stored = 0.5 * _dot(self._weight, traction + self._in_situ, displacement)
+        if self._model.point_loads:
+            stored += 0.5 * float(point_forces @ moved)
         for reference in self._forces:
             balanced, _ = backgrounds[self._faces.region[reference.faces[0]]]
-            moved = reference.conjugate(self._weight, elastic, displacement)
+            moved = reference.conjugate(self._weight, elastic, displacement, point_forces)
             moved += (np.conj(balanced.force) * reference.integral).real
             weight = balanced.force + balanced.carried
             loads.append(np.array([weight.real, weight.imag]))
@@ -236,19 +254,21 @@ class EnergyBalance:
         for reference in self._stresses:
             balanced, far = backgrounds[self._faces.region[reference.faces[0]]]
             initial, remote = np.array(balanced.initial.value), np.array(far.remote)
-            strained = reference.conjugate(self._weight, elastic, displacement)
+            strained = reference.conjugate(self._weight, elastic, displacement, point_forces)
             loads.append(initial + remote)
             conjugates.append(strained)
             stored += 0.5 * float((2 * initial + remote) @ strained)
-        springs = 0.5 * self._measure_springs(displacement + swollen)
+        springs = 0.5 * self._measure_springs(displacement + swollen, stage, factor)
         return _State(
             traction, displacement + swollen, swollen, np.concatenate(loads), np.concatenate(conjugates), stored,
             springs, pairs,
         )
 
-    def _measure_springs(self, displacement: Complex) -> float:
+    def _measure_springs(self, displacement: Complex, stage: int, factor: float) -> float:
         outer = self._outer
         along = (np.conj(outer.direction) * displacement[outer.node][:, None]).real
+        if self._model.stages[stage].ends:
+            along -= evaluate_ends(self._model, outer, stage, factor)
         return float(self._weight[outer.node] @ (outer.stiffness * along**2).sum(axis=1))
 
     def _sample_in_situ(self) -> Complex:
@@ -278,8 +298,11 @@ class EnergyBalance:
         """Fields about the origin, or about a point `within` a finite region, where rounding is smallest."""
         faces = self._find_faces(region)
         z, n = self._faces.position[faces], self._faces.normal[faces]
-        if within:
-            z = z - z.mean()
+        center = complex(z.mean()) if within else 0j
+        z = z - center
+        loads = list(self._model.point_loads.values())
+        motions = evaluate_unit_motions(list(fields), center, loads, self._model.size).reshape(len(fields), -1)
+        motions *= np.repeat([load.region == self._model.regions[region].name for load in loads], 3)
         # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
         second_moment = 0.5 * (self._weight[faces] * n * z**2 * np.conj(z)).sum()
         return _Reference(
@@ -287,6 +310,7 @@ class EnergyBalance:
             np.array([field.traction(z, n) for field in fields]),
             np.array([field.displacement(z) for field in fields]),
             np.array([complex(field.displacement(np.array([1 + 0j]))[0]) * second_moment for field in fields]),
+            motions,
         )
 
 

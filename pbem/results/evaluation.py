@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.hierarchical import choose_terms
+from pbem.bem.hoop import sample_points
 from pbem.bem.interior import InteriorRows, Values, turn_stress
 from pbem.bem.location import Location
 from pbem.bem.pointwise import PointRows, spread_points
@@ -126,9 +127,18 @@ class Evaluator:
             moved, traction, hoop_stress = self._read(at)
             first, opposite = split_faces(mesh, moved)
             u, t = np.where(crack, first - opposite, first), np.where(crack, 0.0, traction[: mesh.nodes])
-            total = evaluate_face_limits(run, where, points, moved, traction, hoop_stress)
             stage, factor = int(self._steps.stage[at]), float(self._steps.factor[at])
-            for region, (balanced, far) in enumerate(evaluate_particular_solutions(run.model, stage, factor)):
+            backgrounds = evaluate_particular_solutions(run.model, stage, factor)
+            of_points = sample_points(mesh, [balanced for balanced, _ in backgrounds])
+            if of_points is not None:
+                moved, traction = moved - of_points.displacement, traction - of_points.traction
+                hoop_stress = hoop_stress - of_points.hoop_stress
+            total = evaluate_face_limits(run, where, points, moved, traction, hoop_stress)
+            for region, (balanced, far) in enumerate(backgrounds):
+                on = np.flatnonzero((where.face >= 0) & (where.region == region))
+                if balanced.points and len(on):
+                    total.displacement[on] += balanced.of_points.displacement(points[on])
+                    total.stress[on] += balanced.of_points.stress(points[on])
                 if not balanced.is_zero:
                     nodes = ends[region] + np.flatnonzero(~crack[ends[region] : ends[region + 1]])
                     u[nodes] -= balanced.displacement(mesh.position[nodes])

@@ -88,7 +88,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Int
         _create_growing(fields, name, (len(faces.position), 2), "f8")
     _create_growing(fields, "hoop_stress", (len(faces.position),), "f8")
     together = file.create_group("all")
-    _write_reactions(file.create_group("reactions"), together, list(model.conditions))
+    _write_reactions(file.create_group("reactions"), together, [*model.conditions, *model.point_supports])
     _write_interfaces(file.create_group("contact"), together.create_group("contact"), model, mesh)
     _write_tips(file.create_group("tips"), together.create_group("tips"), model, mesh)
     energy = file.create_group("energy")

@@ -155,7 +155,7 @@ def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, 
     """Supports where displacements are held, arrows for displacements and tractions that are not zero."""
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
     place, normal = _spread_points(mesh, elements)
-    local = condition.frame == "local"
+    local = condition.value_frame == "local"
     axes_of_curve = (normal, 1j * normal) if local else (np.ones_like(normal), 1j * np.ones_like(normal))
     held = [quantity == "displacement" and not any(value[i] for value in values)
             for i, quantity in enumerate(condition.known)]

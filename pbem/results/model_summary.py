@@ -13,7 +13,7 @@ from pbem.model.model import Condition, Model, Region
 from pbem.model.varying import to_plain
 from pbem.results.doubts import list_doubts
 from pbem.results.law_text import summarise_laws
-from pbem.results.model_text import find_least_distance
+from pbem.results.model_text import describe_remote, find_least_distance
 
 
 def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
             {"name": stage.name, "steps": stage.steps, "duration": stage.duration,
              "boundary": {name: [*map(to_plain, values)] for name, values in stage.boundary.items()},
              "pressure": {name: to_plain(value) for name, value in stage.pressure.items() if value},
-             "remote": dict(zip(("sxx", "syy", "sxy"), stage.remote, strict=True)),
+             "remote": dict(zip(("sxx", "syy", "sxy"), describe_remote(stage, model.origin), strict=True)),
              "gravity": dict(zip(("gx", "gy"), stage.gravity, strict=True)),
              "swelling": {name: each.describe(model.origin) for name, each in stage.swelling.items()}}
             for stage in model.stages
@@ -82,10 +82,10 @@ def _list_region(region: Region) -> dict[str, Any]:
 
 def _list_condition(model: Model, condition: Condition) -> dict[str, Any]:
     """By direction what is known, its values at the ends of the stages, and the stiffness of a spring."""
-    names = ("n", "s") if condition.frame == "local" else ("x", "y")
+    names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
     return {
         names[i]: {
-            "known": condition.known[i], "stiffness": condition.stiffness[i],
+            "known": condition.known[i], "stiffness": to_plain(condition.stiffness[i]),
             "values": [to_plain(stage.boundary.get(condition.curve, (0.0, 0.0))[i]) for stage in model.stages],
         }
         for i in range(2)

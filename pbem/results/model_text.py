@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
@@ -97,7 +98,7 @@ def _direction_titles(model: Model) -> list[str]:
 
 def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     """What is prescribed in each direction: one value, or those at the end of every stage where they differ."""
-    names = ("n", "s") if condition.frame == "local" else ("x", "y")
+    names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
     if condition.known == ("traction", "traction") and not any(map(any, [*values, condition.stiffness])):
         return "free", "free"
@@ -105,7 +106,7 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     for i, quantity in enumerate(condition.known):
         given = [f"{value[i]:g}" for value in values]
         given = given[:1] if len(set(given)) == 1 else shorten(given, 6)
-        spring = f", spring {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
+        spring = f", spring k{'ns'[i]} = {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
         texts.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}{spring}")
     return texts[0], texts[1]
 
@@ -151,8 +152,9 @@ def _describe_loads(model: Model) -> list[str]:
         parts = [f"{stage.name}: {count(stage.steps, 'step')}"]
         if stage.duration:
             parts.append(f"duration {stage.duration:g}")
-        if any(stage.remote):
-            parts.append("remote stress sxx, syy, sxy = {:g}, {:g}, {:g}".format(*stage.remote))
+        if any(stage.remote) or not stage.remote_growth.is_zero:
+            given = (f"{value:g}" if isinstance(value, float) else value for value in describe_remote(stage, model.origin))
+            parts.append("remote stress sxx, syy, sxy = {}, {}, {}".format(*given))
         if any(stage.gravity):
             parts.append("gravity {:g}, {:g}".format(*stage.gravity))
         pressure = {name: value for name, value in stage.pressure.items() if value}
@@ -167,11 +169,18 @@ def _describe_loads(model: Model) -> list[str]:
     return lines
 
 
+def describe_remote(stage: Stage, origin: complex) -> tuple[float | str, ...]:
+    """The stress far away: numbers, or texts where it grows; origin: of the model, in the user's coordinates."""
+    if stage.remote_growth.is_zero:
+        return stage.remote
+    return replace(stage.remote_growth, value=stage.remote).describe(origin)
+
+
 def _describe_boundary(model: Model, stage: Stage) -> list[str]:
     """What is prescribed on outer curves at the end of a stage, other than zero."""
     texts = []
     for curve, condition in model.conditions.items():
-        names = ("n", "s") if condition.frame == "local" else ("x", "y")
+        names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
         values = stage.boundary.get(curve, (0.0, 0.0))
         given = [
             f"{'u' if quantity == 'displacement' else 't'}{name} = {value:g}"

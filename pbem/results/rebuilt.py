@@ -17,9 +17,10 @@ from pbem.geometry.loop import Loop, Side
 from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
-from pbem.model.in_situ import LinearStress
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
+from pbem.model.point_loads import PointLoad
 from pbem.model.swelling import Swelling
 from pbem.results import contents
 
@@ -103,7 +104,9 @@ def read_model(configuration: str) -> Model:
     )  # fmt: skip
     stages = tuple(
         Stage(each["name"], each["steps"], {}, {}, tuple(each["remote"]), tuple(each["gravity"]),
-              swelling={name: _read_swelling(one) for name, one in each.get("swelling", {}).items()})
+              swelling={name: _read_swelling(one) for name, one in each.get("swelling", {}).items()},
+              point_forces={name: tuple(force) for name, force in each.get("point_forces", {}).items()},
+              remote_growth=_read_stress(each["remote_growth"]) if "remote_growth" in each else AT_REST)
         for each in stored["stages"]
     )
     return Model(
@@ -113,6 +116,7 @@ def read_model(configuration: str) -> Model:
         size=stored["size"], origin=_read_point(stored["origin"]),
         initial_stress={name: _read_stress(stress) for name, stress in stored["initial_stress"].items()},
         rest_gravity=_read_point(stored.get("rest_gravity", 0.0)),
+        point_loads={name: _read_point_load(one) for name, one in stored.get("point_loads", {}).items()},
     )
 
 
@@ -126,6 +130,12 @@ def _read_stress(stored: Any) -> LinearStress:
 def _read_swelling(stored: Mapping[str, Any]) -> Swelling:
     return Swelling(tuple(stored["strain"]), _read_point(stored["growth"]), _read_point(stored["center"]),
                     stored["across"], _read_point(stored["across_growth"]))
+
+
+def _read_point_load(stored: Mapping[str, Any]) -> PointLoad:
+    beyond = None if stored["beyond"] is None else _read_point(stored["beyond"])
+    return PointLoad(stored["name"], stored["region"], _read_point(stored["place"]), _read_point(stored["inward"]),
+                     stored["half_angle"], beyond)
 
 
 def _read_leg(stored: Mapping[str, Any]) -> Leg:

@@ -205,13 +205,19 @@ WRONG = {
         "ux = 0.001\nuy = -0.001",
         "ux = 0.001\nspring = { kn = 1 }",
         "boundary.top.spring",
-        "ux together with spring; expected local conditions",
+        "ux together with spring; expected tractions beside a spring",
     ),
-    "spring and global traction": (
+    "far end without spring": (
         "ux = 0.001\nuy = -0.001",
-        "spring = { ks = 1 }\nty = 0.001",
-        "boundary.top.spring",
-        "ty together with spring",
+        "spring = { ks = 1 }\nend_n = 0.001",
+        "boundary.top.end_n",
+        "'end_n' without a spring",
+    ),
+    "negative stiffness somewhere": (
+        "ux = 0.001\nuy = -0.001",
+        'spring = { ks = { expression = "x - 0.3" } }',
+        "boundary.top.spring.ks",
+        "a stiffness that is -0.3",
     ),
     "spring and normal displacement": (
         "ux = 0.001\nuy = -0.001",

@@ -36,8 +36,8 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions)
     faces, of = _collect_faces(problem, whole, known)
     regions = _add_up(faces, of, count, least)
     finite = np.array([not region.infinite for region in problem.model.regions])
-    carried_weight = _find_carried_weight(problem, known)
-    regions = replace(regions, force=regions.force - np.where(finite, 0.0, carried_weight))
+    carried_force = _find_carried_force(problem, whole, known, load)
+    regions = replace(regions, force=regions.force - np.where(finite, 0.0, carried_force))
     # An infinite region may carry a moment, which decays.
     turned = np.where(finite, _divide(np.abs(regions.moment), regions.moments), 0.0)
     relative = np.maximum(_divide(np.abs(regions.force), regions.forces), turned)
@@ -49,7 +49,7 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions)
             carried[own] = np.maximum(carried[own], part)
     most = np.full(count, regions.forces.max())
     parts, part_relative = _measure_parts(problem, whole, known, least)
-    total, total_relative = _measure_whole(problem, faces, of, least, carried_weight)
+    total, total_relative = _measure_whole(problem, faces, of, least, carried_force)
     return Balance(
         resultant=regions.resultant, relative=relative, carried=carried, weight=_divide(regions.forces, most),
         part_resultant=parts.resultant, part_relative=part_relative,
@@ -101,30 +101,39 @@ def _collect_faces(problem: Problem, whole: Complex, known: Complex) -> tuple[_F
     return faces, mesh.node_region[node]
 
 
-def _find_carried_weight(problem: Problem, known: Complex) -> complex:
-    """The weight of finite bodies that an infinite region carries, as nothing else holds them along it; 0 if none.
+def _find_carried_force(problem: Problem, whole: Complex, known: Complex, load: Load) -> complex:
+    """The net force that an infinite region carries, as nothing else holds it along its direction, less that of the
+    fields of its own point loads; 0 if none.
 
-    As the loads of the model balance without weight (or it would have been refused), that is the region's resultant.
-    known (nodes,): tractions in balance with weight; those of in-situ stress do no work on rigid motions.
+    It is that of what acts from outside on all bodies that move with the region: weight, less that of what holes have
+    taken out of the region, point loads, and tractions on outer curves. whole, known (nodes,): tractions, and those of
+    fields in finite balance, which are minus the forces that they balance.
     """
-    mesh = problem.mesh
-    if not known.any() or not problem.plane_translations:
+    mesh, regions = problem.mesh, problem.model.regions
+    plane = next((region.name for region in regions if region.infinite), None)
+    if plane is None or not (known.any() or load.net_force):
         return 0j
-    (plane,) = (region.name for region in problem.model.regions if region.infinite)
     directions, powers = [], []
+    outer = np.zeros(mesh.nodes, dtype=bool)
+    outer[problem.outer.node] = True
     for motion in problem.plane_translations:
         direction, power = motion.velocities[plane][0], 0.0
         for number, name in enumerate(mesh.region_names):
-            if name in motion.velocities and name != plane:
+            if name in motion.velocities:
                 own = np.flatnonzero((mesh.node_region == number) & ~mesh.node_crack)
                 shift, spin = motion.velocities[name]
                 velocity = shift + 1j * spin * mesh.position[own]
-                power -= float(mesh.weight[own] @ (np.conj(known[own]) * velocity).real)
+                acting = np.where(outer[own], whole[own], 0.0) - known[own]
+                power += float(mesh.weight[own] @ (np.conj(acting) * velocity).real)
         directions.append([direction.real, direction.imag])
         powers.append(power)
-    # Along a direction in which something holds the region, nothing is known of its force.
-    force = np.linalg.lstsq(np.array(directions), np.array(powers), rcond=SAME)[0]
-    return complex(*force)
+    # Along a direction in which something holds the region nothing acts on it, or nothing is known of it.
+    fields = np.array([load.net_force.real, load.net_force.imag])
+    if not directions:
+        return complex(*-fields)
+    free = np.array(directions)
+    force, held = (np.linalg.lstsq(free, each, rcond=SAME)[0] for each in (np.array(powers), free @ fields))
+    return complex(*(force - (fields - held)))
 
 
 def _add_up(
@@ -188,7 +197,7 @@ def _measure_parts(problem: Problem, whole: Complex, known: Complex, least: floa
 
 
 def _measure_whole(
-    problem: Problem, faces: _Faces, of: Integer, least: float, carried_weight: complex
+    problem: Problem, faces: _Faces, of: Integer, least: float, carried_force: complex
 ) -> tuple[_Sums, float]:
     """The sums over outer curves, and the weight: what acts on all bodies together from outside.
 
@@ -205,7 +214,7 @@ def _measure_whole(
     sums = _add_up(seen, np.zeros(len(of), dtype=np.int64), 1, least)
     bodies = _add_up(faces, of, len(problem.mesh.region_names), least, middle=complex(sums.middle[0]))
     sums = replace(
-        sums, force=sums.force - carried_weight, forces=bodies.forces.max(keepdims=True),
+        sums, force=sums.force - carried_force, forces=bodies.forces.max(keepdims=True),
         moments=bodies.moments.max(keepdims=True),
     )
     infinite = any(region.infinite for region in problem.model.regions)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -129,7 +129,7 @@ class Step:
     displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
     duration: of the step, 0 where there is no time.
     interior: at the interior points, once evaluated. balance, linearity: None where they are not told.
-    last_of_stage: True at factor 1.
+    support_reactions: force (2,) of every point support. last_of_stage: True at factor 1.
     """
 
     number: int
@@ -144,6 +144,7 @@ class Step:
     balance: Balance | None = None
     linearity: Linearity | None = None
     duration: float = 0.0
+    support_reactions: Mapping[str, Real] = field(default_factory=dict)
 
     @property
     def last_of_stage(self) -> bool:

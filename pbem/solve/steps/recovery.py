@@ -10,6 +10,7 @@ from pbem.solve.nonlinear.newton import Solution
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, Step
 from pbem.solve.steps.linearity import measure_linearity
+from pbem.solve.steps.settling import settle
 
 
 def describe_step(
@@ -29,6 +30,11 @@ def describe_step(
     order = problem.second_faces
     pairs = solution.pairs
     everywhere = np.concatenate([displacement, opposite[order]])
+    free = problem.find_free_motions(solution.modes)
+    slip, reactions = pairs.g_s, {}
+    settled = settle(problem, load, everywhere, traction, stage, factor, free.motions if free.unheld is None else ())
+    if settled is not None:
+        everywhere, slip, reactions = everywhere + settled.displacement, slip + settled.slip, settled.reactions
     return Step(
         number=number,
         stage=stage,
@@ -40,12 +46,13 @@ def describe_step(
         contact=ContactState(
             mode=solution.modes.mode,
             opening=pairs.g_n,
-            slip=pairs.g_s,
+            slip=slip,
             traction_n=pairs.p_n,
             traction_s=pairs.p_s,
             internal=memory.internal,
         ),
-        balance=measure_balance(problem, solution.v, load, problem.find_free_motions(solution.modes)),
-        linearity=measure_linearity(mesh, everywhere, pairs.g_s),
+        balance=measure_balance(problem, solution.v, load, free),
+        linearity=measure_linearity(mesh, everywhere, slip),
         duration=solution.memory.duration,
+        support_reactions=reactions,
     )

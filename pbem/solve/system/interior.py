@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pbem.arrays import Complex
-from pbem.bem.hoop import evaluate_hoop_stress
+from pbem.bem.hoop import evaluate_hoop_stress, sample_points
 from pbem.bem.interior import Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
 from pbem.mesh.interpolation import split_faces
@@ -80,9 +80,17 @@ class InteriorField:
                     stress[inside] += background.stress(self._points[inside])
         elastic = self._rows.evaluate(displacement, traction)
         hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
-        limit = evaluate_limits(
-            mesh, self._points, self._location, step.displacement, step.traction, hoop_stress
-        )
+        moved_limit, carried_limit = step.displacement, step.traction
+        of_points = sample_points(mesh, [each for each, _ in backgrounds])
+        if of_points is not None:
+            moved_limit, carried_limit = moved_limit - of_points.displacement, carried_limit - of_points.traction
+            hoop_stress = hoop_stress - of_points.hoop_stress
+            for region, (balanced, _) in enumerate(backgrounds):
+                on = np.flatnonzero((self._location.element >= 0) & (self._location.region == region))
+                if balanced.points and len(on):
+                    moved[on] += balanced.of_points.displacement(self._points[on])
+                    stress[on] += balanced.of_points.stress(self._points[on])
+        limit = evaluate_limits(mesh, self._points, self._location, moved_limit, carried_limit, hoop_stress)
         return self._gather(Values(moved + elastic.displacement + limit.displacement,
                                    stress + elastic.stress + limit.stress))
 

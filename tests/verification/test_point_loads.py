@@ -1,0 +1,257 @@
+"""Forces and moments at single points against exact solutions: Kelvin, Flamant, a wedge, a disc pressed by two forces."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.arrays import Complex, Real
+
+MATERIAL = {"young": 3e3, "poisson": 0.2}
+# Shifted, turned, and in other units of length.
+PLACES = [(0j, 1 + 0j), (1e6 - 2e5j, 40 * np.exp(0.7j))]
+
+
+def combine(total: Real, difference: Complex) -> Real:
+    """sxx, syy, sxy from sxx + syy and syy - sxx + 2 i sxy."""
+    return np.stack([0.5 * (total - difference.real), 0.5 * (total + difference.real), 0.5 * difference.imag], -1)
+
+
+def kelvin(force: complex, moment: float, away: Complex, kappa: float = 2.2) -> Real:
+    """Of a force and a moment in a plane (Timoshenko and Goodier, articles 42 and 45)."""
+    r = np.abs(away)
+    e = away / r
+    along, across = (np.conj(e) * force).real, (np.conj(e) * force).imag
+    # Radial, hoop and shear stress in polar coordinates.
+    rr, tt = -(3 + kappa) * along / (2 * np.pi * (1 + kappa) * r), (kappa - 1) * along / (2 * np.pi * (1 + kappa) * r)
+    rt = -(kappa - 1) * across / (2 * np.pi * (1 + kappa) * r) - moment / (2 * np.pi * r**2)
+    return combine(rr + tt, (tt - rr + 2j * rt) * np.conj(e) ** 2)
+
+
+def wedge(force: complex, inward: complex, half_angle: float, away: Complex) -> Real:
+    """Radial stress of a force at the apex of a wedge (Michell; Flamant for half_angle pi/2)."""
+    r = np.abs(away)
+    e, sine = away / r, 0.5 * np.sin(2 * half_angle)
+    cosine, tangent = (np.conj(inward) * e).real, (np.conj(inward) * e).imag
+    along, across = (np.conj(inward) * force).real, (np.conj(inward) * force).imag
+    rr = -(along * cosine / (half_angle + sine) + across * tangent / (half_angle - sine)) / r
+    return combine(rr, -rr * np.conj(e) ** 2)
+
+
+def to_pairs(points: Any) -> list[list[float]]:
+    return [[float(point.real), float(point.imag)] for point in np.asarray(points)]
+
+
+@pytest.mark.parametrize(("center", "turn"), PLACES)
+@pytest.mark.parametrize(("scheme", "operator"), [
+    ("SST", "dense"), ("DBEM", "dense"), ("HST", "dense"), ("THST", "dense"), ("SST", "hierarchical"),
+])
+def test_kelvin_in_a_plane(center: complex, turn: complex, scheme: str, operator: str, tmp_path: Path) -> None:
+    """A force and a moment within a circle that two regions of one material share: nothing is seen of the circle."""
+    place, other = center + (0.1 - 0.4j) * turn, center + (1.7 + 0.3j) * turn
+    force = (2 + 1j) * turn
+    size = abs(turn)
+    points = center + np.array([0.3 + 0.2j, -0.5 - 0.1j, 0.11 - 0.4j, 2.5 + 0.5j, 3j]) * turn
+    case = {
+        "materials": {"m": MATERIAL},
+        "curves": {"circle": {"center": to_pairs([center])[0], "radius": size, "elements": 24}},
+        "regions": {"plane": {"material": "m", "infinite": True, "boundary": ["circle"]},
+                    "core": {"material": "m", "boundary": ["circle"]}},
+        "point_loads": {
+            "inside": {"at": to_pairs([place])[0], "fx": force.real, "fy": force.imag, "moment": 0.3 * size**2},
+            "outside": {"at": to_pairs([other])[0], "fx": -force.real, "fy": -force.imag},
+        },
+        "interfaces": {"circle": {"cohesion": 1e3, "tensile_strength": 1e3, "friction": 0.3, "law": "coulomb"}},
+        "analysis": {"steps": 1, "scheme": scheme}, "output": {"points": to_pairs(points)},
+        "solver": {"operator": operator},
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "kelvin.h5")
+    exact = kelvin(force, 0.3 * size**2, points - place) + kelvin(-force, 0.0, points - other)
+    accuracy = 1e-3 * np.abs(exact).max(axis=1, keepdims=True)
+    assert (np.abs(results.interior.stress[-1] - exact) < accuracy).all()
+    np.testing.assert_allclose(results.evaluate(to_pairs(points)).stress[-1], exact, atol=1e-3 * np.abs(exact[3]).max())
+    # The forces turn the plane by a moment, and balance otherwise; nothing moves far away.
+    far = results.evaluate(to_pairs([center + 1e4 * turn])).displacement[-1]
+    assert np.abs(far).max() < 1e-3 * abs(force) / 3e3
+    assert results.balance.relative[-1].max() < 1e-3
+
+
+def make_half_disc(center: complex, turn: complex, load: complex, along: complex, **more: Any) -> dict[str, Any]:
+    """A half-disc below a straight side, with Flamant's tractions on its arc."""
+    size = abs(turn)
+    degrees = float(np.degrees(np.angle(turn)))
+    place = to_pairs([center + along * turn])[0]
+    # Radial: the traction on the arc about the load, if that is the centre of the disc.
+    x, y = f"(x - ({place[0]!r}))", f"(y - ({place[1]!r}))"
+    factor = f"(-2/pi*({load.real!r}*{x} + {load.imag!r}*{y})/({x}**2 + {y}**2)**1.5)"
+    normal = f"(({x})*(x - ({center.real!r})) + ({y})*(y - ({center.imag!r})))/{size!r}/({x}**2 + {y}**2)**0.5"
+    return {
+        "materials": {"m": MATERIAL},
+        "curves": {"side": {"points": to_pairs(center + np.array([-1, 1]) * turn), "elements": 8},
+                   "arc": {"center": to_pairs([center])[0], "radius": size, "angles": [degrees - 180, degrees],
+                           "elements": 12}},
+        "regions": {"half": {"material": "m", "boundary": ["side", "arc"]}},
+        "boundary": {"arc": {"tx": {"expression": f"{factor}*{normal}*{x}"},
+                             "ty": {"expression": f"{factor}*{normal}*{y}"}}},
+        "point_loads": {"p": {"at": place, "fx": load.real, "fy": load.imag}},
+        "analysis": {"steps": 2}, **more,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("center", "turn"), PLACES)
+@pytest.mark.parametrize("along", [0j, 0.3 + 0j])
+def test_flamant_on_a_half_disc(center: complex, turn: complex, along: complex, tmp_path: Path) -> None:
+    """A force at a smooth point of a boundary: exact stress, however near to the load."""
+    load = (0.4 - 1j) * turn
+    away = np.array([1e-6 - 2e-6j, 0.02 - 0.03j, 0.1 - 0.5j, -0.3 - 0.1j]) * turn
+    at = center + along * turn
+    case = make_half_disc(center, turn, load, along, output={"points": to_pairs(at + away)})
+    results = pbem.run(case, tmp_path / "flamant.h5")
+    where = results.interior.position[:, 0] + 1j * results.interior.position[:, 1]
+    exact = wedge(load, -1j * turn / abs(turn), 0.5 * np.pi, where - at)
+    accuracy = 1e-5 * np.abs(exact).max(axis=1, keepdims=True)
+    accuracy = accuracy + np.finfo(float).eps * 64 * abs(center) / np.abs(where - at)[:, None] * np.abs(exact).max(1)[:, None]
+    assert (np.abs(results.interior.stress[-1] - exact) < accuracy).all()
+    assert (np.abs(results.interior.stress[0] - 0.5 * exact) < accuracy).all()
+    # On the straight side beside it: -2 Q/(pi r) along the side, and no traction.
+    on = center + (along + 0.2) * turn
+    beside = results.evaluate(to_pairs([on])).stress[-1][0]
+    np.testing.assert_allclose(
+        beside, wedge(load, -1j * turn / abs(turn), 0.5 * np.pi, np.array([0.2 * turn]))[0], atol=1e-4)
+    arc = results.reactions["arc"][-1] @ np.array([1, 1j])
+    assert abs(arc + load) < 1e-4 * abs(load)
+    assert results.balance.relative[-1].max() < 1e-4
+    assert results.energy.external[-1] == pytest.approx(results.energy.elastic[-1], rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_disc_pressed_by_two_forces(order: int, tmp_path: Path) -> None:
+    """Hertz: two Flamant fields and a uniform stress, near the loads too; the forces grow in a second stage."""
+    case = {
+        "materials": {"m": {**MATERIAL, "plane": "stress"}},
+        "curves": {"rim": {"center": [5, 1], "radius": 2.0, "elements": 16}},
+        "regions": {"disc": {"material": "m", "boundary": ["rim"]}},
+        "point_loads": {"top": {"at": [5, 3], "fy": -2.0}, "bottom": {"at": [5, -1], "fy": 2.0}},
+        "analysis": {"order": order}, "output": {"points": [[5, 1], [5.5, 2.0], [5.001, 2.999]]},
+        "stages": [{"steps": 1}, {"steps": 1, "point_loads": {"top": {"fy": -3.0}, "bottom": {"fy": 3.0}}}],
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "disc.h5")
+    z = results.interior.position[:, 0] + 1j * results.interior.position[:, 1]
+    exact = wedge(-2j, -1j, 0.5 * np.pi, z - 5 - 3j) + wedge(2j, 1j, 0.5 * np.pi, z - 5 + 1j) + [1 / np.pi, 1 / np.pi, 0]
+    scale = np.abs(exact).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(exact[0], [2 * 2 / (np.pi * 4), -6 * 2 / (np.pi * 4), 0], atol=1e-12)
+    accuracy = {1: 2e-3, 2: 2e-4, 3: 1e-5}[order]
+    assert (np.abs(results.interior.stress[0] - exact) < accuracy * scale).all()
+    assert (np.abs(results.interior.stress[1] - 1.5 * exact) < 1.5 * accuracy * scale).all()
+    # No traction is left on the rim but at the two points; energies grow with the square.
+    assert np.abs(results.traction).max() == 0
+    np.testing.assert_allclose(results.energy.external, results.energy.elastic, rtol=1e-6)
+    assert results.energy.elastic[1] == pytest.approx(2.25 * results.energy.elastic[0])
+    # The mean motion is none, and Betti: what a force does elsewhere is what it would be moved by from there.
+    assert abs((results.displacement[0]).mean(axis=0)).max() < 1e-6
+
+
+@pytest.mark.parametrize("half_angle", [0.25 * np.pi, 0.75 * np.pi])
+def test_a_force_in_a_corner(half_angle: float, tmp_path: Path) -> None:
+    """The sector of a disc under a force at its apex, with the tractions of the exact field on its arc."""
+    degrees = np.degrees(half_angle)
+    ends = np.exp(1j * half_angle * np.array([-1, 1]))
+    force = 1.0 + 0.6j
+    sine = 0.5 * np.sin(2 * half_angle)
+    rr = f"-(1.0*x/{half_angle + sine!r} + 0.6*y/{half_angle - sine!r})"
+    points = np.array([1e-4 + 2e-5j, 0.3 - 0.2j])
+    case = {
+        "materials": {"m": MATERIAL},
+        "curves": {"a": {"points": [[0, 0], *to_pairs(ends[:1])], "elements": 6},
+                   "b": {"points": [*to_pairs(ends[1:]), [0, 0]], "elements": 6},
+                   "arc": {"center": [0, 0], "radius": 1.0, "angles": [-degrees, degrees], "elements": 24}},
+        "regions": {"sector": {"material": "m", "boundary": ["a", "arc", "b"]}},
+        "boundary": {"arc": {"tn": {"expression": rr}}},
+        "point_loads": {"apex": {"at": [0, 0], "fx": 1.0, "fy": 0.6}},
+        "analysis": {"steps": 1}, "output": {"points": to_pairs(points)},
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "corner.h5")
+    exact = wedge(force, 1 + 0j, half_angle, points)
+    assert (np.abs(results.interior.stress[-1] - exact) < 1e-4 * np.abs(exact).max(axis=1, keepdims=True)).all()
+
+
+@pytest.mark.parametrize("infinite", [True, False])
+def test_forces_on_the_edge_of_a_hole(infinite: bool, tmp_path: Path) -> None:
+    """The displacement goes around the hole without a jump, in a plane and in a ring; stress balances the forces.
+
+    A force on the edge against a uniform traction on the rest of it, and the same with the force spread over an arc.
+    """
+    def run(spread: bool) -> pbem.Results:
+        half = 0.02
+        arcs = {"lump": [-half, half], "rest": [half, 360 - half]}
+        hole = {name: {"center": [1, 2], "radius": 1.0, "angles": at, "elements": 3 if name == "lump" else 32}
+                for name, at in arcs.items()} if spread else {"rest": {"center": [1, 2], "radius": 1.0, "elements": 32}}
+        length = 2 * np.radians(half)
+        boundary: dict[str, Any] = {"rest": {"tx": -1.0 / (2 * np.pi - (length if spread else 0.0))}}
+        loads: dict[str, Any] = {"lump": {"at": [2, 2], "fx": 1.0, "fy": 0.0}}
+        if spread:
+            boundary["lump"], loads = {"tx": 1.0 / length}, {}
+        outer = {} if infinite else {"outer": {"center": [1, 2], "radius": 4.0, "elements": 16}}
+        return pbem.run({
+            "materials": {"m": MATERIAL}, "curves": {**hole, **outer},
+            "regions": {"body": {"material": "m", "infinite": infinite, "boundary": [*hole, *outer]}},
+            "boundary": boundary, "point_loads": loads, "analysis": {"steps": 1},
+            "output": {"points": [[2.5, 2.2], [-0.5, 2.0], [1, 3.2], [1.0, 0.7]]},
+        }, tmp_path / f"hole_{spread}.h5")  # fmt: skip
+
+    point, spread = run(False), run(True)
+    scale = np.abs(spread.interior.stress[-1]).max()
+    np.testing.assert_allclose(point.interior.stress[-1], spread.interior.stress[-1], atol=1e-3 * scale)
+    moved = np.abs(spread.interior.displacement[-1]).max()
+    np.testing.assert_allclose(point.interior.displacement[-1], spread.interior.displacement[-1], atol=2e-3 * moved)
+    assert point.balance.relative[-1].max() < 1e-3
+
+
+def test_loads_with_weights_springs_and_cracks_keep_energy(tmp_path: Path) -> None:
+    """Energies of forces beside weight, springs, a heated body and a crack: work is stored, over several steps."""
+    case = {
+        "materials": {"m": {**MATERIAL, "density": 1.0, "expansion": 1e-5}},
+        "curves": {"bottom": {"points": [[0, 0], [3, 0]], "elements": 8},
+                   "rest": {"points": [[3, 0], [3, 2], [0, 2], [0, 0]], "elements": 24},
+                   "crack": {"points": [[1, 1.2], [2, 1.4]], "elements": 8}},
+        "regions": {"block": {"material": "m", "boundary": ["bottom", "rest"], "cracks": ["crack"]}},
+        "interfaces": {"crack": {"law": "open"}},
+        "boundary": {"bottom": {"spring": {"kn": 1e4, "ks": 1e4}}},
+        "gravity": {"gy": -1.0}, "temperature": {"block": 30.0},
+        "point_loads": {"a": {"at": [1.5, 0.7], "fx": 1.0, "fy": 2.0, "moment": 0.4}, "b": {"at": [2.2, 2], "fy": 3.0}},
+        "analysis": {"steps": 3},
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "energy.h5")
+    np.testing.assert_allclose(results.energy.external, results.energy.elastic, rtol=2e-4)
+    one = pbem.run(case, tmp_path / "one.h5", set={"analysis.steps": 1})
+    assert one.energy.elastic[-1] == pytest.approx(results.energy.elastic[-1], rel=1e-8)
+    reaction = results.reactions["bottom"][-1]
+    np.testing.assert_allclose(reaction, [-1.0, 6 - 5.0], atol=1e-3)
+    stored = json.loads(results.configuration)["point_loads"]
+    assert stored["b"]["half_angle"] == pytest.approx(0.5 * np.pi)
+
+
+@pytest.mark.parametrize(("load", "words"), [
+    ({"at": [5, 5], "fx": 1.0}, "outside of all regions"),
+    ({"at": [0.5, 0], "fx": 1.0}, "prescribed"),
+    ({"at": [0.5, 1], "moment": 1.0}, "a moment at a point of a boundary"),
+    ({"at": [0.5, 0.9999], "fx": 1.0}, "times the length of its elements"),
+    ({"at": [0.5, 0.5], "fz": 1.0}, "fz"),
+    ({"fx": 1.0}, "at"),
+])
+def test_loads_that_have_no_field_are_refused(load: dict[str, Any], words: str) -> None:
+    case = {
+        "materials": {"m": MATERIAL},
+        "curves": {"bottom": {"points": [[0, 0], [1, 0]], "elements": 4},
+                   "rest": {"points": [[1, 0], [1, 1], [0, 1], [0, 0]], "elements": 12}},
+        "regions": {"block": {"material": "m", "boundary": ["bottom", "rest"]}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}}, "point_loads": {"p": load},
+    }  # fmt: skip
+    with pytest.raises(pbem.CaseError) as caught:
+        pbem.run(case, "none.h5")
+    assert words in str(caught.value)

@@ -42,7 +42,7 @@ OTHERS = "more"
 CONSTANTS = ("TITLE", "SUBJECT", "PROBLEM", "SOURCE", "EXPECTED", "PICTURES")
 # Of a picture (bytes), and of all pictures together.
 LARGEST, LARGEST_SUM = 60_000, 2_000_000
-COLOURS, DPI, WIDTH = 128, 100, 17.8  # of a picture; dots per inch, cm
+COLOURS, DPI, WIDTH = (128, 64, 32, 16), 100, 17.8  # of a picture: as many as fit; dots per inch, cm
 DIGITS = 6
 
 
@@ -243,9 +243,12 @@ def draw(case: GalleryCase, results: Results) -> None:
         if main([command, str(results.path), *options, *sizes, "--dpi", str(DPI), "-o", str(path)]) != 0:
             raise SystemExit(f"{case.name}: pbem {' '.join(arguments)}")
         with Image.open(path) as picture:
-            small = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-        small.save(path, optimize=True)
-        if path.stat().st_size > LARGEST:
+            full = picture.convert("RGB")
+        for colours in COLOURS:
+            full.quantize(colours, dither=Image.Dither.NONE).save(path, optimize=True)
+            if path.stat().st_size <= LARGEST:
+                break
+        else:
             raise SystemExit(f"{path} has {path.stat().st_size} bytes, more than {LARGEST}")
 
 

@@ -300,7 +300,11 @@ def main() -> int:
     wrong = []
     with tempfile.TemporaryDirectory() as folder:
         for case in [case for case in cases if not options.names or case.name in options.names]:
-            results, seconds = run_case(case, Path(folder))
+            try:
+                results, seconds = run_case(case, Path(folder))
+            except pbem.PbemError as error:
+                wrong.append(f"{case.name}: {error}")
+                continue
             found = case.compute(results)
             wrong += find_wrong(case, found)
             differences = ", ".join(f"{find_difference(found[name], value):.1e} of {tolerance:g}"

@@ -231,8 +231,8 @@ def measure(found: dict[str, float], results: Results, seconds: float) -> Measur
     return Measured(values, 2 * len(results.nodes.position), f"{rounded:g}")
 
 
-def draw(case: GalleryCase, results: Results) -> None:
-    """The pictures of a case, with few colours so that the files are small."""
+def draw(case: GalleryCase, results: Results) -> list[str]:
+    """Write the pictures of a case, with few colours so that the files are small; what was wrong, a line each."""
     from PIL import Image
 
     from pbem.cli import main
@@ -241,7 +241,7 @@ def draw(case: GalleryCase, results: Results) -> None:
         command, *options = arguments
         sizes = [] if {"--width", "--size"} & set(options) else ["--width", str(WIDTH)]
         if main([command, str(results.path), *options, *sizes, "--dpi", str(DPI), "-o", str(path)]) != 0:
-            raise SystemExit(f"{case.name}: pbem {' '.join(arguments)}")
+            return [f"{case.name}: pbem {' '.join(arguments)}"]
         with Image.open(path) as picture:
             full = picture.convert("RGB")
         for colours in COLOURS:
@@ -249,7 +249,8 @@ def draw(case: GalleryCase, results: Results) -> None:
             if path.stat().st_size <= LARGEST:
                 break
         else:
-            raise SystemExit(f"{path} has {path.stat().st_size} bytes, more than {LARGEST}")
+            return [f"{path} has {path.stat().st_size} bytes, more than {LARGEST}"]
+    return []
 
 
 def write_list(cases: list[GalleryCase], link: str) -> str:
@@ -314,7 +315,7 @@ def main() -> int:
                 before = read_measured(case.page.read_text(encoding="utf-8")) if case.page.exists() else None
                 page = write_page(case, settle(measure(found, results, seconds), before))
                 case.page.write_text(page, encoding="utf-8")
-                draw(case, results)
+                wrong += draw(case, results)
     if not options.check and not options.names:
         LIST.write_text(write_readme(cases), encoding="utf-8")
         PAGE.write_text(write_topic(cases), encoding="utf-8")

@@ -6,11 +6,11 @@ from pbem.results.reader import Results
 
 TITLE = "Modulus of a solid with cracks of all directions"
 SUBJECT = "composites"
-PROBLEM = """Cracks of half-length a and number n per area, d = n a^2 their density, lower the modulus of a solid. While
-they are far from each other, E'/E'' = 1 + pi d if the cracks are open and equally many have each direction, as every
-crack moves by 2 pi a^2/E' times the traction that it lacks, whatever its direction. Under compression they close: without
-friction they slide only, and E'/E'' = 1 + pi d/4. Twelve cracks in an infinite plane have both, but for 1/3600, the
-square of half-length over distance."""
+PROBLEM = """Cracks of half-length a and number n per area, d = n a^2 their density, lower the modulus of a solid.
+While they are far from each other, E'/E'' = 1 + pi d if the cracks are open and equally many have each direction, as
+every crack moves by 2 pi a^2/E' times the traction that it lacks, whatever its direction. Under compression they
+close: without friction they slide only, and E'/E'' = 1 + pi d/4. Twelve cracks in an infinite plane have both, but
+for 1/3600, the square of half-length over distance."""
 SOURCE = """J. R. Bristow, British Journal of Applied Physics 11 (1960) 81-85; J. B. Walsh, Journal of Geophysical
 Research 70 (1965) 381-389; M. Kachanov, Effective elastic properties of cracked solids, Applied Mechanics Reviews 45
 (1992) 304-335."""

@@ -8,12 +8,12 @@ from pbem.results.reader import Results
 
 TITLE = "Hertz's contact of two cylinders"
 SUBJECT = "contact"
-PROBLEM = """Half a cylinder of steel (radius 100 mm) is pressed by the force P = 6000 N/mm on half a cylinder of bronze
-(50 mm), in plane strain and without friction. With 1/R the sum of the curvatures and 1/E* the sum of (1 - nu^2)/E, the
-half-width of the contact is a = sqrt(4 P R/(pi E*)) = 2.0 mm and the largest pressure 2 P/(pi a). Hertz's solution is
-that of half-planes; a/R = 0.06 here."""
-SOURCE = """H. Hertz, Ueber die Beruehrung fester elastischer Koerper, Journal fuer die reine und angewandte Mathematik
-92 (1882) 156-171; K. L. Johnson, Contact Mechanics, section 4.2 (Cambridge, 1985)."""
+PROBLEM = """Half a cylinder of steel (radius 100 mm) is pressed by the force P = 6000 N/mm on half a cylinder of
+bronze (50 mm), in plane strain and without friction. With 1/R the sum of the curvatures and 1/E* the sum of (1 -
+nu^2)/E, the half-width of the contact is a = sqrt(4 P R/(pi E*)) = 2.0 mm and the largest pressure 2 P/(pi a).
+Hertz's solution is that of half-planes; a/R = 0.06 here."""
+SOURCE = """H. Hertz, Ueber die Beruehrung fester elastischer Koerper, Journal fuer die reine und angewandte
+Mathematik 92 (1882) 156-171; K. L. Johnson, Contact Mechanics, section 4.2 (Cambridge, 1985)."""
 FORCE, CURVATURE = 30.0 * 200, 1 / 100 + 1 / 50
 SOFTNESS = (1 - 0.3**2) / 210e3 + (1 - 0.34**2) / 110e3
 HALF_WIDTH = math.sqrt(4 * FORCE * SOFTNESS / (math.pi * CURVATURE))

@@ -66,9 +66,10 @@ class CompleteSource(sdist):
 
 setup(
     cmdclass={"build_ext": BuildKernels, "sdist": CompleteSource},
-    packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
-    package_dir={"pbem.cases": "cases"},
-    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"], "pbem.pages": ["*.md"]},
+    packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases", "pbem.cases.gallery"],
+    package_dir={"pbem.cases": "cases", "pbem.cases.gallery": "cases/gallery"},
+    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"], "pbem.cases.gallery": ["*.toml"],
+                  "pbem.pages": ["*.md"]},
     ext_modules=[
         Extension(
             "pbem.bem._kernels",

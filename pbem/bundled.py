@@ -7,29 +7,45 @@ from pathlib import Path
 
 from pbem.errors import CaseError, Fault
 
+GALLERY = "gallery/"
+
 
 def find_case(name: str) -> Path:
     """The path of a case: a file, or the name of one that comes with the program (with or without .toml).
 
-    Raises CaseError if there is neither, with the names of those that there are.
+    Cases of the gallery go by `gallery/NAME` and by NAME. Raises CaseError if there is neither, with the names of those
+    that there are.
     """
     if Path(name).is_file():
         return Path(name)
     bundled = list_bundled_cases()
     stem = name.removesuffix(".toml")
-    if stem in bundled:
-        return bundled[stem]
-    near = difflib.get_close_matches(stem, bundled, n=1, cutoff=0.6)
+    for each in (stem, GALLERY + stem):
+        if each in bundled:
+            return bundled[each]
+    names = [each.removeprefix(GALLERY) for each in bundled]
+    near = difflib.get_close_matches(stem.removeprefix(GALLERY), names, n=1, cutoff=0.6)
     hint = f" (did you mean '{near[0]}'?)" if near else ""
-    expected = f"a case file or one of the cases of the program: {', '.join(bundled)}" if bundled else "a case file"
-    raise CaseError(name, (Fault("CASE", f"'{name}', which is no file", expected + hint),))
+    raise CaseError(name, (Fault("CASE", f"'{name}', which is no file", _describe_cases(bundled) + hint),))
+
+
+def _describe_cases(bundled: dict[str, Path]) -> str:
+    """What names a case: those of the gallery are on their page."""
+    if not bundled:
+        return "a case file"
+    own = [name for name in bundled if not name.startswith(GALLERY)]
+    gallery = " or of `pbem help gallery`" if len(own) < len(bundled) else ""
+    return f"a case file or one of the cases of the program{gallery}: {', '.join(own)}"
 
 
 def list_bundled_cases() -> dict[str, Path]:
-    """The cases that come with the program, by name: in the package, or beside it in a checkout."""
+    """The cases that come with the program, by name: in the package, or beside it in a checkout.
+
+    Those of the gallery are named gallery/NAME, and come last.
+    """
     package = Path(__file__).resolve().parent
     for folder in (package / "cases", package.parent / "cases"):
         cases = {path.stem: path for path in sorted(folder.glob("*.toml"))}
         if cases:
-            return cases
+            return cases | {GALLERY + path.stem: path for path in sorted((folder / "gallery").glob("*.toml"))}
     return {}

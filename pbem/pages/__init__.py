@@ -17,6 +17,7 @@ TOPICS = {
     "install": "how to install, on Debian, Ubuntu and elsewhere",
     "commands": "commands, options, exit codes and messages",
     "cases": "how a case file describes bodies, cracks, contacts and loads",
+    "gallery": "cases with known answers to start from, by subject",
     "keys": "all keys of the case file, with types, ranges and defaults",
     "import": "maps of traces and meshes as cases",
     "laws": "friction laws, and how to write one",

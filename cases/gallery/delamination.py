@@ -1,0 +1,27 @@
+"""Delamination by moments."""
+
+from pbem.results.reader import Results
+
+TITLE = "Delamination of two layers by moments"
+SUBJECT = "composites"
+PROBLEM = """A layer of carbon composite (h = 2 mm) on one of glass composite (3 mm), both taken as isotropic, with a
+crack between them that is long against both. Opposite moments M = 60 N mm per mm of width open it (plane strain). The
+bonded part carries nothing in the end, so each arm releases its energy of bending: J = 6 M^2/(E' h^3), summed over
+both arms, with E' = E/(1 - nu^2). It does not depend on the length of the crack, and is exact to terms that fall
+exponentially with it. Between two materials there is a J-integral, but no KI and KII in the usual sense."""
+SOURCE = """J. R. Rice, A path independent integral and the approximate analysis of strain concentration by notches
+and cracks, Journal of Applied Mechanics 35 (1968) 379-386; Z. Suo, J. W. Hutchinson, Interface crack between two
+elastic layers, International Journal of Fracture 43 (1990) 1-18."""
+CARBON, GLASS = 130e3 / (1 - 0.3**2), 40e3 / (1 - 0.25**2)
+EXPECTED = {"J at the tip, N/mm": (6 * 60**2 * (1 / (CARBON * 2**3) + 1 / (GLASS * 3**3)), 1e-3)}
+PICTURES = [
+    ("displaced layers, and the stress along them",
+     ["plot", "--field", "sxx", "--displaced", "--limits", "-100", "100"]),
+    ("opening along the crack and traction along the bond",
+     ["plot", "--curve", "crack", "bond", "--field", "opening,traction_n", "--x", "x", "--ylim", "-50", "50"]),
+]
+
+
+def compute(results: Results) -> dict[str, float]:
+    """The J-integral at the inner end of the crack."""
+    return {"J at the tip, N/mm": results.tips["crack"].J[-1, 1]}

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
+from pbem.contact.rigid_nodes import RigidNodes, collect_rigid_nodes, evaluate_rigid, list_nodes_of
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.in_situ import AT_REST
@@ -24,6 +25,7 @@ class OuterNodes:
     direction (k, 2): complex unit vectors. displacement_known (k, 2). condition (k,): index of the condition.
     stiffness (k, 2): of springs against the ground, stress/length along each direction; 0 where there is none.
     places (k,): in the user's coordinates, with the length from their curve's first point where a condition varies.
+    rigid: curves that stay rigid; their nodes, stays_rigid (k,), have no values of their own.
     """
 
     node: Integer
@@ -32,6 +34,8 @@ class OuterNodes:
     condition: Integer
     stiffness: Real
     places: Places
+    rigid: tuple[RigidNodes, ...]
+    stays_rigid: Bool
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class Load:
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
+    rigid (b, 3): of all rigid bodies the forces or motions.
     """
 
     values: Real
@@ -48,6 +53,7 @@ class Load:
     known: Real
     far: Complex
     background: Complex
+    rigid: Real
 
 
 def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
@@ -63,8 +69,9 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     known = np.array([quantity == "displacement" for c in conditions for quantity in c.known], dtype=bool)
     stiffness = np.array([value for c in conditions for value in c.stiffness], dtype=float)
     places = Places(mesh.position[node] + model.origin, _measure_along(model, mesh)[node])
+    rigid = collect_rigid_nodes(model, mesh)
     return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
-                      stiffness.reshape(-1, 2)[which], places)
+                      stiffness.reshape(-1, 2)[which], places, rigid, np.isin(node, list_nodes_of(rigid)))
 
 
 def _measure_along(model: Model, mesh: Mesh) -> Real:
@@ -107,6 +114,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
+        rigid=evaluate_rigid(model, stage, factor),
     )
 
 
@@ -196,5 +204,6 @@ def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:
     parts = np.stack([outer.direction.real, outer.direction.imag], axis=2) != 0  # (k, direction, component)
     for first, free in ((0, ~outer.displacement_known), (2 * mesh.nodes, outer.displacement_known)):
         wanted = ((free | ever | (outer.stiffness > 0))[:, :, None] & parts).any(axis=1)
+        wanted |= outer.stays_rigid[:, None]
         needed[first + 2 * outer.node[:, None] + np.arange(2)] = wanted
     return needed | known

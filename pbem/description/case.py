@@ -32,6 +32,7 @@ from pbem.description.schema import (
     SolverTable,
     StageTable,
     StressTable,
+    ToolTable,
     UnitsTable,
 )
 from pbem.description.summary import print_case, print_case_as_html
@@ -65,6 +66,7 @@ class Case:
     boundary: Mapping[str, ConditionTable]
     interfaces: Mapping[str, LawTable]
     contacts: Mapping[str, ContactTable]
+    tools: Mapping[str, ToolTable]
     remote: StressTable | None
     gravity: GravityTable | None
     initial_stress: Mapping[str, InSituTable]
@@ -263,5 +265,5 @@ def _concerns_loads(path: KeyPath) -> bool:
     """Whether a fault here leaves open what holds and what loads the bodies."""
     if path and path[0] == "materials":
         return path[-1] == "density"
-    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity") or
+    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "tools", "stages", "gravity") or
                            path[0] not in CaseFile.model_fields)

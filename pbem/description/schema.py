@@ -115,6 +115,45 @@ class SpringTable(Table):
     ks: NotNegative = Field(0.0, description="the same along the curve: adds -ks us to ts")
 
 
+class StageRigidTable(Table):
+    """Force and moment on what stays rigid, or how it moves, at the end of the stage. May depend on the time `t`."""
+
+    fx: Value | None = Field(None, description="force along x on it, stress times length, as per unit thickness")
+    fy: Value | None = Field(None, description="force along y")
+    moment: Value | None = Field(None, description="moment about `about`, counter-clockwise, stress times length^2")
+    ux: Value | None = Field(None, description="or displacement of the point `about` along x")
+    uy: Value | None = Field(None, description="or along y")
+    rotation: Value | None = Field(None, description="or rotation, degrees, counter-clockwise; it is taken as small")
+
+
+class RigidTable(StageRigidTable):
+    """What stays rigid: per direction a force or a motion is given; where neither is, the force is zero."""
+
+    about: Point | None = Field(
+        None, description="point of the moment and of the displacements; by default the centroid of its curves"
+    )
+    curves: tuple[Text, ...] = Field((), description="further curves that move with it as one rigid body")
+
+
+class StageForceTable(Table):
+    """Resultant of a traction at the end of the stage. May depend on the time `t`."""
+
+    fx: Value | None = Field(None, description="force along x, stress times length, as per unit thickness")
+    fy: Value | None = Field(None, description="force along y")
+    moment: Value | None = Field(
+        None, description='moment about `about`, counter-clockwise; with `how = "linear"` only'
+    )
+
+
+class ForceTable(StageForceTable):
+    """A force and a moment that are spread over a curve as a traction."""
+
+    about: Point | None = Field(None, description="point of the moment; by default the curve's centroid")
+    how: Literal["uniform", "linear"] = Field(
+        "uniform", description="the traction is the same everywhere, or linear in x and y, with that moment"
+    )
+
+
 class StageConditionTable(Table):
     """Displacement or traction in two directions; what is not given is free of traction."""
 
@@ -129,12 +168,16 @@ class StageConditionTable(Table):
     tn: Value | None = Field(None, description="or traction along the outward normal")
     ts: Value | None = Field(None, description="or traction along the normal turned by +90 degrees")
     pressure: Value | None = Field(None, description="`tn = -pressure`, `ts = 0`")
+    rigid: StageRigidTable | None = Field(None, description="the curve stays rigid, under forces or with motions")
+    force: StageForceTable | None = Field(None, description="or a traction with this resultant")
 
 
 class ConditionTable(StageConditionTable):
     """Conditions on a curve of one region: displacement or traction in two directions. What is not given is free of
     traction."""
 
+    rigid: RigidTable | None = Field(None, description="the curve stays rigid, under forces or with motions")
+    force: ForceTable | None = Field(None, description="or a traction with this resultant")
     spring: SpringTable | None = Field(None, description="an elastic support in place of displacements")
 
 
@@ -192,6 +235,12 @@ class ContactTable(LawTable):
     initial gap follows from the geometry. All keys of `[interfaces.CURVE]` are accepted as well."""
 
     between: tuple[Text, Text] = Field(description="the two curves, in any order; results lie on the first one")
+
+
+class ToolTable(RigidTable):
+    """A rigid tool: a curve that bounds no region, with a shape that never changes. It acts on bodies by `[contacts]`
+    in which it is one of the two curves. Per direction a force or a motion is given; where neither is, the force is
+    zero."""
 
 
 class GenerateTable(LawTable):
@@ -314,6 +363,7 @@ class StageTable(Table):
     boundary: Mapping[str, StageConditionTable] = Field(
         {}, description="values at the end of the stage: `ux` to `pressure` as in `[boundary.CURVE]`"
     )
+    tools: Mapping[str, StageRigidTable] = Field({}, description="forces or motions of a rigid tool")
     interfaces: Mapping[str, StageInterfaceTable] = Field({}, description="of an interface or a crack")
     contacts: Mapping[str, StageInterfaceTable] = Field({}, description="of a contact")
     remote: StressTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
@@ -371,6 +421,7 @@ class CaseFile(Table):
     boundary: Mapping[str, ConditionTable] = {}
     interfaces: Mapping[str, LawTable] = {}
     contacts: Mapping[str, ContactTable] = {}
+    tools: Mapping[str, ToolTable] = {}
     remote: StressTable | None = Field(None, description="Stress at infinity, for infinite regions.")
     gravity: GravityTable | None = None
     initial_stress: Mapping[str, InSituTable] = Field(

@@ -34,6 +34,7 @@ from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.resultants import describe_unbalance
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
+from pbem.model.rigid_body import find_tractions
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
@@ -154,7 +155,17 @@ def _find_topology(cut: Cut) -> _Topology:
     return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))
 
 
+def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
+    """The loading with the tractions that have given resultants."""
+    stages = []
+    for stage, values in zip(loading.stages, loading.rigid.stages, strict=True):
+        tractions = {name: find_tractions(each, curves, values[name]) for name, each in loading.rigid.spreads.items()}
+        stages.append(replace(stage, boundary={**stage.boundary, **tractions}))
+    return replace(loading, stages=tuple(stages))
+
+
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
+    loading = _spread_forces(loading, topology.curves)
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,
@@ -199,6 +210,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         initial_stress=loading.initial_stress,
         rest_gravity=loading.rest_gravity,
         contacts=loading.contacts,
+        rigid=loading.rigid.bodies,
         groups=case.groups,
         ties=fitted.ties,
     )
@@ -219,7 +231,7 @@ def _note_loads(model: Model) -> list[str]:
     weights = any(region.material.density for region in model.regions)
     loads = [value for stage in model.stages for value in (
         *(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(), *stage.remote,
-        *(stage.gravity if weights else ()))]
+        *(stage.gravity if weights else ()), *(each for values in stage.rigid.values() for each in values))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]

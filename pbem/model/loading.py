@@ -15,6 +15,7 @@ from pbem.model.given import read_value
 from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
+from pbem.model.rigid_body import RigidLoading, read_rigid_loading
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
@@ -38,6 +39,7 @@ class Loading:
     interfaces: Mapping[str, Interface]
     contacts: Mapping[str, Contact]
     stages: tuple[Stage, ...]
+    rigid: RigidLoading
     initial_stress: Mapping[str, LinearStress]
     rest_gravity: complex
     faults: tuple[Fault, ...]
@@ -51,6 +53,12 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         condition, wrong = _find_condition(case, name)
         conditions[name] = condition
         faults += wrong
+    rigid = read_rigid_loading(case, roles)
+    faults += rigid.faults
+    for body in rigid.bodies.values():
+        for name in body.curves:
+            if name in conditions:
+                conditions[name] = Condition(name, "global", ("displacement", "displacement"))
     interfaces: dict[str, Interface] = {}
     laws: dict[Hashable, Law] = {}
     none = LawTable()
@@ -76,11 +84,14 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     swellings = read_swellings(case, find_corners(case))
     faults += swellings.faults
     stages = tuple(
-        replace(stage, swelling=swelling) for stage, swelling in
-        zip(_find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, strict=True)
+        replace(stage, swelling=swelling, rigid={name: values[name] for name in rigid.bodies})
+        for stage, swelling, values in zip(
+            _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, rigid.stages,
+            strict=True,
+        )
     )
     faults += _check_durations(case, joints, stages)
-    return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress,
+    return Loading(conditions, interfaces, contacts, stages, rigid, backgrounds.initial_stress,
                    backgrounds.rest_gravity, tuple(faults))
 
 

@@ -12,6 +12,7 @@ from pbem.geometry.curve import Curve, find_middle
 from pbem.geometry.loop import Loop
 from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
+from pbem.model.rigid_body import RigidBody, Values
 from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
@@ -21,13 +22,17 @@ Quantity = Literal["displacement", "traction"]
 
 @dataclass(frozen=True)
 class Region:
-    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each."""
+    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each.
+
+    rigid: a tool, the rigid body of the same name; its loops are its curves, open or closed, each by itself.
+    """
 
     name: str
     material: Material
     loops: tuple[Loop, ...]
     cracks: tuple[str, ...] = ()
     infinite: bool = False
+    rigid: bool = False
 
 
 @dataclass(frozen=True)
@@ -113,6 +118,7 @@ class Stage:
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
     infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
+    rigid: of every rigid body its three forces or motions, rotations in degrees.
     """
 
     name: str
@@ -123,11 +129,13 @@ class Stage:
     gravity: tuple[float, float] = (0.0, 0.0)
     duration: float = 0.0
     swelling: Mapping[str, Swelling] = field(default_factory=dict)
+    rigid: Mapping[str, Values] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:
     """The loads of a stage that depend on time by themselves."""
     values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
+    values += [each for values in stage.rigid.values() for each in values]
     return [value for value in values if isinstance(value, Varying) and value.timed]
 
 
@@ -170,7 +178,7 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
-    contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
+    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools. interior_points: where displacement and stress are asked for, those of the
     grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress of materials by name, there before any load. rest_gravity: acceleration that it is in
     balance with where it grows with the coordinates, which acts on these materials from the start.
@@ -199,6 +207,7 @@ class Model:
     initial_stress: Mapping[str, LinearStress] = field(default_factory=dict)
     rest_gravity: complex = 0j
     contacts: Mapping[str, Contact] = field(default_factory=dict)
+    rigid: Mapping[str, RigidBody] = field(default_factory=dict)
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
     groups: tuple[GeneratedGroup, ...] = ()

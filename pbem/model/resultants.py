@@ -13,7 +13,8 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
 from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
-from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.model.rigid_body import find_reference
+from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
 from pbem.model.varying import Places, Value, Varying, evaluate, negate
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
@@ -47,6 +48,22 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
     return None
 
 
+def _list_pushes(
+    model: Model, moving: Sequence[Region], stage: Stage, time: float
+) -> Iterator[tuple[complex, float, complex, str]]:
+    """Force and moment of the rigid bodies of moving regions, the point of it, and the region."""
+    bounded = find_bounded(model)
+    names = {region.name for region in moving}
+    nowhere = Places(np.zeros(1, dtype=complex), np.zeros(1))
+    for name, body in model.rigid.items():
+        own = [bounded[curve] for curve in body.curves if bounded[curve] in names]
+        if own:
+            values = [float(evaluate(value, nowhere, time)[0]) if kind == "force" else 0.0
+                      for value, kind in zip(stage.rigid[name], body.known, strict=True)]
+            about = find_reference(body, model.curves, model.origin)
+            yield complex(values[0], values[1]), values[2], about, own[0]
+
+
 def _has_expressions(stage: Stage) -> bool:
     values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
     return any(isinstance(value, Varying) and value.expression for value in values)
@@ -60,6 +77,13 @@ def _sum_tractions(
     Fluid between two regions presses on both; where they are tied along the normal its power cancels.
     """
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
+    for push, turn, about, name in _list_pushes(model, moving, stage, time):
+        a, spin = motion.velocities[name]
+        drive = (np.conj(push) * (a + 1j * spin * about)).real, turn * spin
+        force += push
+        moment += turn + float((np.conj(about) * push).imag)
+        power += float(sum(drive))
+        scale += abs(drive[0]) + abs(drive[1])
     for region in moving:
         a, spin = motion.velocities[region.name]
         weight, lever = _weigh(model, region, stage)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
+from pbem.bem.rigid_region import list_region_nodes, load_rigid_rows
 from pbem.contact.rigid_nodes import RigidNodes, collect_rigid_nodes, evaluate_rigid, list_nodes_of
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
@@ -107,15 +108,27 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     remote = interpolate(before.remote, after.remote)
     balanced = _sample(mesh, [balanced_background(model, region, stage, factor) for region in model.regions])
     far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
+    background = balanced[0] + far[0]
+    rigid = evaluate_rigid(model, stage, factor)
+    for number, given in enumerate(rigid):
+        _load_tool(model, mesh, number, given, far[0])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
         values=values,
         pressure=evaluate_pressure(model, mesh, stage, factor),
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
-        background=balanced[0] + far[0],
-        rigid=evaluate_rigid(model, stage, factor),
+        background=background,
+        rigid=rigid,
     )
+
+
+def _load_tool(model: Model, mesh: Mesh, number: int, given: Real, far: Complex) -> None:
+    """Put the right-hand sides of a rigid body that is a tool among the displacements (nodes,) far away."""
+    name, body = list(model.rigid.items())[number]
+    if body.tool:
+        region = mesh.region_names.index(name)
+        far[list_region_nodes(mesh, region)] = load_rigid_rows(mesh, region, model.regions[region].material, given)
 
 
 def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:

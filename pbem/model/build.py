@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pbem.description.case import Case
-from pbem.errors import CaseError, Fault
+from pbem.errors import CaseError, Fault, KeyPath
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
@@ -38,6 +38,7 @@ from pbem.model.rigid_body import find_tractions
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
+from pbem.model.tools import check_tools, make_tool_regions, orient_tools
 from pbem.model.varying import Varying
 from pbem.wording import list_names
 
@@ -95,7 +96,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     loading = read_loading(case, roles)
     topology = _find_topology(cut)
     interior, wrong = list_interior_points(case)
-    faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
+    faults = [*roles.faults, *check_tools(case, roles), *topology.faults, *loading.faults, *wrong]
     if faults:
         return None, case, faults
     model, faults = _compose(case, roles, loading, topology)
@@ -141,6 +142,7 @@ def _find_topology(cut: Cut) -> _Topology:
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
+        loops = {**loops, **orient_tools(case, curves, loops, roles)}
         faults += find_coincidences(curves, loops, roles)
         notes += describe_closing(curves, cracks, loops)
     if not faults:
@@ -189,12 +191,13 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         Region(name, materials[table.material], topology.loops[name], tuple(table.cracks), table.infinite)
         for name, table in case.regions.items()
     )
+    tools = make_tool_regions(case, curves, loading.rigid.bodies, topology.loops)
     fitted = fit_curves(
         case, curves, regions, topology.tips, frozenset(loading.interfaces) | frozenset(roles.in_contact)
     )
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",
-        regions=regions, curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
+        regions=(*regions, *tools), curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
         analysis=Analysis(
             case.analysis.scheme, case.analysis.order, case.analysis.tips, case.analysis.accuracy
@@ -262,7 +265,9 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
-        faults.append(Fault.at(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+        free = motion.regions[0]
+        loc: KeyPath = ("tools" if regions[free].rigid else "regions", free)
+        faults.append(Fault.at(loc, f"{found}: {unbalance}", expected))
     notes = []
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]

@@ -17,6 +17,8 @@ from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
 
+# Of a tool, for points that no number of turns is inside for.
+NO_INSIDE = -(10**6)
 Quantity = Literal["displacement", "traction"]
 
 
@@ -24,7 +26,7 @@ Quantity = Literal["displacement", "traction"]
 class Region:
     """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each.
 
-    rigid: a tool, the rigid body of the same name; its loops are its curves, open or closed, each by itself.
+    A rigid tool is the rigid body of the same name; its loops are its curves, open or closed, each by itself.
     """
 
     name: str
@@ -32,7 +34,11 @@ class Region:
     loops: tuple[Loop, ...]
     cracks: tuple[str, ...] = ()
     infinite: bool = False
-    rigid: bool = False
+
+    @property
+    def rigid(self) -> bool:
+        """Whether it is a rigid tool."""
+        return self.material.rigid is not None
 
 
 @dataclass(frozen=True)
@@ -233,5 +239,10 @@ class Model:
 
     @property
     def finite_regions(self) -> list[int]:
-        """Numbers of the regions that have an outer boundary."""
-        return [number for number, region in enumerate(self.regions) if not region.infinite]
+        """Numbers of the elastic regions that have an outer boundary."""
+        return [number for number, region in enumerate(self.regions) if not region.infinite and not region.rigid]
+
+    @property
+    def turns_outside(self) -> list[int]:
+        """Per region what its loops lack of one turn about points inside; of tools, which have no inside, too many."""
+        return [NO_INSIDE if region.rigid else int(region.infinite) for region in self.regions]

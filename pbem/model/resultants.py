@@ -133,7 +133,7 @@ def _divide_side(curves: Mapping[str, Curve], side: Side, values: tuple[Value, V
 
 def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex]:
     """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops."""
-    if region.infinite or not any(stage.gravity):
+    if region.infinite or region.rigid or not any(stage.gravity):
         return 0j, 0j
     legs = loop_legs(model.curves, region.loops)
     origin = legs[0].start

@@ -193,7 +193,8 @@ def _link_to_ground(
             yield int(np.flatnonzero(parts.region == number)[-1]), GROUND, np.eye(3)
     body = parts.first[mesh.node_element[outer.node]]
     least = np.array([find_least_stiffness(model, region) for region in model.regions])
-    held = (outer.displacement_known & ~outer.stays_rigid[:, None]) | (outer.stiffness > least[mesh.node_region[outer.node], None])
+    held = outer.displacement_known & ~outer.stays_rigid[:, None]
+    held |= outer.stiffness > least[mesh.node_region[outer.node], None]
     groups = []
     for k in range(2):
         own = np.flatnonzero(held[:, k])

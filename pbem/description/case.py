@@ -15,6 +15,7 @@ from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
 from pbem.description.repair import repair
+from pbem.description.rigid_tables import ToolTable
 from pbem.description.schema import (
     AnalysisTable,
     CaseFile,
@@ -32,10 +33,9 @@ from pbem.description.schema import (
     SolverTable,
     StageTable,
     StressTable,
-    ToolTable,
-    UnitsTable,
 )
 from pbem.description.summary import print_case, print_case_as_html
+from pbem.description.table import UnitsTable
 from pbem.description.translation import find_schema_findings
 from pbem.description.varying import ExpressionTable
 from pbem.errors import CaseError, Fault, KeyPath

@@ -33,8 +33,8 @@ from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.resultants import describe_unbalance
-from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.rigid_body import find_tractions
+from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends

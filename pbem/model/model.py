@@ -184,8 +184,9 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
-    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools. interior_points: where displacement and stress are asked for, those of the
-    grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
+    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools.
+    interior_points: where displacement and stress are asked for, those of the grid first, x fastest, then single
+    points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress of materials by name, there before any load. rest_gravity: acceleration that it is in
     balance with where it grows with the coordinates, which acts on these materials from the start.
     origin: point of the user's coordinates about which those of the model are, 0 unless the model is far from there.

@@ -10,7 +10,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.description.case import Case
-from pbem.description.schema import StageForceTable, StageRigidTable
+from pbem.description.rigid_tables import StageForceTable, StageRigidTable
 from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.curve import Curve
@@ -107,9 +107,11 @@ def _list_tables(case: Case) -> Iterator[tuple[KeyPath, str, Any, list[tuple[Key
     for name in named:
         for key in ("rigid", "force"):
             base = getattr(case.boundary.get(name), key, None)
-            changes = [(("stages", number, "boundary", name, key), getattr(stage.boundary[name], key))
-                       for number, stage in enumerate(case.stages)
-                       if name in stage.boundary and getattr(stage.boundary[name], key) is not None]
+            changes: list[tuple[KeyPath, Any]] = [
+                (("stages", number, "boundary", name, key), getattr(stage.boundary[name], key))
+                for number, stage in enumerate(case.stages)
+                if name in stage.boundary and getattr(stage.boundary[name], key) is not None
+            ]
             if base is not None or changes:
                 yield ("boundary", name, key), name, base, changes
     for name, table in case.tools.items():

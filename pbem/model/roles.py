@@ -88,7 +88,8 @@ def _add_tools(case: Case, bounds: dict[str, list[str]], inside: Mapping[str, li
             if curve not in case.curves:
                 faults.append(unknown_name(loc, curve, "curve", case.curves))
             elif bounds[curve] or inside[curve]:
-                found = f"curve '{curve}', which {list_names([repr(each) for each in bounds[curve] + inside[curve]])} has"
+                owners = list_names([f"'{each}'" for each in bounds[curve] + inside[curve]])
+                found = f"curve '{curve}', which {owners} has"
                 faults.append(Fault.at(loc, found, "a curve that bounds no region, of one tool"))
             else:
                 bounds[curve].append(name)

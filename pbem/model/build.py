@@ -11,6 +11,7 @@ from pbem.errors import CaseError, Fault, KeyPath
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
+from pbem.model.approach import find_closing
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
     check_inside,
@@ -115,6 +116,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     radii = {name: table.radius for name, table in case.curves.items() if table.radius is not None}
     model = move_to_own_origin(model, radii)
     if conditions_known and not varying:
+        model = replace(model, closing=find_closing(model))
         wrong, notes = _check_support(model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
@@ -269,6 +271,10 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         loc: KeyPath = ("tools" if regions[free].rigid else "regions", free)
         faults.append(Fault.at(loc, f"{found}: {unbalance}", expected))
     notes = []
+    if model.closing:
+        names = list_names([f"'{name}'" for name in sorted(model.closing)])
+        notes.append(f"Nothing but {names} holds what the loads move, which does not touch yet: the search for its "
+                     "contact begins where it comes to touch.")
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
         name = next(each.name for each in moving if each.infinite)

@@ -184,7 +184,8 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
-    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools.
+    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools. closing: contacts
+    that touch only once the loads have moved a body that nothing else holds.
     interior_points: where displacement and stress are asked for, those of the grid first, x fastest, then single
     points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress of materials by name, there before any load. rest_gravity: acceleration that it is in
@@ -215,6 +216,7 @@ class Model:
     rest_gravity: complex = 0j
     contacts: Mapping[str, Contact] = field(default_factory=dict)
     rigid: Mapping[str, RigidBody] = field(default_factory=dict)
+    closing: frozenset[str] = frozenset()
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
     groups: tuple[GeneratedGroup, ...] = ()

@@ -48,6 +48,14 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
     return None
 
 
+def measure_power(model: Model, motion: RigidBodyMode, number: int) -> float:
+    """What the loads at the end of a stage do on a motion per unit of it; 0 where they balance."""
+    stage, names = model.stages[number], set(motion.regions)
+    moving = [region for region in model.regions if region.name in names]
+    _, _, power, scale = _sum_tractions(model, motion, moving, stage, model.find_time(number, 1.0))
+    return power if abs(power) > (BALANCED_EXPRESSION if _has_expressions(stage) else BALANCED) * scale else 0.0
+
+
 def _list_pushes(
     model: Model, moving: Sequence[Region], stage: Stage, time: float
 ) -> Iterator[tuple[complex, float, complex, str]]:

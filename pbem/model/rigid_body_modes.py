@@ -192,6 +192,8 @@ def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> Real:
 
 
 def _touches(model: Model, joint: Interface | Contact) -> bool:
+    if joint.name in model.closing:
+        return True
     if isinstance(joint, Interface) and not isinstance(joint.law.gap, Varying):
         return joint.law.gap <= 0
     names = [joint.name] if isinstance(joint, Interface) else [joint.first, joint.second]

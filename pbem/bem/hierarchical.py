@@ -18,6 +18,7 @@ from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestor
 from pbem.bem.leaf import Medium, form_l2p, form_p2m
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions, take_off_rigid_motions
+from pbem.bem.rigid_region import form_rigid_rows
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.bem.tree import Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
@@ -91,6 +92,8 @@ def sort_elements(mesh: Mesh, materials: Sequence[Material], terms: int) -> Sort
     """Cluster trees of all regions' elements."""
     counts = np.bincount(mesh.region, minlength=len(materials))
     most = np.where(counts <= SMALL_REGION, SMALL_REGION, LEAF_ELEMENTS)
+    # Nothing of a tool is far.
+    most = np.where([material.rigid is not None for material in materials], np.maximum(counts, 1), most)
     forest = build_forest(mesh.start, mesh.end, mesh.geometry.bulges, mesh.region, most)
     return Sorted(mesh, tuple(materials), tuple(collect_sources(mesh, materials)), forest, terms)
 
@@ -225,7 +228,11 @@ def _evaluate_leaf(
     columns = list_columns(mesh, list_nodes(mesh, elements), 2 * width if bounded else width)
     kept = needed[columns]
     near = np.empty((2 * len(nodes), int(kept.sum())))
-    far = np.empty((2 * len(nodes), 4 * (parts.terms + 1)))
+    far = np.zeros((2 * len(nodes), 4 * (parts.terms + 1)))
+    if material.rigid is not None:
+        first = list_nodes(mesh, elements)[0]
+        near[:] = -form_rigid_rows(mesh, region, material)[number_components(nodes - first)][:, kept]
+        return columns[kept], near, far
     for traction in (False, True):
         at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
         if len(at) == 0:

@@ -29,8 +29,9 @@ class Location:
     s: Real
 
 
-def locate_points(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> Location:
-    """Location of points (q,); infinite: per region, whether it is the outside of its loops.
+def locate_points(mesh: Mesh, infinite: Sequence[int], points: Complex) -> Location:
+    """Location of points (q,); infinite: per region, whether it is the outside of its loops, or less than 0: it has no
+    inside.
 
     By winding numbers: the angles that a region's elements subtend add up to a turn about the points inside. They are
     exact for straight elements and arcs, so that no point is on the wrong side of a curved boundary.
@@ -43,11 +44,11 @@ def locate_points(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> Loca
     return Location(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
 
-def _locate_chunk(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> tuple[Integer, Integer, Real]:
+def _locate_chunk(mesh: Mesh, infinite: Sequence[int], points: Complex) -> tuple[Integer, Integer, Real]:
     with np.errstate(divide="ignore", invalid="ignore"):
         straight = mesh.geometry.preimage(points).T  # each element from -1 to 1
     off = np.maximum(np.abs(straight.imag), np.abs(straight.real) - 1)
-    off = np.where(np.isfinite(off), off, np.inf)
+    off = np.where(np.isfinite(off) & (np.array(infinite)[mesh.region] >= 0), off, np.inf)
     nearest = np.argmin(off, axis=1)
     row = np.arange(len(points))
     touches = off[row, nearest] < TOUCHING
@@ -58,6 +59,7 @@ def _locate_chunk(mesh: Mesh, infinite: Sequence[bool], points: Complex) -> tupl
     region = np.where(touches, mesh.region[nearest], region)
     element = np.where(touches, nearest, -1)
     near_end = (np.abs(np.abs(straight.real) - 1 + 1j * straight.imag) < NEAR_END) & ~mesh.crack
+    near_end &= (np.array(infinite)[mesh.region] >= 0)
     near_end &= (mesh.region == region[:, None]) & ~touches[:, None]
     close = near_end.any(axis=1)
     element[close] = np.argmax(near_end[close], axis=1)

@@ -18,6 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.rigid_region import form_rigid_rows
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import number_components
@@ -106,13 +107,19 @@ def assemble_rows(
     for region in np.unique(node_region[nodes]):
         own = nodes[node_region[nodes] == region]
         columns = _needed_columns(mesh, int(region), needed)
+        rows = number_components(own - first_node)
+        if materials[region].rigid is not None:
+            whole = form_rigid_rows(mesh, int(region), materials[region])
+            matrix = whole[np.ix_(number_components(own - _region_nodes(mesh, int(region))[0]), _own_columns(
+                mesh, int(region), columns))]
+            blocks.append(Block(int(region), rows, columns, matrix))
+            continue
         matrix = np.empty((2 * len(own), len(columns)))
         scratch = _allocate_scratch(sources[region])
         for part, where in _list_chunks(own, mesh.traction_equation, scratch):
             traction = bool(mesh.traction_equation[part[0]])
             values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction, scratch)
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
-        rows = number_components(own - first_node)
         blocks.append(Block(int(region), rows, columns, matrix))
     return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
 
@@ -192,6 +199,14 @@ def _needed_columns(mesh: Mesh, region: int, needed: Bool) -> Integer:
     columns = np.concatenate([2 * nodes, 2 * nodes + 1, 2 * (mesh.nodes + bounding), 2 * (mesh.nodes + bounding) + 1])
     columns.sort()
     return columns[needed[columns]]
+
+
+def _own_columns(mesh: Mesh, region: int, columns: Integer) -> Integer:
+    """Places of entries of v among a region's own: its displacements, then its tractions."""
+    nodes = _region_nodes(mesh, region)
+    return np.where(
+        columns < 2 * mesh.nodes, columns - 2 * nodes[0], columns - 2 * (mesh.nodes + nodes[0]) + 2 * len(nodes)
+    )
 
 
 def _allocate_scratch(sources: Sources) -> tuple[Real, Real]:

@@ -17,6 +17,7 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.contact.laws import PairState
 from pbem.contact.loads import Load, OuterNodes
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation
+from pbem.contact.rigid_nodes import constrain_rigid_nodes
 from pbem.mesh.mesh import Mesh
 
 
@@ -54,6 +55,13 @@ class _Entries:
             self.columns.append(unknown[kept])
             self.values.append(value[kept])
 
+    def add_entries(self, rows: Integer, columns: Integer, values: Real) -> None:
+        """Entries as they are."""
+        kept = values != 0
+        self.rows.append(rows[kept])
+        self.columns.append(columns[kept])
+        self.values.append(values[kept])
+
     def build(self) -> sparse.csr_matrix:
         entries = (np.concatenate(self.values), (np.concatenate(self.rows), np.concatenate(self.columns)))
         return sparse.csr_matrix(entries, shape=(4 * self.nodes, 2 * self.nodes))
@@ -73,7 +81,12 @@ def build_constraints(
     offset = np.zeros((2, mesh.nodes), dtype=complex)
     _constrain_outer_nodes(entries, offset, outer, load, traction_scale)
     _constrain_pairs(entries, offset, mesh, gap, law)
-    return ConstraintMap(entries.build(), np.stack([offset.real, offset.imag], axis=2).ravel())
+    constant = np.stack([offset.real, offset.imag], axis=2).ravel()
+    for rigid in outer.rigid:
+        own = constrain_rigid_nodes(rigid, mesh.nodes, load.rigid[rigid.number], traction_scale)
+        entries.add_entries(own.rows, own.columns, own.values)
+        constant[own.offset_rows] += own.offset
+    return ConstraintMap(entries.build(), constant)
 
 
 def _constrain_outer_nodes(
@@ -83,7 +96,8 @@ def _constrain_outer_nodes(
     for k in range(2):
         direction, known = outer.direction[:, k], outer.displacement_known[:, k]
         unknown = 2 * outer.node + k
-        for field, taken, scale in ((DISPLACEMENT, ~known, 1.0), (TRACTION, known, traction_scale)):
+        unknown_traction = known & ~outer.stays_rigid
+        for field, taken, scale in ((DISPLACEMENT, ~known, 1.0), (TRACTION, unknown_traction, traction_scale)):
             entries.add(field, outer.node[taken], unknown[taken], scale * direction[taken])
         sprung = outer.stiffness[:, k] > 0
         spring = -outer.stiffness[sprung, k] * direction[sprung]

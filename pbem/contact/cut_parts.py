@@ -25,7 +25,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import Parts
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import describe_motion, find_least_stiffness
-from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
+from pbem.model.rigid_links import GROUND, Link, constrain_motions, find_moving_bodies
 
 # Parts move apart if their motions differ by more than this part of a unit motion.
 APART = 1e-6
@@ -63,7 +63,8 @@ class CutParts:
         """The free motions in which parts of one region move against each other (theory, 84)."""
         parts = self.parts
         label, bodies = self._tie_sticking(modes)
-        links = [(int(label[body]), GROUND, rows) for body, _, rows in self._grounded]
+        links = [(int(label[body]), other if other == GROUND else int(label[other]), rows)
+                 for body, other, rows in self._grounded]
         links += self._link_parts(modes, label)
         members = np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label, minlength=bodies))[:-1])
         found = []
@@ -192,13 +193,20 @@ def _link_to_ground(
             yield int(np.flatnonzero(parts.region == number)[-1]), GROUND, np.eye(3)
     body = parts.first[mesh.node_element[outer.node]]
     least = np.array([find_least_stiffness(model, region) for region in model.regions])
-    held = outer.displacement_known | (outer.stiffness > least[mesh.node_region[outer.node], None])
+    held = outer.displacement_known & ~outer.stays_rigid[:, None]
+    held |= outer.stiffness > least[mesh.node_region[outer.node], None]
     groups = []
     for k in range(2):
         own = np.flatnonzero(held[:, k])
         rows = _move(mesh.position[outer.node[own]], outer.direction[own, k], center, scale)
         groups.append((body[own], np.full(len(own), GROUND), rows))
     yield from _collect(groups)
+    for rigid in outer.rigid:
+        members = np.unique(parts.first[mesh.node_element[rigid.nodes]])
+        about = mesh.position[rigid.nodes[0]] - rigid.motions[0, 2] / 1j
+        yield int(members[0]), GROUND, constrain_motions(~rigid.forced, about, center, scale)
+        for other in members[1:]:
+            yield int(members[0]), int(other), np.eye(3)
 
 
 def _collect(groups: list[tuple[Integer, Integer, Real]]) -> Iterator[Link]:

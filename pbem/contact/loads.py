@@ -10,6 +10,8 @@ import numpy as np
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.bem.point_field import PointField
+from pbem.bem.rigid_region import list_region_nodes, load_rigid_rows
+from pbem.contact.rigid_nodes import RigidNodes, collect_rigid_nodes, evaluate_rigid, list_nodes_of
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.in_situ import AT_REST, LinearStress
@@ -25,6 +27,7 @@ class OuterNodes:
     direction (k, 2): complex unit vectors. displacement_known (k, 2). condition (k,): index of the condition.
     stiffness (k, 2): of springs against the ground, stress/length along each direction; 0 where there is none.
     places (k,): in the user's coordinates, with the length from their curve's first point where a condition varies.
+    rigid: curves that stay rigid; their nodes, stays_rigid (k,), have no values of their own.
     """
 
     node: Integer
@@ -33,6 +36,8 @@ class OuterNodes:
     condition: Integer
     stiffness: Real
     places: Places
+    rigid: tuple[RigidNodes, ...]
+    stays_rigid: Bool
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,7 @@ class Load:
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
     of_points (nodes,): the displacement of point loads' fields, a part of the background. net_force: of those on an
     infinite region, that of their fields far away (complex).
+    rigid (b, 3): of all rigid bodies the forces or motions.
     """
 
     values: Real
@@ -52,6 +58,7 @@ class Load:
     far: Complex
     background: Complex
     of_points: Complex
+    rigid: Real
     net_force: complex = 0j
 
 
@@ -70,8 +77,9 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     at_rest = Moment(0.0, 0.0, 1.0)
     stiffness = [_blend_all([(0.0, c.stiffness[k]) for c in conditions], which, places, at_rest) for k in (0, 1)]
     # Rounding of an expression that is zero somewhere.
+    rigid = collect_rigid_nodes(model, mesh)
     return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
-                      np.maximum(np.stack(stiffness, axis=1), 0.0), places)
+                      np.maximum(np.stack(stiffness, axis=1), 0.0), places, rigid, np.isin(node, list_nodes_of(rigid)))
 
 
 def _measure_along(model: Model, mesh: Mesh) -> Real:
@@ -111,15 +119,20 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     points = [each for region, background in zip(model.regions, backgrounds, strict=True) if region.infinite
               for each in background.points]
     far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
+    background = balanced[0] + far[0]
+    rigid = evaluate_rigid(model, stage, factor)
+    for number, given in enumerate(rigid):
+        _load_tool(model, mesh, number, given, far[0])
     known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
         values=values,
         pressure=evaluate_pressure(model, mesh, stage, factor),
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
-        background=balanced[0] + far[0],
+        background=background,
         of_points=_sample(mesh, [each.of_points for each in backgrounds])[0],
         net_force=sum((each.net_force for each in points), 0j),
+        rigid=rigid,
     )
 
 
@@ -142,6 +155,14 @@ def evaluate_ends(model: Model, outer: OuterNodes, stage: int, factor: float) ->
     """Displacement (k, 2) of the far ends of springs along the outer nodes' directions."""
     before = model.stages[stage - 1].ends if stage > 0 else {}
     return _evaluate_pairs(model, outer, (before, model.stages[stage].ends), stage, factor)
+
+
+def _load_tool(model: Model, mesh: Mesh, number: int, given: Real, far: Complex) -> None:
+    """Put the right-hand sides of a rigid body that is a tool among the displacements (nodes,) far away."""
+    name, body = list(model.rigid.items())[number]
+    if body.tool:
+        region = mesh.region_names.index(name)
+        far[list_region_nodes(mesh, region)] = load_rigid_rows(mesh, region, model.regions[region].material, given)
 
 
 def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
@@ -250,5 +271,6 @@ def find_needed_columns(model: Model, mesh: Mesh, outer: OuterNodes) -> Bool:
     parts = np.stack([outer.direction.real, outer.direction.imag], axis=2) != 0  # (k, direction, component)
     for first, free in ((0, ~outer.displacement_known), (2 * mesh.nodes, outer.displacement_known)):
         wanted = ((free | ever | (outer.stiffness > 0))[:, :, None] & parts).any(axis=1)
+        wanted |= outer.stays_rigid[:, None]
         needed[first + 2 * outer.node[:, None] + np.arange(2)] = wanted
     return needed | known

@@ -15,6 +15,7 @@ from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
 from pbem.description.repair import repair
+from pbem.description.rigid_tables import ToolTable
 from pbem.description.schema import (
     AnalysisTable,
     CaseFile,
@@ -34,9 +35,9 @@ from pbem.description.schema import (
     RemoteTable,
     SolverTable,
     StageTable,
-    UnitsTable,
 )
 from pbem.description.summary import print_case, print_case_as_html
+from pbem.description.table import UnitsTable
 from pbem.description.translation import find_schema_findings
 from pbem.description.varying import ExpressionTable
 from pbem.errors import CaseError, Fault, KeyPath
@@ -67,6 +68,7 @@ class Case:
     boundary: Mapping[str, ConditionTable]
     interfaces: Mapping[str, LawTable]
     contacts: Mapping[str, ContactTable]
+    tools: Mapping[str, ToolTable]
     remote: RemoteTable | None
     gravity: GravityTable | None
     initial_stress: Mapping[str, InSituTable]
@@ -267,5 +269,6 @@ def _concerns_loads(path: KeyPath) -> bool:
     """Whether a fault here leaves open what holds and what loads the bodies."""
     if path and path[0] == "materials":
         return path[-1] == "density"
-    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads", "point_supports") or
+    loads = ("boundary", "interfaces", "contacts", "tools", "stages", "gravity", "point_loads", "point_supports")
+    return bool(path) and (path[0] in loads or
                            path[0] not in CaseFile.model_fields)

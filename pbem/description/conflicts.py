@@ -35,11 +35,13 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
     for name in ("interfaces", "contacts"):
         for loc, table in _tables(raw, (name,)):
             findings += _check_law(loc, table)
+    for loc, table in _tables(raw, ("tools",)):
+        findings += _check_rigid(loc, table)
     findings += _check_generate(raw)
     findings += _check_stages(raw)
     findings += _check_solver(raw)
     findings += _check_options(raw)
-    for name in ("materials", "curves", "regions", "contacts", "point_loads", "point_supports"):
+    for name in ("materials", "curves", "regions", "contacts", "tools", "point_loads", "point_supports"):
         findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc, str(loc[-1]))]
     return findings
 
@@ -148,7 +150,32 @@ def _check_condition(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
     local = [key for key in LOCAL_KEYS if key in table]
     if in_axes and local:
         findings.append(Finding((*loc, local[0]), f"{in_axes[0]} together with {local[0]}", ONE_FAMILY))
+    resultants = [key for key in ("rigid", "force") if key in table]
+    others = [*in_axes, *local, *(["spring"] if "spring" in table else [])]
+    if resultants and (others or len(resultants) > 1):
+        other = (others or resultants)[0]
+        findings.append(Finding((*loc, resultants[-1]), f"{other} together with {resultants[-1]}",
+                                "rigid, force, or conditions in two directions: one of them on a curve"))
+    if isinstance(table.get("rigid"), dict):
+        findings += _check_rigid((*loc, "rigid"), table["rigid"])
+    force = table.get("force")
+    if isinstance(force, dict) and "moment" in force and force.get("how", "uniform") == "uniform" and (
+        loc[0] != "stages"
+    ):
+        findings.append(Finding((*loc, "force", "moment"), 'a moment with how = "uniform"',
+                                'how = "linear", or no moment: a uniform traction has that of its force'))
     return findings + _check_spring(loc, table, in_axes)
+
+
+# Pairs of keys of what is rigid that belong to one direction.
+FORCE_OR_MOTION = (("fx", "ux"), ("fy", "uy"), ("moment", "rotation"))
+
+
+def _check_rigid(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
+    return [
+        Finding((*loc, motion), f"both {force} and {motion}", "a force or a motion in each direction")
+        for force, motion in FORCE_OR_MOTION if force in table and motion in table
+    ]
 
 
 def _check_spring(loc: KeyPath, table: Mapping[str, Any], in_axes: Sequence[str]) -> list[Finding]:
@@ -215,6 +242,8 @@ def _check_stages(raw: Mapping[str, Any]) -> list[Finding]:
             continue
         for loc, table in _tables(stage, ("stages", number, "boundary")):
             findings += _check_condition(loc, table)
+        for loc, table in _tables(stage, ("stages", number, "tools")):
+            findings += _check_rigid(loc, table)
         name = stage.get("name")
         if isinstance(name, str) and name in names:
             found = f"the name {show(name)} of stage {names[name] + 1} again"

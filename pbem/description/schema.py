@@ -12,7 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from pbem.description.table import Table
+from pbem.description.rigid_tables import ForceTable, RigidTable, StageForceTable, StageRigidTable, ToolTable
+from pbem.description.table import Table, UnitsTable
 from pbem.description.values import (
     MOST_ELEMENTS,
     MOST_GENERATED,
@@ -37,13 +38,6 @@ from pbem.description.values import (
     check_option,
 )
 from pbem.description.varying import LinearValue, Strength, Value
-
-
-class UnitsTable(Table):
-    """Labels for pictures and results. Nothing is converted: any consistent units will do."""
-
-    length: Text = Field("", description="label of the unit of length")
-    stress: Text = Field("", description="label of the unit of stress")
 
 
 class MaterialTable(Table):
@@ -133,12 +127,16 @@ class StageConditionTable(Table):
     pressure: Value | None = Field(None, description="`tn = -pressure`, `ts = 0`")
     end_n: Value | None = Field(None, description="displacement of the far end of a spring `kn`, along the normal")
     end_s: Value | None = Field(None, description="of the far end of a spring `ks`, along the normal turned by +90")
+    rigid: StageRigidTable | None = Field(None, description="the curve stays rigid, under forces or with motions")
+    force: StageForceTable | None = Field(None, description="or a traction with this resultant")
 
 
 class ConditionTable(StageConditionTable):
     """Conditions on a curve of one region: displacement or traction in two directions. What is not given is free of
     traction."""
 
+    rigid: RigidTable | None = Field(None, description="the curve stays rigid, under forces or with motions")
+    force: ForceTable | None = Field(None, description="or a traction with this resultant")
     spring: SpringTable | None = Field(None, description="an elastic support, beside tractions, in place of displacements")
 
 
@@ -345,6 +343,7 @@ class StageTable(Table):
     boundary: Mapping[str, StageConditionTable] = Field(
         {}, description="values at the end of the stage: `ux` to `pressure` as in `[boundary.CURVE]`"
     )
+    tools: Mapping[str, StageRigidTable] = Field({}, description="forces or motions of a rigid tool")
     interfaces: Mapping[str, StageInterfaceTable] = Field({}, description="of an interface or a crack")
     contacts: Mapping[str, StageInterfaceTable] = Field({}, description="of a contact")
     remote: RemoteTable | None = Field(None, description="`sxx`, `syy`, `sxy` at the end of the stage")
@@ -404,6 +403,7 @@ class CaseFile(Table):
     boundary: Mapping[str, ConditionTable] = {}
     interfaces: Mapping[str, LawTable] = {}
     contacts: Mapping[str, ContactTable] = {}
+    tools: Mapping[str, ToolTable] = {}
     remote: RemoteTable | None = Field(
         None, description="Stress at infinity, for infinite regions: uniform, or linear in x and y and in balance with "
         "the region's weight under `[gravity]`."

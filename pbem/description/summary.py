@@ -31,6 +31,7 @@ def summarise(case: Any) -> list[tuple[str, str]]:
         ("conditions", list(case.boundary)),
         ("interfaces", laws),
         ("contacts", [f"{name} ({' and '.join(table.between)})" for name, table in case.contacts.items()]),
+        ("tools", list(case.tools)),
         ("stages", stages or [_count(case.analysis.steps, "step")]),
         ("analysis", [f"{case.analysis.scheme}, order {case.analysis.order}"]),
     ]

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
+
+from pbem.description.values import Text
 
 
 class Table(BaseModel):
     """A table of the case file: frozen, and without keys beyond its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class UnitsTable(Table):
+    """Labels for pictures and results. Nothing is converted: any consistent units will do."""
+
+    length: Text = Field("", description="label of the unit of length")
+    stress: Text = Field("", description="label of the unit of stress")

@@ -16,7 +16,7 @@ class Chain:
     """The elements of one curve in a region's order of travel (region on the left).
 
     forward: travelled in the curve's own direction. traction (elements,): the traction equation is collocated there.
-    first_node: number of its first node in the mesh. order: of the shapes on its elements.
+    first_node: number of its first node in the mesh. order: of the shapes on its elements. rigid: of a tool.
     """
 
     region: int
@@ -27,6 +27,7 @@ class Chain:
     elements: Elements
     first_node: int
     order: int
+    rigid: bool = False
 
     @property
     def local(self) -> Real:

@@ -39,7 +39,7 @@ def choose_equations(model: Model) -> Equations:
     for number, region in enumerate(model.regions):
         for loop in region.loops:
             for side in loop.sides:
-                asks = loop.outer and _asks_traction_equation(model, region, side.curve, inner)
+                asks = loop.outer and not region.rigid and _asks_traction_equation(model, region, side.curve, inner)
                 traction[number, side.curve] = (asks,) * len(model.curves[side.curve].legs)
         asked = [(curve, leg) for (of, curve), legs in traction.items() if of == number
                  for leg, asks in enumerate(legs) if asks]  # fmt: skip

@@ -83,7 +83,7 @@ def _list_chains(model: Model, equations: Equations) -> list[Chain]:
             traction = np.array(equations.traction[number, curve]) if not crack else np.full(elements.count, True)
             if not forward:
                 elements, traction = elements.reverse(), traction[::-1]
-            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order))
+            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order, region.rigid))
             first_node += elements.count * (order + 1)
     return chains
 

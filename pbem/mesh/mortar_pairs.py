@@ -105,6 +105,9 @@ def describe_sparse_meshes(contacts: Sequence[tuple[str, Integer]], order: int) 
 def _choose_slave(one: Chain, other: Chain, others: Elements) -> tuple[Chain, Chain, Coupling]:
     """Slave, master and what couples them: the slave is the one that is nowhere much finer than the other, unless its
     elements are so long that they lose much of the length over which the two face each other."""
+    if one.rigid or other.rigid:  # a tool has no tractions of its own
+        slave, master = (other, one) if one.rigid else (one, other)
+        return slave, master, couple_curves(slave.elements, master.elements, slave.local, others)
     seen = couple_curves(one.elements, other.elements, one.local, others)
     worse, better = measure_contrast(seen, one.elements, other.elements)
     chosen = (one, other, seen)

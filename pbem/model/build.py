@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.description.case import Case
-from pbem.errors import CaseError, Fault
+from pbem.errors import CaseError, Fault, KeyPath
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import find_crossings, format_point, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
+from pbem.model.approach import find_closing
 from pbem.model.coincidence import find_coincidences
 from pbem.model.crack import (
     check_inside,
@@ -26,23 +27,25 @@ from pbem.model.crack import (
 from pbem.model.cutting import Cut, cut_cracks
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.interior import list_interior_points
 from pbem.model.law import check_along
 from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
-from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
-from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
-from pbem.model.point_supports import PointSupport, place_point_supports
-from pbem.model.support_motions import check_independent
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
+from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
+from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.resultants import describe_unbalance, find_unbalanced_force
+from pbem.model.rigid_body import find_tractions
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
+from pbem.model.support_motions import check_independent
+from pbem.model.tools import check_tools, make_tool_regions, orient_tools
 from pbem.model.varying import Varying
 from pbem.wording import list_names
 
@@ -102,7 +105,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     loading = read_loading(case, roles)
     topology = _find_topology(cut, loading)
     interior, wrong = list_interior_points(case)
-    faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
+    faults = [*roles.faults, *check_tools(case, roles), *topology.faults, *loading.faults, *wrong]
     if faults:
         return None, case, faults
     model, faults = _compose(case, roles, loading, topology)
@@ -121,6 +124,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
     radii = {name: table.radius for name, table in case.curves.items() if table.radius is not None}
     model = move_to_own_origin(model, radii)
     if conditions_known and not varying:
+        model = replace(model, closing=find_closing(model))
         wrong, notes = _check_support(model)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
@@ -149,6 +153,7 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
         faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
+        loops = {**loops, **orient_tools(case, curves, loops, roles)}
         faults += find_coincidences(curves, loops, roles)
         notes += describe_closing(curves, cracks, loops)
     if not faults:
@@ -170,7 +175,17 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults))
 
 
+def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
+    """The loading with the tractions that have given resultants."""
+    stages = []
+    for stage, values in zip(loading.stages, loading.rigid.stages, strict=True):
+        tractions = {name: find_tractions(each, curves, values[name]) for name, each in loading.rigid.spreads.items()}
+        stages.append(replace(stage, boundary={**stage.boundary, **tractions}))
+    return replace(loading, stages=tuple(stages))
+
+
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
+    loading = _spread_forces(loading, topology.curves)
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,
@@ -194,12 +209,13 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         Region(name, materials[table.material], topology.loops[name], tuple(table.cracks), table.infinite)
         for name, table in case.regions.items()
     )
+    tools = make_tool_regions(case, curves, loading.rigid.bodies, topology.loops)
     fitted = fit_curves(
         case, curves, regions, topology.tips, frozenset(loading.interfaces) | frozenset(roles.in_contact)
     )
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",
-        regions=regions, curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
+        regions=(*regions, *tools), curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
         analysis=Analysis(
             case.analysis.scheme, case.analysis.order, case.analysis.tips, case.analysis.accuracy
@@ -215,6 +231,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         initial_stress=loading.initial_stress,
         rest_gravity=loading.rest_gravity,
         contacts=loading.contacts,
+        rigid=loading.rigid.bodies,
         groups=case.groups,
         ties=fitted.ties,
         point_loads=topology.points.loads,
@@ -248,8 +265,9 @@ def _note_loads(model: Model) -> list[str]:
     """A model whose answer is zero everywhere has probably lost its loads."""
     weights = any(region.material.density for region in model.regions)
     loads = [value for stage in model.stages for value in (
-        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair), *stage.pressure.values(), *stage.remote,
-        *(stage.gravity if weights else ()))]
+        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
+        *stage.pressure.values(), *stage.remote, *(stage.gravity if weights else ()),
+        *(each for values in stage.rigid.values() for each in values))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
@@ -290,9 +308,15 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
-        faults.append(Fault.at(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+        free = motion.regions[0]
+        loc: KeyPath = ("tools" if regions[free].rigid else "regions", free)
+        faults.append(Fault.at(loc, f"{found}: {unbalance}", expected))
     faults += check_independent(list(model.point_supports.values()), motions)
     notes = []
+    if model.closing:
+        names = list_names([f"'{name}'" for name in sorted(model.closing)])
+        notes.append(f"Nothing but {names} holds what the loads move, which does not touch yet: the search for its "
+                     "contact begins where it comes to touch.")
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
         name = next(each.name for each in moving if each.infinite)

@@ -17,6 +17,7 @@ from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
 from pbem.model.point_loads import read_point_forces
 from pbem.model.point_supports import read_support_values
+from pbem.model.rigid_body import RigidLoading, read_rigid_loading
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import Backgrounds, read_backgrounds
@@ -43,6 +44,7 @@ class Loading:
     interfaces: Mapping[str, Interface]
     contacts: Mapping[str, Contact]
     stages: tuple[Stage, ...]
+    rigid: RigidLoading
     initial_stress: Mapping[str, LinearStress]
     rest_gravity: complex
     faults: tuple[Fault, ...]
@@ -56,6 +58,12 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         condition, wrong = _find_condition(case, name)
         conditions[name] = condition
         faults += wrong
+    rigid = read_rigid_loading(case, roles)
+    faults += rigid.faults
+    for body in rigid.bodies.values():
+        for name in body.curves:
+            if name in conditions:
+                conditions[name] = Condition(name, "global", ("displacement", "displacement"))
     interfaces: dict[str, Interface] = {}
     laws: dict[Hashable, Law] = {}
     none = LawTable()
@@ -85,14 +93,15 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     support_values, wrong = read_support_values(case)
     faults += wrong
     stages = tuple(
-        replace(stage, swelling=swelling, point_forces=forces, support_values=shifts, remote_growth=growth)
-        for stage, swelling, forces, shifts, growth in zip(
+        replace(stage, swelling=swelling, point_forces=forces, support_values=shifts, remote_growth=growth,
+                rigid={name: values[name] for name in rigid.bodies})
+        for stage, swelling, forces, shifts, growth, values in zip(
             _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, point_forces,
-            support_values, backgrounds.remote, strict=True,
+            support_values, backgrounds.remote, rigid.stages, strict=True,
         )
     )
     faults += _check_durations(case, joints, stages)
-    return Loading(conditions, interfaces, contacts, stages, backgrounds.initial_stress,
+    return Loading(conditions, interfaces, contacts, stages, rigid, backgrounds.initial_stress,
                    backgrounds.rest_gravity, tuple(faults))
 
 

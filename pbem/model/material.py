@@ -7,14 +7,27 @@ from typing import Literal
 
 
 @dataclass(frozen=True)
+class RigidSupport:
+    """Of a rigid tool: forced: per motion (along x, along y, rotation about the point `about`) whether its force or
+    moment is given, and not the motion itself."""
+
+    forced: tuple[bool, bool, bool]
+    about: complex
+
+
+@dataclass(frozen=True)
 class Material:
-    """young: Young's modulus (stress, > 0); poisson: Poisson's ratio in (-1, 0.5); plane: strain or stress."""
+    """young: Young's modulus (stress, > 0); poisson: Poisson's ratio in (-1, 0.5); plane: strain or stress.
+
+    rigid: of a rigid tool, whose moduli only set the size of numbers; None of what is elastic.
+    """
 
     name: str
     young: float
     poisson: float
     plane: Literal["strain", "stress"] = "strain"
     density: float = 0.0
+    rigid: RigidSupport | None = None
 
     @property
     def shear_modulus(self) -> float:

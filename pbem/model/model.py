@@ -14,22 +14,33 @@ from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.material import Material
 from pbem.model.point_loads import Force, PointLoad
 from pbem.model.point_supports import PointSupport, Shift
+from pbem.model.rigid_body import RigidBody, Values
 from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
 
+# Of a tool, for points that no number of turns is inside for.
+NO_INSIDE = -(10**6)
 Quantity = Literal["displacement", "traction"]
 
 
 @dataclass(frozen=True)
 class Region:
-    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each."""
+    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each.
+
+    A rigid tool is the rigid body of the same name; its loops are its curves, open or closed, each by itself.
+    """
 
     name: str
     material: Material
     loops: tuple[Loop, ...]
     cracks: tuple[str, ...] = ()
     infinite: bool = False
+
+    @property
+    def rigid(self) -> bool:
+        """Whether it is a rigid tool."""
+        return self.material.rigid is not None
 
 
 @dataclass(frozen=True)
@@ -124,6 +135,7 @@ class Stage:
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
     point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
     point support. ends: of the curves whose springs' far ends move: by how much, along the normal and the curve.
+    rigid: of every rigid body its three forces or motions, rotations in degrees.
     """
 
     name: str
@@ -138,12 +150,14 @@ class Stage:
     support_values: Mapping[str, Shift] = field(default_factory=dict)
     ends: Mapping[str, tuple[Value, Value]] = field(default_factory=dict)
     remote_growth: LinearStress = AT_REST
+    rigid: Mapping[str, Values] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:
     """The loads of a stage that depend on time by themselves."""
     values = [*(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
               *stage.pressure.values()]
+    values += [each for values in stage.rigid.values() for each in values]
     return [value for value in values if isinstance(value, Varying) and value.timed]
 
 
@@ -186,8 +200,10 @@ class Model:
 
     interfaces: every shared curve, in the order of the file, then every crack. conditions: every outer curve (of
     one region), in the order of the file. crack_tips: per crack whether its start and end are tips.
-    contacts: pairs of curves that may touch. interior_points: where displacement and stress are asked for, those of the
-    grid first, x fastest, then single points; interior_grid: the grid's numbers of points along x and y.
+    contacts: pairs of curves that may touch. rigid: curves that stay rigid, and tools. closing: contacts
+    that touch only once the loads have moved a body that nothing else holds.
+    interior_points: where displacement and stress are asked for, those of the grid first, x fastest, then single
+    points; interior_grid: the grid's numbers of points along x and y.
     initial_stress: in-situ stress of materials by name, there before any load. rest_gravity: acceleration that it is in
     balance with where it grows with the coordinates, which acts on these materials from the start.
     origin: point of the user's coordinates about which those of the model are, 0 unless the model is far from there.
@@ -215,6 +231,8 @@ class Model:
     initial_stress: Mapping[str, LinearStress] = field(default_factory=dict)
     rest_gravity: complex = 0j
     contacts: Mapping[str, Contact] = field(default_factory=dict)
+    rigid: Mapping[str, RigidBody] = field(default_factory=dict)
+    closing: frozenset[str] = frozenset()
     interior_points: tuple[complex, ...] = ()
     interior_grid: tuple[int, int] | None = None
     groups: tuple[GeneratedGroup, ...] = ()
@@ -267,5 +285,10 @@ class Model:
 
     @property
     def finite_regions(self) -> list[int]:
-        """Numbers of the regions that have an outer boundary."""
-        return [number for number, region in enumerate(self.regions) if not region.infinite]
+        """Numbers of the elastic regions that have an outer boundary."""
+        return [number for number, region in enumerate(self.regions) if not region.infinite and not region.rigid]
+
+    @property
+    def turns_outside(self) -> list[int]:
+        """Per region what its loops lack of one turn about points inside; of tools, which have no inside, too many."""
+        return [NO_INSIDE if region.rigid else int(region.infinite) for region in self.regions]

@@ -16,6 +16,7 @@ from dataclasses import replace
 from pbem.geometry.curve import Leg
 from pbem.geometry.elements import Elements
 from pbem.model.model import Model
+from pbem.model.tools import move_tool
 
 # A model is moved if its middle is further away than so many times its size.
 FAR = 4.0
@@ -68,6 +69,7 @@ def _move(model: Model, origin: complex, places: Mapping[complex, complex]) -> M
     curves = {name: replace(curve, legs=tuple(map(shift, curve.legs))) for name, curve in model.curves.items()}
     return replace(
         model, curves=curves, origin=model.origin + origin,
+        regions=tuple(move_tool(region, origin) for region in model.regions),
         ties=tuple(replace(tie, corner=tie.corner - origin) for tie in model.ties),
         interior_points=tuple(point - origin for point in model.interior_points),
         stages=tuple(

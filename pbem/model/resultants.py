@@ -13,7 +13,8 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
 from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
-from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.model.rigid_body import find_reference
+from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
 from pbem.model.varying import Places, Value, Varying, evaluate, negate
 from pbem.wording import list_names
 
@@ -59,6 +60,30 @@ def find_unbalanced_force(model: Model, motion: RigidBodyMode, moving: Sequence[
     return 0j
 
 
+def measure_power(model: Model, motion: RigidBodyMode, number: int) -> float:
+    """What the loads at the end of a stage do on a motion per unit of it; 0 where they balance."""
+    stage, names = model.stages[number], set(motion.regions)
+    moving = [region for region in model.regions if region.name in names]
+    _, _, power, scale = _sum_tractions(model, motion, moving, stage, model.find_time(number, 1.0))
+    return power if abs(power) > (BALANCED_EXPRESSION if _has_expressions(stage) else BALANCED) * scale else 0.0
+
+
+def _list_pushes(
+    model: Model, moving: Sequence[Region], stage: Stage, time: float
+) -> Iterator[tuple[complex, float, complex, str]]:
+    """Force and moment of the rigid bodies of moving regions, the point of it, and the region."""
+    bounded = find_bounded(model)
+    names = {region.name for region in moving}
+    nowhere = Places(np.zeros(1, dtype=complex), np.zeros(1))
+    for name, body in model.rigid.items():
+        own = [bounded[curve] for curve in body.curves if bounded[curve] in names]
+        if own:
+            values = [float(evaluate(value, nowhere, time)[0]) if kind == "force" else 0.0
+                      for value, kind in zip(stage.rigid[name], body.known, strict=True)]
+            about = find_reference(body, model.curves, model.origin)
+            yield complex(values[0], values[1]), values[2], about, own[0]
+
+
 def _has_expressions(stage: Stage) -> bool:
     values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
     return any(isinstance(value, Varying) and value.expression for value in values)
@@ -72,6 +97,13 @@ def _sum_tractions(
     Fluid between two regions presses on both; where they are tied along the normal its power cancels.
     """
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
+    for push, turn, about, name in _list_pushes(model, moving, stage, time):
+        a, spin = motion.velocities[name]
+        drive = (np.conj(push) * (a + 1j * spin * about)).real, turn * spin
+        force += push
+        moment += turn + float((np.conj(about) * push).imag)
+        power += float(sum(drive))
+        scale += abs(drive[0]) + abs(drive[1])
     for region in moving:
         a, spin = motion.velocities[region.name]
         for load in model.point_loads_by_region.get(region.name, ()):
@@ -131,6 +163,8 @@ def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex
 
     Of an infinite region, which stress far away carries, minus the weight that its holes would have.
     """
+    if region.rigid:
+        return 0j, 0j
     legs = loop_legs(model.curves, region.loops)
     if not any(stage.gravity) or not legs:
         return 0j, 0j

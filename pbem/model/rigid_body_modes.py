@@ -14,7 +14,8 @@ from pbem.geometry.junction import format_point
 from pbem.geometry.loop import Side
 from pbem.geometry.sampling import sample_side
 from pbem.model.model import Contact, Interface, Law, Model, Region
-from pbem.model.rigid_links import GROUND, Link, find_moving_bodies
+from pbem.model.rigid_body import find_reference
+from pbem.model.rigid_links import GROUND, Link, constrain_motions, find_moving_bodies
 from pbem.model.touching import measure_opening, place_on_leg
 from pbem.model.varying import Places, Varying
 from pbem.wording import list_names
@@ -94,6 +95,7 @@ def _find_motions(model: Model, ties: Mapping[str, Tie | PairTie], plane_held: b
     names = [region.name for region in model.regions]
     center, scale = _frame(model)
     links = [*_link_to_ground(model, center, scale, plane_held), *_link_regions(model, names, ties, center, scale)]
+    links += _link_rigid(model, names, center, scale)
     return tuple(
         describe_motion(vector, [names[body] for body in bodies], center, scale, model.origin)
         for bodies, vector in find_moving_bodies(len(names), links)
@@ -122,12 +124,13 @@ def _constrain(motions: Complex, directions: list[Complex]) -> Real:
 
 
 def _link_to_ground(model: Model, center: complex, scale: float, plane_held: bool) -> Iterator[Link]:
+    rigid = {name for body in model.rigid.values() for name in body.curves}
     for number, region in enumerate(model.regions):
         if region.infinite and plane_held:  # by what is far away
             yield number, GROUND, np.eye(3)
         for side in (side for loop in region.loops for side in loop.sides):
             condition = model.conditions.get(side.curve)
-            if condition is None:
+            if condition is None or side.curve in rigid:
                 continue
             least = find_least_stiffness(model, region)
             for k, value in enumerate(condition.stiffness):
@@ -158,14 +161,30 @@ def _find_stiff(model: Model, curve: str, stiffness: Varying, least: float) -> t
     return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
+def _link_rigid(model: Model, names: list[str], center: complex, scale: float) -> Iterator[Link]:
+    """What is given of the motions of rigid bodies; regions with curves of the same one move as one."""
+    numbers = {name: number for number, name in enumerate(names)}
+    bounded = find_bounded(model)
+    for body in model.rigid.values():
+        owners = list(dict.fromkeys(numbers[bounded[name]] for name in body.curves))
+        held = np.array([kind == "motion" for kind in body.known])
+        about = find_reference(body, model.curves, model.origin)
+        yield owners[0], GROUND, constrain_motions(held, about, center, scale)
+        for other in owners[1:]:
+            yield owners[0], other, np.eye(3)
+
+
+def find_bounded(model: Model) -> dict[str, str]:
+    """The region of every curve of one region; of interfaces one of both."""
+    return {side.curve: region.name for region in model.regions for loop in region.loops for side in loop.sides}
+
+
 def _link_regions(
     model: Model, names: list[str], ties: Mapping[str, Tie | PairTie], center: complex, scale: float
 ) -> Iterator[Link]:
     """What interfaces and contacts demand of the difference of two regions' motions, on the (first) curve's points."""
     numbers = {name: number for number, name in enumerate(names)}
-    bounded = {
-        side.curve: region.name for region in model.regions for loop in region.loops for side in loop.sides
-    }
+    bounded = find_bounded(model)
     joints: list[tuple[Interface | Contact, str, str, str]] = [
         (one, one.name, one.first, one.second) for one in model.interfaces.values() if one.second is not None
     ]
@@ -191,6 +210,8 @@ def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> Real:
 
 
 def _touches(model: Model, joint: Interface | Contact) -> bool:
+    if joint.name in model.closing:
+        return True
     if isinstance(joint, Interface) and not isinstance(joint.law.gap, Varying):
         return joint.law.gap <= 0
     names = [joint.name] if isinstance(joint, Interface) else [joint.first, joint.second]

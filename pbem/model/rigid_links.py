@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from pbem.arrays import Real
+from pbem.arrays import Bool, Real
 
 # First body, second body, rows (k, 3): rows @ (motion of the first - motion of the second) = 0.
 Link = tuple[int, int, Real]
@@ -15,6 +15,16 @@ GROUND = -1  # the body that does not move
 
 # A motion is free if it violates the constraints by less than this part of their size.
 RELATIVE_RANK = 1e-8
+
+
+def constrain_motions(held: Bool, about: complex, center: complex, scale: float) -> Real:
+    """Rows (k, 3) for a body whose displacement along x or y at a point, or whose rotation is given (held (3,)).
+
+    Motions are along x, along y, and the angle times scale about the center.
+    """
+    lever = (about - center) / scale
+    rows = np.array([[1.0, 0.0, -lever.imag], [0.0, 1.0, lever.real], [0.0, 0.0, 1.0]])
+    return rows[held]
 
 
 def find_null_motions(bodies: int, links: Iterable[Link]) -> list[Real]:

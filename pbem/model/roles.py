@@ -55,6 +55,7 @@ def resolve_roles(case: Case) -> Roles:
                     faults.append(Fault.at(loc_of_name, f"curve '{name}' a second time", "each curve once"))
                 else:
                     uses[name].append(region)
+    faults += _add_tools(case, bounds, inside)
     infinite = [region for region, table in case.regions.items() if table.infinite]
     for region in infinite[1:]:
         found = f"a second infinite region beside '{infinite[0]}'"
@@ -73,6 +74,26 @@ def resolve_roles(case: Case) -> Roles:
     kinds = {name: "an interface" for name in shared} | {name: "a crack" for name in cracks}
     contacts, wrong = _resolve_contacts(case, outer, kinds)
     return Roles(outer, shared, cracks, contacts, tuple(faults + wrong))
+
+
+def _add_tools(case: Case, bounds: dict[str, list[str]], inside: Mapping[str, list[str]]) -> list[Fault]:
+    """Enter the curves of rigid tools, which bound no region, as those of their tool."""
+    faults = []
+    for name, table in case.tools.items():
+        if name in case.regions:
+            faults.append(Fault.at(("tools", name), f"the name '{name}' of a region too", "a name of its own"))
+            continue
+        for index, curve in enumerate((name, *table.curves)):
+            loc: KeyPath = ("tools", name, "curves", index - 1) if index else ("tools", name)
+            if curve not in case.curves:
+                faults.append(unknown_name(loc, curve, "curve", case.curves))
+            elif bounds[curve] or inside[curve]:
+                owners = list_names([f"'{each}'" for each in bounds[curve] + inside[curve]])
+                found = f"curve '{curve}', which {owners} has"
+                faults.append(Fault.at(loc, found, "a curve that bounds no region, of one tool"))
+            else:
+                bounds[curve].append(name)
+    return faults
 
 
 def _resolve_contacts(
@@ -117,6 +138,6 @@ def _check_use(name: str, bounds: list[str], inside: list[str]) -> Fault | None:
         found = f"crack '{name}' in {len(inside)} regions ({list_names(inside)})"
         return Fault.at(loc, found, "a crack inside one region: split it where it meets their interface")
     if not bounds and not inside:
-        expected = "a use in the `boundary` or `cracks` of a region, or no such curve"
+        expected = "a use in the `boundary` or `cracks` of a region, as a tool, or no such curve"
         return Fault.at(loc, f"curve '{name}', which no region uses", expected)
     return None

@@ -32,7 +32,7 @@ This page is made from the program's own schema. An optional key without a defau
 # What stands in the place of a name of the user's.
 NAMES = {
     "materials": "NAME", "curves": "NAME", "regions": "NAME", "contacts": "NAME", "boundary": "CURVE",
-    "interfaces": "CURVE", "initial_stress": "MATERIAL",
+    "interfaces": "CURVE", "tools": "CURVE", "initial_stress": "MATERIAL",
     "temperature": "REGION", "eigenstrain": "REGION", "point_loads": "NAME", "point_supports": "NAME",
 }  # fmt: skip
 # Numbers beyond this are refused as slips of the pen, which is not worth saying of every key.
@@ -40,7 +40,7 @@ NO_BOUND = 1e100
 # Tables that accept the keys of [interfaces.CURVE] too, which are told there.
 WITH_LAW = ("ContactTable", "GenerateTable")
 # Values of stages, told with the table that they are values of.
-VALUES = ("StageConditionTable", "RemoteTable", "GravityTable", "PointForceTable", "PointShiftTable")
+VALUES = ("StageConditionTable", "StageRigidTable", "RemoteTable", "GravityTable", "PointForceTable", "PointShiftTable")
 
 
 def write_key_page() -> str:

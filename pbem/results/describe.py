@@ -9,6 +9,7 @@ from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
+from pbem.results.rigid import COMPONENTS, list_rigid_rows
 from pbem.results.text_tables import count as _count
 from pbem.results.text_tables import format_number as _number
 from pbem.results.text_tables import section as _section
@@ -57,6 +58,8 @@ def describe_results(results: Results, traces: int = 10) -> str:
         parts.append(_section("reactions at the last step", _table(
             ["curve", "x", "y"],
             [[name, _number(force[-1, 0]), _number(force[-1, 1])] for name, force in results.reactions.items()])))
+        parts.append(_section("rigid bodies at the last step: force and moment on them, motion (degrees)", _table(
+            ["body", "about", *COMPONENTS], list_rigid_rows(results.rigid))))
     return "\n\n".join(part for part in parts if part)
 
 

@@ -147,6 +147,9 @@ class EnergyBalance:
             self._refer(number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
             for number, each in enumerate(model.regions) if each.infinite
         ]  # fmt: skip
+        tools = np.array([each.rigid for each in model.regions])[self._faces.region]
+        self._tools = np.where(tools, self._weight, 0.0)
+        self._elastic = self._weight - self._tools
         self._in_situ = self._sample_in_situ()
         self._reached = reached or Energy(0.0, 0.0, 0.0)
         self.runaway: Runaway | None = None
@@ -158,6 +161,7 @@ class EnergyBalance:
         nodes = self._outer.node
         moved = (new.displacement - old.displacement)[nodes]
         work = _dot(self._weight[nodes], 0.5 * (old.traction + new.traction)[nodes], moved)
+        work -= _dot(self._tools, 0.5 * (old.traction + new.traction), new.displacement - old.displacement)
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
         # What swells does work against the stress.
         work -= _dot(self._weight, 0.5 * (old.traction + new.traction), new.swollen - old.swollen)
@@ -238,7 +242,7 @@ class EnergyBalance:
             )
             loads.append(point_forces)
             conjugates.append(moved)
-        stored = 0.5 * _dot(self._weight, traction + self._in_situ, displacement)
+        stored = 0.5 * _dot(self._elastic, traction + self._in_situ, displacement)
         if self._model.point_loads:
             stored += 0.5 * float(point_forces @ moved)
         for reference in self._forces:

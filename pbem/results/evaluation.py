@@ -77,7 +77,7 @@ class Evaluator:
         mesh, model = run.mesh, run.model
         own = given - model.origin
         finite = np.abs(given) < FARTHEST
-        infinite = np.array([region.infinite for region in model.regions])
+        infinite = np.array(model.turns_outside)
         reach = np.maximum(np.where(finite, np.abs(given), 0.0), abs(model.origin) + run.faces.extent)
         where = find_points(mesh, run.faces, infinite, np.where(finite, own, 0), reach, side == "second")
         where.region[~finite], where.face[~finite] = -1, -1

@@ -11,6 +11,7 @@ import numpy as np
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.results.configuration import to_plain
 from pbem.results.reader import Results
+from pbem.results.rigid import COMPONENTS
 from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.results.traces import list_traces
 
@@ -53,6 +54,11 @@ def _collect_last(results: Results, traces: int | None) -> dict[str, Any]:
             for name, tips in results.tips.items()
         },
         "reactions": {name: {"x": force[-1, 0], "y": force[-1, 1]} for name, force in results.reactions.items()},
+        "rigid": {
+            name: {"about": each.about, "known": each.known,
+                   **dict(zip(COMPONENTS, (*each.force[-1], *each.motion[-1]), strict=True))}
+            for name, each in results.rigid.items()
+        },
         "energy": {name: values[-1] for name, values in vars(results.energy).items()},
         "balance": _collect_balance(results),
         "linearity": _collect_linearity(results),

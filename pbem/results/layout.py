@@ -22,6 +22,7 @@ from pbem.results.configuration import dump_configuration
 from pbem.results.estimates import list_datasets
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.linearity import create_linearity
+from pbem.results.rigid import create_rigid
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
 
@@ -96,6 +97,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Int
         create_energy(energy, name)
     create_balance(file, model, mesh)
     create_linearity(file, mesh)
+    create_rigid(file, model)
     _write_estimates(file.create_group("estimates"), model, mesh)
     if model.analysis.accuracy is not None:
         _write_fractions(file.create_group("mesh"), model)

@@ -45,6 +45,11 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
                    "least_distance": find_least_distance(mesh, name)}
             for name, each in model.contacts.items()
         },
+        "rigid": {
+            name: {"curves": list(body.curves), "tool": body.tool, "known": list(body.known),
+                   "values": [[*map(to_plain, stage.rigid[name])] for stage in model.stages]}
+            for name, body in model.rigid.items()
+        },
         "laws": summarise_laws(model),
         "stages": [
             {"name": stage.name, "steps": stage.steps, "duration": stage.duration,
@@ -73,8 +78,9 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
 
 def _list_region(region: Region) -> dict[str, Any]:
     material = region.material
+    shown = None if region.rigid else {name: value for name, value in vars(material).items() if name != "rigid"}
     return {
-        "name": region.name, "material": vars(material), "infinite": region.infinite,
+        "name": region.name, "material": shown, "rigid": region.rigid, "infinite": region.infinite,
         "loops": [{"outer": loop.outer, "curves": [side.curve for side in loop.sides]} for loop in region.loops],
         "cracks": list(region.cracks),
     }  # fmt: skip

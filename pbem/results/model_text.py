@@ -10,8 +10,10 @@ import numpy as np
 from pbem.description.generation import GeneratedGroup
 from pbem.forecast.forecast import Forecast
 from pbem.geometry.curve import Curve
+from pbem.geometry.junction import format_point
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Law, Model, Region, Stage
+from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference
 from pbem.results.doubts import list_doubts
 from pbem.results.law_text import TITLES, list_law_rows
 from pbem.results.text_tables import count, format_bytes, format_number, section, shorten, table
@@ -31,6 +33,8 @@ def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -
         section("conditions", table(["curve", *_direction_titles(model)],
                                       [[each.curve, *describe_condition(model, each)]
                                        for each in model.conditions.values()])),
+        section("rigid bodies", table(["body", "about", "x", "y", "turn"],
+                                      [_rigid_row(model, body) for body in model.rigid.values()])),
         section("interfaces", table(["interface", "first side", "second side", "pairs", "law"],
                                       _interface_rows(model, mesh, made))),
         section("contacts", table(["contact", "first curve", "second curve", "pairs", "least distance"],
@@ -55,10 +59,24 @@ def _describe_region(region: Region, made: Collection[str]) -> str:
     ]
     written = [name for name in region.cracks if name not in made]
     cracks = [f"cracks: {', '.join(shorten(written, 12))}"] if written else []
+    if region.rigid:
+        return "\n    ".join([f"rigid tool {region.name}", *(text.replace("outer loop", "curve") for text in loops)])
     kind = "infinite region" if region.infinite else "region"
     head = (f"{kind} {region.name}: {material.name}, Young's modulus {material.young:g}, "
             f"Poisson's ratio {material.poisson:g}, plane {material.plane}")
     return "\n    ".join([head, *shorten(loops), *cracks])
+
+
+def _rigid_row(model: Model, body: RigidBody) -> list[str]:
+    """The point and, per direction, the force or motion at the end of every stage where they differ."""
+    about = find_reference(body, model.curves, model.origin) + model.origin
+    more = f" with {', '.join(body.curves[1:])}" if len(body.curves) > 1 else ""
+    texts = []
+    for axis, kind in enumerate(body.known):
+        given = [f"{stage.rigid[body.name][axis]:g}" for stage in model.stages]
+        given = given[:1] if len(set(given)) == 1 else shorten(given, 6)
+        texts.append(f"{(FORCES if kind == 'force' else MOTIONS)[axis]} = {', '.join(given)}")
+    return [f"{body.name}{' (tool)' if body.tool else ''}{more}", format_point(about), *texts]
 
 
 def _curve_row(curve: Curve) -> list[str]:
@@ -100,6 +118,9 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     """What is prescribed in each direction: one value, or those at the end of every stage where they differ."""
     names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
+    rigid = next((name for name, body in model.rigid.items() if condition.curve in body.curves), None)
+    if rigid is not None:
+        return f"rigid body {rigid}", f"rigid body {rigid}"
     if condition.known == ("traction", "traction") and not any(map(any, [*values, condition.stiffness])):
         return "free", "free"
     texts = []

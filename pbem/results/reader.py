@@ -37,6 +37,7 @@ from pbem.results.lazy import (
 )
 from pbem.results.linearity import read_linearity
 from pbem.results.outline import find_tips
+from pbem.results.rigid import RigidMotion, read_rigid
 from pbem.results.trial import check_contents
 
 STATUSES = ("running", "finished", "failed", "stopped")
@@ -52,6 +53,7 @@ class Results:
     energies; balance: of the forces on every region, and linearity: how large strains and slips are, None in files of
     earlier versions; interior: points inside, None if the case has none; convergence: one row per Newton iteration with
     the fields step, iteration, residual, changed, stick, slip, open, seconds.
+    rigid: forces on rigid curves and tools, and how they move.
     overrides: values that were set beside the case, a line KEY = VALUE each. failure: why the run ended early (status
     "failed" or "stopped"), empty if it did not, or was killed.
     """
@@ -80,6 +82,7 @@ class Results:
     linearity: Linearities | None
     interior: Interior | None
     convergence: NDArray[Any] = field(repr=False)
+    rigid: Mapping[str, RigidMotion] = field(default_factory=dict)
 
     @cached_property
     def displacement(self) -> Real:
@@ -275,6 +278,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         linearity=read_linearity(file, k),
         interior=_read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
+        rigid=read_rigid(file, k),
     )
 
 

@@ -27,6 +27,7 @@ def list_facts(results: Results) -> list[tuple[str, str]]:
         ("size", size), ("regions", list_names(results.nodes.region_names, MOST_NAMES)),
         ("contact", list_names(results.contact, MOST_NAMES)), ("tips", list_names(results.tips, MOST_NAMES)),
         ("reactions", list_names(results.reactions, MOST_NAMES)),
+        ("rigid", list_names(results.rigid, MOST_NAMES)),
         ("interior", "" if results.interior is None else f"{len(results.interior.position)} points"),
     ]
     return [(name, printable(text)) for name, text in facts if text]

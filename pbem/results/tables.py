@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError
 from pbem.results.reader import Results
+from pbem.results.rigid import COMPONENTS
 from pbem.results.trace_names import find_names, name_trace
 from pbem.wording import list_names, suggest
 
@@ -21,7 +22,7 @@ FIXED = ("position", "normal", "arc_length")
 
 
 def make_table(results: Results, what: str) -> Table:
-    """The columns of a table: `steps`, `reactions`, `tips`, `interior`, or the contact of an interface.
+    """The columns of a table: `steps`, `reactions`, `rigid`, `tips`, `interior`, or the contact of an interface.
 
     That is named as contact.NAME, or by NAME alone if it is none of the others; "contact" is all of them. NAME may be a
     trace, which stands for all its pieces, or a pattern: then a column tells the interface. One row for each stored
@@ -54,6 +55,7 @@ def choose_table(results: Results) -> str:
 def list_tables(results: Results) -> list[str]:
     """The names of all tables that the file holds."""
     there = {"steps": True, "reactions": bool(results.reactions), "tips": bool(results.tips),
+             "rigid": bool(results.rigid),
              "interior": results.interior is not None, "contact": bool(len(results.contact))}
     return [*(name for name in KINDS if there[name]), *(PREFIX + name for name in results.contact)]
 
@@ -101,6 +103,14 @@ def _tabulate_reactions(results: Results) -> Table:
     names = np.array(list(results.reactions), dtype=object)
     forces = np.stack(list(results.reactions.values()), axis=1).reshape(-1, 2) if len(names) else np.zeros((0, 2))
     return {**_name_steps(results, len(names)), "curve": _repeat(results, names), "x": forces[:, 0], "y": forces[:, 1]}
+
+
+def _tabulate_rigid(results: Results) -> Table:
+    bodies = list(results.rigid.values())
+    values = np.stack([np.concatenate([each.force, each.motion], axis=1) for each in bodies], axis=1).reshape(-1, 6)
+    names = np.array([each.name for each in bodies], dtype=object)
+    return {**_name_steps(results, len(bodies)), "body": _repeat(results, names),
+            **{name: values[:, k] for k, name in enumerate(COMPONENTS)}}
 
 
 def _tabulate_tips(results: Results) -> Table:
@@ -176,7 +186,7 @@ def _tabulate_contacts(results: Results) -> Table:
 
 KINDS: Mapping[str, Callable[[Results], Table]] = {
     "steps": _tabulate_steps, "reactions": _tabulate_reactions, "tips": _tabulate_tips, "interior": _tabulate_interior,
-    "contact": _tabulate_contacts,
+    "contact": _tabulate_contacts, "rigid": _tabulate_rigid,
 }
 
 

@@ -36,9 +36,10 @@ class Whereabouts:
 
 
 def find_points(
-    mesh: Mesh, faces: Elements, infinite: Bool, points: Complex, reach: Real, second: bool
+    mesh: Mesh, faces: Elements, infinite: Integer, points: Complex, reach: Real, second: bool
 ) -> Whereabouts:
-    """Where points (q,) lie; reach (q,): the largest number in their coordinates, which rounds them.
+    """Where points (q,) lie; infinite (r,): 1 of a region that is the outside of its loops, less than 0 of one without
+    an inside, else 0; reach (q,): the largest number in their coordinates, which rounds them.
 
     second: a point on a crack or interface belongs to the second of its sides, else to the first.
     """
@@ -53,6 +54,7 @@ def find_points(
     # Sides of the same place: regions by their numbers, of a crack the first face before the second.
     first_faces = np.concatenate([np.arange(mesh.elements), np.flatnonzero(mesh.crack)])
     side = 2 * mesh.region[first_faces] + (np.arange(faces.count) >= mesh.elements)
+    off[infinite[mesh.region[first_faces[face]]] < 0] = np.inf
     touching = np.flatnonzero(off < tolerance)
     rank = (-1 if second else 1) * side[face[touching]]
     order = touching[np.lexsort((off[touching], rank, point[touching]))]
@@ -63,7 +65,7 @@ def find_points(
     ending = np.abs(np.abs(s.real) - 1 + 1j * s.imag) < NEAR_END
     inner = face < mesh.elements
     ending &= inner & ~mesh.crack[np.where(inner, face, 0)] & (on[point] < 0)
-    ending &= mesh.region[first_faces[face]] == region[point]
+    ending &= (mesh.region[first_faces[face]] == region[point]) & np.isfinite(off)
     close, chosen = np.unique(point[ending], return_index=True)
     _take(on, where, close, np.flatnonzero(ending)[chosen], face, s)
     at_end = np.zeros(len(points), dtype=bool)
@@ -91,7 +93,7 @@ def _list_near(faces: Elements, points: Complex) -> tuple[Integer, Integer]:
     return point[order], face[order]
 
 
-def _count_turns(mesh: Mesh, faces: Elements, infinite: Bool, points: Complex) -> Integer:
+def _count_turns(mesh: Mesh, faces: Elements, infinite: Integer, points: Complex) -> Integer:
     """The region (q,) that each point is in, by the turns of the regions' boundaries about it; -1 outside of all.
 
     A loop turns only about points in the box around it: of thousands of small ones each point meets few. (theory, 80)

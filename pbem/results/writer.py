@@ -40,6 +40,7 @@ from pbem.results.lazy import refuse_damage
 from pbem.results.linearity import append_linearity
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, name_stages, read_last_energy, read_last_step, truncate
+from pbem.results.rigid import append_rigid
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.results.unfinished import drop_unfinished, read_unfinished, write_unfinished
@@ -139,7 +140,7 @@ class ResultWriter:
         self.unfinished: Unfinished | None = None
         self._storage = storage
         self._every = max(1, model.output_every)
-        faces = list_faces(mesh)
+        faces = self._all_faces = list_faces(mesh)
         self._weight = faces.weight
         numbers = {name: number for number, name in enumerate(model.conditions)}
         condition_of_curve = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)
@@ -226,6 +227,7 @@ class ResultWriter:
             append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
         append_balance(file, step)
         append_linearity(file, step)
+        append_rigid(file, self._model, self._mesh.curve_names, self._all_faces, step.displacement, step.traction)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
@@ -265,7 +267,9 @@ class ResultWriter:
         if mesh.order > 0:  # else the stretch is told by neighbours of the same region
             mesh = replace(mesh, region=np.array(kind_of)[mesh.region])
             initial = [initial[kind_of.index(number)] for number in range(len(kinds))]
-        return evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
+        stress = evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
+        stress[np.array([region.rigid for region in self._model.regions])[self._all_faces.region]] = 0.0
+        return stress
 
     def _sum_reactions(self, traction: Complex) -> Complex:
         """Integral (c,) of the traction over every outer curve."""

@@ -17,11 +17,12 @@ from pbem.model.model import Model
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.pair_weights import weigh_mesh_pairs
+from pbem.results.rigid import measure_rigid
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.problem.step import SilentReporter, Step
 
 FACTORS = ("KI", "KII", "J", "T")
-Kind = Literal["reactions", "contact", "tips"]
+Kind = Literal["reactions", "contact", "tips", "rigid"]
 
 
 class AbsentNameError(LookupError):
@@ -30,7 +31,8 @@ class AbsentNameError(LookupError):
 
 @dataclass(frozen=True)
 class Names:
-    """What there is to ask for: outer curves, interfaces and cracks with pairs, cracks with tips; families of several.
+    """What there is to ask for: outer curves, interfaces and cracks with pairs, cracks with tips; families of several;
+    rigid bodies.
 
     families: the names that stand for more than one, each with its members.
     """
@@ -39,6 +41,7 @@ class Names:
     contact: tuple[str, ...]
     tips: tuple[str, ...]
     families: Mapping[str, tuple[str, ...]]
+    rigid: tuple[str, ...] = ()
 
     def find_members(self, kind: Kind, name: str | None) -> tuple[str, ...]:
         """What a name stands for in this case: itself, or all of its family; None: everything of the kind.
@@ -71,7 +74,7 @@ def list_quantity_names(model: Model, mesh: Mesh) -> Names:
             families.setdefault(stem, []).append(name)
     return Names(
         tuple(model.conditions), contact, tuple(list_tip_curves(model, mesh)),
-        {name: tuple(members) for name, members in families.items()},
+        {name: tuple(members) for name, members in families.items()}, tuple(model.rigid),
     )
 
 
@@ -138,6 +141,14 @@ class Outcome(SilentReporter):
         force = faces.weight[on] * step.traction[on]
         place = faces.position[on] + self.model.origin
         return float(force.real.sum()), float(force.imag.sum()), float((np.conj(place) * force).imag.sum())
+
+    def measure_rigid(self, name: str) -> tuple[float, ...]:
+        """Force along x and y and moment on a rigid body, its displacement along x and y and its rotation (degrees)."""
+        step, body = self.last, self.model.rigid[name]
+        force, motion = measure_rigid(
+            self.model, body, self.mesh.curve_names, self._faces, step.displacement, step.traction
+        )
+        return tuple(float(value) for value in (*force, *motion))
 
     @cached_property
     def _faces(self) -> Faces:

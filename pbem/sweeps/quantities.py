@@ -12,7 +12,9 @@ from pbem.contact.laws import OPEN, SLIP, STICK, find_joint
 from pbem.description.replacement import Part, split_key
 from pbem.errors import CaseError, Fault
 from pbem.model.model import Model
+from pbem.model.rigid_body import FORCES, MOTIONS
 from pbem.results.pair_weights import JUMPS
+from pbem.results.rigid import COMPONENTS as RIGID
 from pbem.sweeps.outcome import FACTORS, AbsentNameError, Kind, Names, Outcome
 from pbem.wording import list_names, show, suggest
 
@@ -25,6 +27,7 @@ STEPS = ("number", "load_factor", "iterations", "residual")
 STATISTICS = ("max", "min", "mean", "largest", "integral")
 KINDS = {
     "reactions": "reactions.CURVE.x, y or moment",
+    "rigid": "rigid.NAME.fx (fx, fy, moment, ux, uy or rotation)",
     "contact": "contact.NAME.slip.largest (FIELD slip, opening, traction_n or traction_s; max, min, mean, largest or "
                "integral), contact.NAME.status.slip (stick, slip or open), without NAME of all",
     "tips": "tips.NAME.KI (KI, KII, J or T), tips.NAME.start.KI or end, without NAME of all",
@@ -78,7 +81,11 @@ def read_quantities(texts: Iterable[str], names: Names, option: str = "") -> tup
 def choose_quantities(model: Model, names: Names) -> list[str]:
     """Those that are taken if none are asked for: reactions where displacements are known; slips, openings, factors."""
     held = [name for name, each in model.conditions.items() if "displacement" in each.known]
+    held = [name for name in held if not any(name in body.curves for body in model.rigid.values())]
     found = [f"reactions.{quote(name)}.{part}" for name in held for part in ("x", "y")]
+    # Of rigid bodies what was not given.
+    found += [f"rigid.{quote(name)}.{(MOTIONS if kind == 'force' else FORCES)[axis]}"
+              for name, body in model.rigid.items() for axis, kind in enumerate(body.known)]
     loose = [name for name in names.contact if find_joint(model, name).law.kind != "bonded"]
     single = [f".{quote(name)}" for name in loose] if len(loose) <= MOST_INTERFACES else [""]
     found += [f"contact{name}.{part}" for name in single for part in ("slip.largest", "opening.max")]
@@ -102,7 +109,8 @@ def _read(text: str, names: Names) -> list[Quantity]:
     kind, *rest = parts
     if kind.text not in KINDS:
         raise WrongQuantityError(f"'{kind.text}'{suggest(kind.text, KINDS)}", "; ".join(KINDS.values()))
-    reader = {"reactions": _read_reaction, "contact": _read_contact, "tips": _read_tips}.get(kind.text)
+    reader = {"reactions": _read_reaction, "contact": _read_contact, "tips": _read_tips,
+              "rigid": _read_rigid}.get(kind.text)
     if reader is not None:
         return reader(rest, names)
     known = ENERGIES if kind.text == "energy" else STEPS
@@ -146,6 +154,21 @@ def _read_reaction(parts: Sequence[Part], names: Names) -> list[Quantity]:
             outcome.sum_reaction(each)[at] for each in outcome.names.find_members("reactions", name)))
 
     return [make(each) for each in _select(parts[0], names, "reactions")]
+
+
+def _read_rigid(parts: Sequence[Part], names: Names) -> list[Quantity]:
+    if len(parts) != 2:
+        raise WrongQuantityError(f"{len(parts)} names after rigid", KINDS["rigid"])
+    what = _take(parts[1:], RIGID, "rigid")
+
+    def make(name: str) -> Quantity:
+        def evaluate(outcome: Outcome) -> float:
+            (body,) = outcome.names.find_members("rigid", name)
+            return outcome.measure_rigid(body)[RIGID.index(what)]
+
+        return Quantity(f"rigid.{quote(name)}.{what}", evaluate)
+
+    return [make(each) for each in _select(parts[0], names, "rigid")]
 
 
 def _read_contact(parts: Sequence[Part], names: Names) -> list[Quantity]:

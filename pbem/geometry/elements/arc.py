@@ -128,10 +128,11 @@ class Arc(Kind):
         """The chord's angle, and a full turn between the chord and the arc (theory, 80)."""
         if np.any(abs(e.sweep) > WIDEST):
             return sum(self.subtend(self.cut(e, 0.5 * k, 0.5 * k + 0.5), z) for k in (0, 1))
-        # Between the chord and the arc the chord passes on the other side of the point.
+        # Between the chord and the arc the chord passes on the other side of the point: its angle has the other sign,
+        # which also tells a point on the chord itself as the angle was rounded.
         in_circle = abs(z - e.center) < abs(e.start - e.center)
-        beyond = ((z - e.start) * np.conj(e.end - e.start)).imag * e.sweep < 0
-        return CHORD.subtend(e, z) + 2 * np.pi * np.sign(e.sweep) * (in_circle & beyond)
+        angle = CHORD.subtend(e, z)
+        return angle + 2 * np.pi * np.sign(e.sweep) * (in_circle & (angle * e.sweep < 0))
 
     def extremes(self, e: Shape) -> list[Any]:
         turning = [e.center + abs(e.start - e.center) * direction for direction in (1, 1j, -1, -1j)]

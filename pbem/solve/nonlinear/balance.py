@@ -38,6 +38,7 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions)
     finite = np.array([not region.infinite for region in problem.model.regions])
     carried_force = _find_carried_force(problem, whole, known, load)
     regions = replace(regions, force=regions.force - np.where(finite, 0.0, carried_force))
+    regions = _balance_tools(problem, regions, load)
     # An infinite region may carry a moment, which decays.
     turned = np.where(finite, _divide(np.abs(regions.moment), regions.moments), 0.0)
     relative = np.maximum(_divide(np.abs(regions.force), regions.forces), turned)
@@ -56,6 +57,20 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions)
         part_weight=_divide(parts.forces, np.full(len(parts.forces), regions.forces.max())),
         whole=total.resultant[0], whole_relative=total_relative,
     )
+
+
+def _balance_tools(problem: Problem, regions: _Sums, load: Load) -> _Sums:
+    """The sums with what is left over on tools: tractions and given forces; where motions are given, nothing."""
+    force, moment = regions.force.copy(), regions.moment.copy()
+    for number, region in enumerate(problem.model.regions):
+        support = region.material.rigid
+        if support is not None:
+            x, y, turn = load.rigid[list(problem.model.rigid).index(region.name)]
+            lever = support.about - regions.middle[number]
+            about = moment[number] - (np.conj(lever) * force[number]).imag
+            x, y, turn = np.where(support.forced, [force[number].real + x, force[number].imag + y, about + turn], 0.0)
+            force[number], moment[number] = complex(x, y), turn + (np.conj(lever) * complex(x, y)).imag
+    return replace(regions, force=force, moment=moment)
 
 
 @dataclass(frozen=True)
@@ -206,9 +221,11 @@ def _measure_whole(
     """
     outer = np.zeros(problem.mesh.nodes, dtype=bool)
     outer[problem.outer.node] = True
-    acting = outer[faces.node]
+    # Tools act by what their contacts carry.
+    tools = np.array([region.rigid for region in problem.model.regions])[of]
+    acting = outer[faces.node] | tools
     seen = replace(
-        faces, traction=np.where(acting, faces.traction, 0.0),
+        faces, traction=np.where(acting, np.where(tools, -1.0, 1.0) * faces.traction, 0.0),
         weight=np.where(acting | (faces.bounding & (faces.known != 0)), faces.weight, 0.0),
     )
     sums = _add_up(seen, np.zeros(len(of), dtype=np.int64), 1, least)

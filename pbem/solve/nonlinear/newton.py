@@ -126,7 +126,7 @@ def _search_modes(
     hold = Hold(problem)
     comm = problem.comm
     modes = problem.decide(lambda: follow_leaders(
-        laws, hold.apply(memory.modes, laws.gap, np.zeros(laws.count))))
+        laws, hold.apply(memory.modes, problem.approached, np.zeros(laws.count))))
     normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
     fixed_point, kept = FixedPoint(), (modes, normal_traction, slip)
     products = problem.system.products

@@ -17,6 +17,7 @@ from scipy.linalg import lapack
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid_motions import RigidMotions
+from pbem.bem.rigid_region import form_rigid_rows
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -58,7 +59,7 @@ class SchwarzPreconditioner:
         self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
         groups: Sequence[Subdomain], nodes: Integer, rigid: Sequence[RigidMotions] = (),
     ) -> None:
-        self._mesh, self._anchors = mesh, tuple(anchors)
+        self._mesh, self._anchors, self._materials = mesh, tuple(anchors), tuple(materials)
         self._rigid = [motions for motions in rigid if motions.interpolated]
         self._sources = collect_sources(mesh, materials)
         self._scale = scale_equations(mesh, materials, length)
@@ -271,6 +272,13 @@ class SchwarzPreconditioner:
         columns = number_components(seen)
         if bounded:
             columns = np.concatenate([columns, 2 * mesh.nodes + columns])
+        material = self._materials[region]
+        if material.rigid is not None:
+            whole = form_rigid_rows(mesh, region, material)
+            first, count = self._first_element[region] * (mesh.order + 1), whole.shape[1] // 2
+            at = np.concatenate([number_components(seen - first), count + number_components(seen - first)])
+            values = whole[np.ix_(number_components(nodes - first), at)]
+            return self._hold(values, nodes, seen, region), columns
         values = np.empty((2 * len(nodes), len(columns)))
         for traction in (False, True):
             at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
@@ -288,12 +296,16 @@ class SchwarzPreconditioner:
                 left = (self.free[number_components(nodes)] @ rotation) + values @ rotation[columns]
                 values[:, place] -= np.outer(left, motions.basis[-1])
         # After the rotations, which the anchors hold.
+        return self._hold(values, nodes, seen, region), columns
+
+    def _hold(self, values: Real, nodes: Integer, seen: Integer, region: int) -> Real:
+        """Rows of nodes on the displacements of others, with what the region's anchors add."""
         own_anchors = [number for number, anchor in enumerate(self._anchors) if anchor.region == region]
         for one in own_anchors:
             for other in own_anchors:
                 if self._acting[one, other]:
                     self._anchor(values, nodes, seen, one, other)
-        return values, columns
+        return values
 
     def _find_anchored(self, constraints: ConstraintMap) -> Bool:
         """Unknowns of the regions on which other anchors act than before."""

@@ -15,6 +15,7 @@ from pbem.arrays import Complex, Integer, Real
 from pbem.bem.interior import Values
 from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
+from pbem.contact.approach import approach_pairs
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.cut_parts import CutMotion, CutParts
@@ -186,6 +187,12 @@ class Problem:
 
         known: dict[str, FreeMotions] = {}
         return lru_cache(maxsize=64)(find)
+
+    @cached_property
+    def approached(self) -> Real:
+        """Initial openings (m,) of all pairs, once the loads have moved what only contacts hold that do not touch yet.
+        """
+        return approach_pairs(self.model, self.mesh, self.laws.gap)
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
         """The constraint map for linearised laws and a load."""

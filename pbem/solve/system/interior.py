@@ -36,7 +36,7 @@ class InteriorField:
         own = points[shares[comm.rank] : shares[comm.rank + 1]]
         self._model, self._mesh, self._comm = model, mesh, comm
         self._points = own
-        self._location = locate_points(mesh, [region.infinite for region in model.regions], own)
+        self._location = locate_points(mesh, model.turns_outside, own)
         self._place: PlaceInterior = place_directly
         parts = [self._location.region, self._location.element, self._location.s]
         region, element, s = (gather_parts(comm, np.asarray(part, dtype=float)) for part in parts)

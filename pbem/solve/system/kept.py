@@ -138,7 +138,7 @@ class KeptProblems:
 
 def outer_parts(outer: OuterNodes) -> tuple[Any, ...]:
     """What the operator depends on of the conditions, which have their values besides."""
-    return outer.node, outer.direction, outer.displacement_known, outer.stiffness
+    return outer.node, outer.direction, outer.displacement_known, outer.stiffness, outer.rigid
 
 
 def varying_parts(laws: PairLaws) -> tuple[Any, ...]:

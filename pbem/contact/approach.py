@@ -1,0 +1,34 @@
+"""Pairs that come to touch first where the loads move a body that nothing holds yet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.arrays import Real
+from pbem.mesh.mesh import Mesh
+from pbem.model.approach import find_drive, find_rates, move_until_closed
+from pbem.model.model import Model
+from pbem.model.rigid_body_modes import find_rigid_body_modes
+
+
+def approach_pairs(model: Model, mesh: Mesh, gap: Real) -> Real:
+    """Openings (m,) after that motion, from the initial ones; the same where no contact is closed by one."""
+    if not model.closing:
+        return gap
+    motions = find_rigid_body_modes(model, dict.fromkeys(model.closing, "none"))
+    power = find_drive(model, motions) if motions else None
+    if power is None:
+        return gap
+    pairs, node_region = mesh.pairs, mesh.node_region
+    rates = np.zeros((pairs.count, len(motions)))
+    own = ~pairs.crack
+    sides = np.stack([node_region[pairs.first], node_region[pairs.second]], axis=1)
+    for first, second in np.unique(sides[own], axis=0).tolist():
+        at = np.flatnonzero(own & (sides == (first, second)).all(axis=1))
+        names = mesh.region_names[first], mesh.region_names[second]
+        rates[at] = find_rates(motions, *names, pairs.position[at], pairs.normal[at])
+    moved = move_until_closed(np.maximum(gap, 0.0)[own], rates[own], power, model.size)
+    result = gap.copy()
+    if moved is not None:
+        result[own] = np.maximum(moved, 0.0)
+    return result

@@ -1,0 +1,92 @@
+"""Bodies that contacts hold only once they have moved: how far the loads move them until they touch.
+
+Up to there nothing resists: of all rigid motions that leave no faces overlapping, the loads take the one in which they
+do most work. Openings are linear in small motions, so that this is a linear program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linprog
+
+from pbem.arrays import Complex, Real
+from pbem.geometry.loop import side_legs
+from pbem.geometry.sampling import sample_side
+from pbem.model.model import Model
+from pbem.model.resultants import measure_power
+from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
+from pbem.model.sight import Surroundings
+from pbem.model.varying import Places, Varying, evaluate
+
+# Nobody moves further than so many sizes of the model: what does is stopped by nothing.
+FARTHEST = 10.0
+# Openings below this part of the largest that there was are closed.
+CLOSED = 1e-6
+
+
+def find_closing(model: Model) -> frozenset[str]:
+    """Contacts that do not touch at the start, and stop what the loads of a stage move otherwise freely."""
+    apart = {name: one for name, one in model.contacts.items() if one.law.kind not in ("open", "bonded")}
+    motions = find_rigid_body_modes(model)
+    if not apart or not motions:
+        return frozenset()
+    power = find_drive(model, motions)
+    if power is None:
+        return frozenset()
+    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
+    bounded = find_bounded(model)
+    names, openings, rates = [], [], []
+    for name, contact in apart.items():
+        for curve, other in ((contact.first, contact.second), (contact.second, contact.first)):
+            points, normals = sample_side(model.curves, sides[curve])
+            seen = Surroundings(side_legs(model.curves, sides[other])).look_along(points, normals, -model.size)
+            faced = (seen.leg >= 0) & (seen.product < 0) & (np.abs(seen.distance) < model.size)
+            if not faced.any():
+                continue
+            points, normals, distance = points[faced], normals[faced], np.maximum(seen.distance[faced], 0.0)
+            gap = evaluate(contact.law.gap, Places(points + model.origin, np.zeros(len(points)))) if not (
+                isinstance(contact.law.gap, Varying)) else np.zeros(len(points))
+            names += [name] * len(points)
+            openings.append(np.maximum(distance + gap, 0.0))
+            rates.append(find_rates(motions, bounded[curve], bounded[other], points, normals))
+    if not openings:
+        return frozenset()
+    opening, rate = np.concatenate(openings), np.concatenate(rates)
+    moved = move_until_closed(opening, rate, power, model.size)
+    if moved is None:
+        return frozenset()
+    closed = moved <= CLOSED * max(float(opening.max()), CLOSED * model.size)
+    return frozenset(name for name, touches in zip(names, closed.tolist(), strict=True) if touches)
+
+
+def find_drive(model: Model, motions: Sequence[RigidBodyMode]) -> Real | None:
+    """What the loads of the first stage that drives any of some motions do on each (c,); None if none does."""
+    for number in range(len(model.stages)):
+        power = np.array([measure_power(model, motion, number) for motion in motions])
+        if power.any():
+            return power
+    return None
+
+
+def find_rates(
+    motions: Sequence[RigidBodyMode], first: str, second: str, points: Complex, normals: Complex
+) -> Real:
+    """Openings (k, c) per unit of each motion at points of the first region, with its outward normals."""
+    result = np.zeros((len(points), len(motions)))
+    for column, motion in enumerate(motions):
+        for name, sign in ((second, 1.0), (first, -1.0)):
+            shift, spin = motion.velocities.get(name, (0j, 0.0))
+            result[:, column] += sign * (np.conj(normals) * (shift + 1j * spin * points)).real
+    return result
+
+
+def move_until_closed(opening: Real, rates: Real, power: Real, size: float) -> Real | None:
+    """Openings (k,) after the motion that the loads take; None if nothing stops it."""
+    most = FARTHEST * size
+    found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening, bounds=[(-most, most)] * len(power))
+    if found.status != 0 or -found.fun > 0.1 * most:
+        return None
+    return np.asarray(opening + rates @ found.x)
+

@@ -41,6 +41,7 @@ class Load:
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
     background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
+    carried (m, 2): traction, along n and s, that faces which a stage opens still carry in it.
     """
 
     values: Real
@@ -48,6 +49,7 @@ class Load:
     known: Real
     far: Complex
     background: Complex
+    carried: Real
 
 
 def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
@@ -107,6 +109,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
         background=balanced[0] + far[0],
+        carried=np.zeros((mesh.pairs.count, 2)),
     )
 
 

@@ -320,6 +320,21 @@ class StageTable(Table):
     gravity: GravityTable | None = Field(None, description="`gx`, `gy` at the end of the stage")
     temperature: Mapping[str, LinearValue] = Field({}, description="of a region at the end of the stage")
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
+    remove: tuple[Text, ...] = Field(
+        (), description="regions that are taken away; what they carried on their interfaces is released in proportion "
+        "over the steps of the stage",
+    )
+    open: tuple[Text, ...] = Field(
+        (), description="interfaces, cracks and contacts that never touch from this stage on; what they carried is "
+        "released in proportion over its steps",
+    )
+    close: tuple[Text, ...] = Field(
+        (), description="interfaces, cracks and contacts that are bonded from this stage on, as they lie at its "
+        "beginning",
+    )
+    release: tuple[Text, ...] = Field(
+        (), description="of what stages before have closed or opened: from this stage on it follows its law"
+    )
 
 
 class SolverTable(Table):

@@ -12,6 +12,7 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.coincidence import find_coincidences
+from pbem.model.construction import arrange_model, group_stages
 from pbem.model.crack import (
     check_inside,
     check_near_misses,
@@ -162,7 +163,9 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         for name, condition in loading.conditions.items()
     }
     behaviour |= {
-        name: (interface.first, interface.second, interface.law) for name, interface in loading.interfaces.items()
+        name: (interface.first, interface.second, interface.law,
+               tuple(stage.construction.joints.get(name) for stage in loading.stages))
+        for name, interface in loading.interfaces.items()
     }
     behaviour |= {curve: ("contact", name) for curve, name in roles.in_contact.items()}
     with_tips = frozenset(roles.cracks) if case.analysis.tips else frozenset()
@@ -237,20 +240,39 @@ def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
                for stiffness in condition.stiffness)
 
 
-def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
-    """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
+def _check_hold(model: Model, now: Model, stages: Sequence[int], later: bool) -> tuple[list[Fault], list[str]]:
+    """Of stages with the same construction: faults for bodies that nothing holds, and motions whose loads balance.
+
+    now: the model as it is there. later: these are not the first stages.
+    """
     faults, balanced = [], []
     regions = {region.name: region for region in model.regions}
-    for motion in find_rigid_body_modes(model):
+    for motion in find_rigid_body_modes(now):
         found = f"a free rigid motion ({motion.text})"
-        unbalance = describe_unbalance(model, motion, [regions[name] for name in motion.regions])
+        unbalance = describe_unbalance(now, motion, [regions[name] for name in motion.regions], stages)
         if unbalance is None:
             balanced.append(motion.text)
             continue
         soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
+        if later:
+            found = f"from stage '{model.stages[stages[0]].name}' on {found}"
         faults.append(Fault.at(("regions", motion.regions[0]), f"{found}: {unbalance}", expected))
+    return faults, balanced
+
+
+def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
+    """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
+    faults: list[Fault] = []
+    balanced: list[str] = []
+    for stages in group_stages(model):
+        number = stages[0]
+        wrong, resting = _check_hold(model, arrange_model(model, number), stages, faults == [] and number > 0)
+        faults += wrong
+        balanced += resting
+    balanced = [*dict.fromkeys(balanced)]
+    regions = {region.name: region for region in model.regions}
     notes = []
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]

@@ -17,17 +17,23 @@ from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
 
 Quantity = Literal["displacement", "traction"]
+# How faces are held that do not follow their law.
+Hold = Literal["closed", "open"]
 
 
 @dataclass(frozen=True)
 class Region:
-    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each."""
+    """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each.
+
+    removed: gone, in a model as it is in a stage (see pbem.model.construction).
+    """
 
     name: str
     material: Material
     loops: tuple[Loop, ...]
     cracks: tuple[str, ...] = ()
     infinite: bool = False
+    removed: bool = False
 
 
 @dataclass(frozen=True)
@@ -105,6 +111,19 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class Construction:
+    """What there is in a stage.
+
+    joints: of interfaces, cracks and contacts that do not follow their law: "closed" faces are bonded where they lie,
+    "open" ones never touch, as are those whose region is gone. removed: regions that are gone, in the order of the
+    file.
+    """
+
+    joints: Mapping[str, Hold] = field(default_factory=dict)
+    removed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Stage:
     """A part of the load history: the values at its end, linear from those at the end of the stage before (0 at first);
     what depends on time by itself has its own value at every time.
@@ -113,6 +132,7 @@ class Stage:
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
     infinity, for infinite regions; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
     shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
+    construction: which faces are held otherwise than by their law, and which regions are gone.
     """
 
     name: str
@@ -123,6 +143,7 @@ class Stage:
     gravity: tuple[float, float] = (0.0, 0.0)
     duration: float = 0.0
     swelling: Mapping[str, Swelling] = field(default_factory=dict)
+    construction: Construction = field(default_factory=Construction)
 
 
 def list_timed(stage: Stage) -> list[Varying]:

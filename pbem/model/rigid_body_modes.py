@@ -123,7 +123,7 @@ def _constrain(motions: Complex, directions: list[Complex]) -> Real:
 
 def _link_to_ground(model: Model, center: complex, scale: float, plane_held: bool) -> Iterator[Link]:
     for number, region in enumerate(model.regions):
-        if region.infinite and plane_held:  # by what is far away
+        if (region.infinite and plane_held) or region.removed:  # by what is far away; what is gone has no motion
             yield number, GROUND, np.eye(3)
         for side in (side for loop in region.loops for side in loop.sides):
             condition = model.conditions.get(side.curve)

@@ -99,7 +99,8 @@ class Case:
         if expansion is not None:
             values |= {field.name: getattr(expansion, field.name) for field in fields(Expansion)}
         named = [*values["interfaces"], *values["boundary"]]
-        named += [name for stage in values["stages"] for name in (*stage.interfaces, *stage.boundary, *list_named(stage))]
+        named += [name for stage in values["stages"]
+                  for name in (*stage.interfaces, *stage.boundary, *list_named(stage))]
         families = find_families(named, values["curves"])
         if families:
             values["boundary"] = spread_conditions(values["boundary"], families)

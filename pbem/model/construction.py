@@ -21,7 +21,8 @@ def read_construction(
     """What there is in every stage; what a stage does not name stays as it was. laws: of interfaces and contacts."""
     joints: dict[str, Hold] = {}
     removed: list[str] = []
-    stages, faults = [], []
+    stages: list[Construction] = []
+    faults: list[Fault] = []
     for number, table in enumerate(case.stages):
         faults += _check_removed(case, number, table, removed)
         removed += [name for name in dict.fromkeys(table.remove) if name in case.regions and name not in removed]
@@ -71,7 +72,8 @@ def _check_removed(case: Case, number: int, table: StageTable, before: Sequence[
 
 
 def _check_joints(
-    case: Case, number: int, table: StageTable, before: Mapping[str, Hold], laws: Mapping[str, Law], gone: Collection[str]
+    case: Case, number: int, table: StageTable, before: Mapping[str, Hold], laws: Mapping[str, Law],
+    gone: Collection[str],
 ) -> Iterator[Fault]:
     """Names that are none, are named twice, would change nothing, or are those of faces of a region that is gone."""
     told: dict[str, str] = {}
@@ -108,9 +110,8 @@ def arrange_model(model: Model, stage: int) -> Model:
     now = model.stages[stage].construction
     if not now.joints and not now.removed:
         return model
-    laws = {name: _hold_law(joint.law, now.joints[name])
-            for joint in (*model.interfaces.values(), *model.contacts.values())
-            for name in (joint.name,) if name in now.joints}
+    every: dict[str, Interface | Contact] = {**model.interfaces, **model.contacts}
+    laws = {name: _hold_law(every[name].law, hold) for name, hold in now.joints.items()}
     interfaces: dict[str, Interface] = {
         name: replace(each, law=laws.get(name, each.law)) for name, each in model.interfaces.items()
     }

@@ -225,7 +225,7 @@ def _find_stages(
         for name in conditions:
             _update(values[name], stage.boundary.get(name))
         bared = {name: table for name, table in stage.boundary.items() if name in joints}
-        changes = {**stage.contacts, **stage.interfaces, **bared}
+        changes: dict[str, StageInterfaceTable | StageConditionTable] = {**stage.contacts, **stage.interfaces, **bared}
         for name in joints:
             if name in changes:
                 pressure[name] = _read(changes[name].pressure or 0.0)

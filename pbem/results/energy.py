@@ -67,16 +67,17 @@ class Energy:
     external: work of prescribed tractions and displacements, fluid pressure, weight, stress far away, and swelling.
     elastic: stored in the regions, in springs under outer curves and in the elastic joints of interfaces.
     dissipated: by friction and by bonds that parted; it never falls.
-    released: set free where faces ran away within a step, as motion that the quasi-static balance does not follow, and
-    taken out where a stage opens faces or takes regions away: what these had stored, and the work of the tractions that
-    are released.
-    external = elastic + dissipated + released, as exactly as the discrete fields obey Betti's theorem.
+    released: set free where faces ran away within a step, as motion that the quasi-static balance does not follow.
+    removed: taken out where a stage opens faces or takes regions away: what these had stored, and the work against the
+    tractions that are released.
+    external = elastic + dissipated + released + removed, as exactly as the discrete fields obey Betti's theorem.
     """
 
     external: float
     elastic: float
     dissipated: float
     released: float = 0.0
+    removed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,8 @@ class EnergyBalance:
             external=before.external + work,
             elastic=self._add_stored(new),
             dissipated=before.dissipated + dissipated,
-            released=before.released + released + lost + pairs.taken + bared,
+            released=before.released + released,
+            removed=before.removed + lost + pairs.taken + bared,
         )
         return self._reached
 

@@ -88,6 +88,9 @@ class Evaluator:
             displacement[k] = np.stack([values.displacement.real, values.displacement.imag], axis=1)
             stress[k] = values.stress
         displacement[:, where.region < 0], stress[:, where.region < 0] = np.nan, np.nan
+        for k, at in enumerate(steps):
+            gone = self._find_gone(at)[where.region] & (where.region >= 0)
+            displacement[k, gone], stress[k, gone] = np.nan, np.nan
         stress[:, at_tip] = np.nan
         names = np.array([*mesh.region_names, ""])
         return Evaluation(
@@ -123,7 +126,8 @@ class Evaluator:
         last = np.searchsorted(where.region[by_region], regions)
         densities, totals = [], []
         for at in steps:
-            moved, traction, hoop_stress = self._read(at)
+            stored = self._read(at)
+            moved, traction, hoop_stress = np.nan_to_num(stored[0]), np.nan_to_num(stored[1]), np.nan_to_num(stored[2])
             first, opposite = split_faces(mesh, moved)
             u, t = np.where(crack, first - opposite, first), np.where(crack, 0.0, traction[: mesh.nodes])
             total = evaluate_face_limits(run, where, points, moved, traction, hoop_stress)
@@ -156,6 +160,13 @@ class Evaluator:
         strained = np.stack([take_off_rigid_motions(each, self._rigid) for each in v.T], axis=1)
         displacement, stress = field.sample(v, strained)
         return [Values(displacement[:, k], stress[:, k]) for k in range(len(densities))]
+
+    def _find_gone(self, at: int) -> Bool:
+        """Which regions are gone at a stored step: what is stored of them is not a number."""
+        moved, region = self._read(at)[0], self._run.mesh.node_region
+        gone = np.zeros(len(self._run.model.regions), dtype=bool)
+        gone[region[np.isnan(moved[: len(region)])]] = True
+        return gone
 
     def _read(self, at: int) -> tuple[Complex, Complex, Real]:
         with open_quietly(self._path) as file:

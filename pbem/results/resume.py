@@ -90,8 +90,9 @@ def read_last_energy(file: h5py.File) -> Energy:
     """The energies at the last step that was stored completely."""
     k = count_steps(file)
     group = file["energy"]
-    if "released" not in group:  # a file of an earlier version
-        extend(create_energy(group, "released"), np.zeros(len(group["external"])))
+    for kind in ("released", "removed"):
+        if kind not in group:  # a file of an earlier version
+            extend(create_energy(group, kind), np.zeros(len(group["external"])))
     return Energy(**{kind: float(group[kind][k - 1]) for kind in ENERGIES})
 
 

@@ -23,7 +23,6 @@ from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.arranged import Arranged, begin_stage, describe_rest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, SilentReporter, Step
-from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.kept import KeptProblems

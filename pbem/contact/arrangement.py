@@ -25,7 +25,8 @@ class Arrangement:
 
     closed, opened (m,): pairs that are bonded, or never touch, whatever their law; opening (m,): those that open in
     this stage. bared (m,): pairs with a region that is gone on one side or on both. regions (r,): that are gone. nodes
-    (k,): theirs on interfaces and cracks; outer (o,): which of the outer nodes are theirs.
+    (k,): theirs on interfaces and cracks; outer (o,): which of the outer nodes are theirs. bare (b,): the nodes of
+    other regions on the faces that they have left.
     """
 
     closed: Bool
@@ -35,6 +36,7 @@ class Arrangement:
     regions: Bool
     nodes: Integer
     outer: Bool
+    bare: Integer
 
     def hold(self, laws: PairLaws, rest: Real) -> PairLaws:
         """The laws of the pairs in the stage; rest (m,): openings of closed pairs without traction."""
@@ -71,10 +73,14 @@ def find_arrangement(model: Model, mesh: Mesh, outer: OuterNodes, stage: int) ->
     pairs = mesh.pairs
     closed, opened = ([name for name, hold in now.joints.items() if hold == kind] for kind in ("closed", "open"))
     around = choose(opened) & np.isin(of, np.unique(of[node_gone[pairs.first] | node_gone[pairs.second]]))
+    bared = around | (pairs.crack & node_gone[pairs.first])
+    beside = np.zeros(mesh.nodes, dtype=bool)
+    beside[pairs.slave[bared]] = True
+    beside[mesh.links.traction_node[bared[mesh.links.traction_pair]]] = True
     return Arrangement(
         closed=choose(closed), opened=choose(opened), opening=choose(list_opened(model.stages, stage)),
-        bared=around | (pairs.crack & node_gone[pairs.first]), regions=gone,
-        nodes=np.flatnonzero(node_gone & ~is_outer), outer=node_gone[outer.node],
+        bared=bared, regions=gone, nodes=np.flatnonzero(node_gone & ~is_outer), outer=node_gone[outer.node],
+        bare=np.flatnonzero(beside & ~node_gone),
     )
 
 

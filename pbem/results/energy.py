@@ -245,10 +245,7 @@ class EnergyBalance:
         pressed[pairs.slave] = pairs.sense * pressure * pairs.normal
         given = links.traction_weight * pressed[pairs.slave[links.traction_pair]]
         np.subtract.at(pressed, links.traction_node, given)
-        bare = np.zeros(count, dtype=bool)
-        bare[pairs.slave[there.bared]] = True
-        bare[links.traction_node[there.bared[links.traction_pair]]] = True
-        at = np.flatnonzero(bare & ~mesh.node_crack)
+        at = there.bare
         moved = (new.displacement - old.displacement)[at]
         fluid = _dot(self._weight[at], pressed[at], moved)
         return fluid, fluid - _dot(self._weight[at], 0.5 * (old.traction + new.traction)[at], moved)

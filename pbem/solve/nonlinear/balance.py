@@ -197,6 +197,8 @@ def _measure_whole(
     """
     outer = np.zeros(problem.mesh.nodes, dtype=bool)
     outer[problem.outer.node] = True
+    if problem.arrangement is not None:
+        outer[problem.arrangement.bare] = True  # what a region that is gone still carries, or fluid in its place
     acting = outer[faces.node]
     seen = replace(
         faces, traction=np.where(acting, faces.traction, 0.0),

@@ -192,6 +192,10 @@ class ContactTable(LawTable):
     initial gap follows from the geometry. All keys of `[interfaces.CURVE]` are accepted as well."""
 
     between: tuple[Text, Text] = Field(description="the two curves, in any order; results lie on the first one")
+    overlap: NotNegative = Field(
+        0.0, description="length by which the bodies may lie in each other as they are drawn, at most, as for a press "
+        "fit; the first step drives them apart",
+    )
 
 
 class GenerateTable(LawTable):

@@ -55,6 +55,7 @@ class _Topology:
     size: float
     notes: tuple[str, ...]
     faults: tuple[Fault, ...]
+    overlaps: Mapping[str, float]
 
 
 def build_model(case: Case) -> Model:
@@ -135,10 +136,12 @@ def _find_topology(cut: Cut) -> _Topology:
     infinite = {name for name, table in case.regions.items() if table.infinite}
     loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
     faults = [*shapes.faults, *crossings, *wrong]
+    overlaps: dict[str, float] = {}
     notes = [*cut.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
-        faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
+        overlaps, wrong = check_contacts(case, curves, loops, roles, shapes.tolerance)
+        faults += wrong
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
         faults += find_coincidences(curves, loops, roles)
@@ -152,7 +155,7 @@ def _find_topology(cut: Cut) -> _Topology:
     curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))
+    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults), overlaps)
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
@@ -201,7 +204,8 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         notes=(*topology.notes, *grading, *fitted.notes, *_note_choices(case)),
         initial_stress=loading.initial_stress,
         rest_gravity=loading.rest_gravity,
-        contacts=loading.contacts,
+        contacts={name: replace(each, overlap=topology.overlaps.get(name, 0.0))
+                  for name, each in loading.contacts.items()},
         groups=case.groups,
         ties=fitted.ties,
     )
@@ -227,6 +231,7 @@ def _note_loads(model: Model) -> list[str]:
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
     loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]
+    loads += [contact.overlap for contact in model.contacts.values() if contact.law.kind != "open"]
     return [] if any(loads) else [
         "No load: all prescribed displacements and tractions, pressures, stresses far away, weights, in-situ stresses, "
         "swellings and interferences are zero, and so will be the results."

@@ -86,13 +86,15 @@ class Contact:
     """Two different outer curves that may touch; their meshes need not match, the gap follows from the geometry.
 
     first, second: names of the curves; the pairs lie on the first, which gives their normal. Neither has a
-    Condition: where they do not touch they are free of traction.
+    Condition: where they do not touch they are free of traction. overlap: how deep the bodies lie in each other as they
+    are drawn, at most (length); 0 where they do not.
     """
 
     name: str
     first: str
     second: str
     law: Law
+    overlap: float = 0.0
 
 
 @dataclass(frozen=True)

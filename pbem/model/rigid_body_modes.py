@@ -175,6 +175,8 @@ def _constrain_at_pairs(tie: PairTie, center: complex, scale: float) -> Real:
 def _touches(model: Model, joint: Interface | Contact) -> bool:
     if isinstance(joint, Interface) and not isinstance(joint.law.gap, Varying):
         return joint.law.gap <= 0
+    if isinstance(joint, Contact) and joint.overlap > 0:
+        return True
     names = [joint.name] if isinstance(joint, Interface) else [joint.first, joint.second]
     shorter = min(model.curves[name].length for name in names)
     largest = max(abs(point) for name in names for leg in model.curves[name].legs for point in (leg.start, leg.end))

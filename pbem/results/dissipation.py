@@ -87,7 +87,7 @@ def measure_work(
     laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord, opened: Bool | None = None
 ) -> PairWork:
     """The work in a step; weight (m,): length of the boundary that belongs to each pair; opened (m,): those that a
-    stage has opened (theory, 76, 92)."""
+    stage has opened (theory, 76, 93)."""
     moved, slid = new.g_n - old.g_n, new.g_s - old.g_s
     pressed = 0.5 * (old.p_n + old.pressure + new.p_n + new.pressure) * moved
     trapezoid = pressed + 0.5 * (old.p_s + new.p_s) * slid

@@ -234,8 +234,10 @@ class EnergyBalance:
             self._weight = np.where(self._there.regions[self._faces.region], 0.0, self._all_weight)
 
     def _measure_bared(self, old: _State, new: _State) -> tuple[float, float]:
-        """On faces whose other side is gone: work of the fluid, and what the tractions take that are released (theory,
-        92)."""
+        """On faces whose other side is gone: work of the fluid, and what the tractions take that are released.
+
+        (theory, 93)
+        """
         there, mesh = self._there, self._mesh
         if there is None or not there.bared.any():
             return 0.0, 0.0

@@ -66,11 +66,14 @@ class Evaluator:
         self._run: RebuiltRun = rebuild_run(str(path), nodes, elements, configuration)
         self._fine: Resampling = resample(self._run.mesh)
 
-    def evaluate(self, points: ArrayLike, steps: Sequence[int], tips: Complex, side: Side = "first") -> Evaluation:
+    def evaluate(
+        self, points: ArrayLike, steps: Sequence[int], tips: Complex, side: Side = "first", beside: bool = True
+    ) -> Evaluation:
         """The field at points (q, 2), after the steps stored at these places in the file.
 
         tips: places of crack tips, in the user's coordinates. side: of a crack or interface that a point lies on. On an
-        outer boundary the values are the limits from inside.
+        outer boundary the values are the limits from inside. beside: where a region is gone on the one side, those of
+        the other are given.
         """
         run, given = self._run, read_points(points)
         mesh, model = run.mesh, run.model
@@ -91,6 +94,11 @@ class Evaluator:
         for k, at in enumerate(steps):
             gone = self._find_gone(at)[where.region] & (where.region >= 0)
             displacement[k, gone], stress[k, gone] = np.nan, np.nan
+            bared = np.flatnonzero(gone & (where.face >= 0))
+            if len(bared) and beside:
+                other: Side = "second" if side == "first" else "first"
+                left = self.evaluate(given[bared].view(float).reshape(-1, 2), [at], tips, other, beside=False)
+                displacement[k, bared], stress[k, bared] = left.displacement[0], left.stress[0]
         stress[:, at_tip] = np.nan
         names = np.array([*mesh.region_names, ""])
         return Evaluation(

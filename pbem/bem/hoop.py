@@ -142,11 +142,13 @@ def _find_smooth_joints(mesh: Mesh) -> Integer:
     """For each element (e,) the one in which it goes on, on the same curve without a corner; -1 where it does not."""
     numbers = np.arange(mesh.elements)
     key = np.stack([mesh.curve, mesh.region, mesh.crack])
+    begin, end = (each / np.abs(each) for each in mesh.geometry.directions())
     breaks = (np.diff(key, axis=1) != 0).any(axis=0) | (mesh.start[1:] != mesh.end[:-1])
+    # The other side of a closed curve may begin where the first ends, and turns back there.
+    breaks |= (np.conj(end[:-1]) * begin[1:]).real < 0
     firsts = np.concatenate([[0], np.flatnonzero(breaks) + 1])
     following = numbers + 1
     following[np.concatenate([firsts[1:] - 1, [mesh.elements - 1]])] = firsts  # closed curves go on where they began
-    begin, end = (each / np.abs(each) for each in mesh.geometry.directions())
     turns = mesh.geometry.turns
     smooth = (mesh.start[following] == mesh.end) & (following != numbers)
     smooth &= (np.abs(end - begin[following]) < SMOOTH) & (turns[following] * turns >= 0)

@@ -19,6 +19,7 @@ from pbem.contact.loads import Load, OuterNodes
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation
 from pbem.contact.rigid_nodes import constrain_rigid_nodes
 from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import number_components
 
 
 @dataclass(frozen=True)
@@ -71,22 +72,41 @@ DISPLACEMENT, TRACTION = 0, 1
 
 
 def build_constraints(
-    mesh: Mesh, outer: OuterNodes, gap: Real, law: Linearisation, load: Load, traction_scale: float
+    mesh: Mesh, outer: OuterNodes, gap: Real, law: Linearisation, load: Load, traction_scale: float,
+    gone: Integer | None = None,
 ) -> ConstraintMap:
     """The map for the given linearised laws of the pairs and the given load; gap (m,): initial openings.
 
-    (theory, 44)
+    gone (k,): nodes on interfaces and cracks of regions that are gone. (theory, 44, 92)
     """
     entries = _Entries(mesh.nodes)
     offset = np.zeros((2, mesh.nodes), dtype=complex)
     _constrain_outer_nodes(entries, offset, outer, load, traction_scale)
-    _constrain_pairs(entries, offset, mesh, gap, law)
+    _constrain_pairs(entries, offset, mesh, gap, law, load.carried)
     constant = np.stack([offset.real, offset.imag], axis=2).ravel()
     for rigid in outer.rigid:
         own = constrain_rigid_nodes(rigid, mesh.nodes, load.rigid[rigid.number], traction_scale)
         entries.add_entries(own.rows, own.columns, own.values)
         constant[own.offset_rows] += own.offset
-    return ConstraintMap(entries.build(), constant)
+    matrix = entries.build()
+    if gone is not None and len(gone):
+        matrix, constant = _hold_still(matrix, constant, gone, traction_scale)
+    return ConstraintMap(matrix, constant)
+
+
+def _hold_still(
+    matrix: sparse.csr_matrix, constant: Real, gone: Integer, traction_scale: float
+) -> tuple[sparse.csr_matrix, Real]:
+    """The map in which these nodes do not move and their tractions are their own unknowns, and nothing else depends on
+    these: of a region that is gone, a state that is zero and disturbs no other (theory, 92)."""
+    nodes = len(constant) // 4
+    own = number_components(gone)
+    rows, columns = np.ones(4 * nodes), np.ones(2 * nodes)
+    rows[own], rows[2 * nodes + own], columns[own] = 0.0, 0.0, 0.0
+    still = sparse.csr_matrix((np.full(len(own), traction_scale), (2 * nodes + own, own)), shape=matrix.shape)
+    left = (sparse.diags(rows) @ matrix @ sparse.diags(columns) + still).tocsr()
+    left.eliminate_zeros()
+    return left, rows * constant
 
 
 def _constrain_outer_nodes(
@@ -106,18 +126,22 @@ def _constrain_outer_nodes(
             offset[field, outer.node[taken]] += load.values[taken, k] * direction[taken]
 
 
-def _constrain_pairs(entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation) -> None:
+def _constrain_pairs(
+    entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation, carried: Real
+) -> None:
     """The slave node follows the other side but for the jump; the other side carries the opposite of its traction.
 
-    The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge.
-    (theory, 47, 65)
+    The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge. carried (m, 2): what
+    opened faces still carry besides their law.
+    (theory, 47, 65, 91)
     """
     pairs, links = mesh.pairs, mesh.links
     n, s = pairs.normal, 1j * pairs.normal
     givers = links.traction_pair
     led = law.leader
     constant_jump = pairs.sense * ((law.offset[led, G_N] - gap[led]) * n + law.offset[led, G_S] * s)
-    constant_traction = -pairs.sense * (law.offset[:, P_N] * n + law.offset[:, P_S] * s)
+    borne_n, borne_s = law.offset[:, P_N] + carried[:, 0], law.offset[:, P_S] + carried[:, 1]
+    constant_traction = -pairs.sense * (borne_n * n + borne_s * s)
     for k in range(2):
         unknown = 2 * pairs.slave + k
         jump = pairs.sense * (law.tangent[led, G_N, k] * n + law.tangent[led, G_S, k] * s)

@@ -7,7 +7,7 @@ adds an elastic jump, compliance times traction, in front of its law; what is le
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,7 @@ class PairLaws:
     tensile strength for good. fluid_inside: the fluid pressure also acts in closed parts. compliance_n, compliance_s:
     length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length.
     leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
+    rest: the opening of pairs that stick and carry nothing, 0 but where a stage has closed faces that were apart.
     """
 
     strengths: tuple[StrengthGroup, ...]
@@ -57,6 +58,11 @@ class PairLaws:
     compliance_s: Real
     stiffness: Real
     leader: Integer
+    rest: Real = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if not len(self.rest):
+            object.__setattr__(self, "rest", np.zeros(len(self.gap)))
 
     @property
     def count(self) -> int:
@@ -88,6 +94,10 @@ class PairState:
     p_s: Real
     g_n: Real
     g_s: Real
+
+    def bear(self, carried: Real) -> PairState:
+        """With tractions (m, 2) along n and s besides those of the laws."""
+        return replace(self, p_n=self.p_n + carried[:, 0], p_s=self.p_s + carried[:, 1])
 
 
 @dataclass(frozen=True)

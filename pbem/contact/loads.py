@@ -50,6 +50,7 @@ class Load:
     of_points (nodes,): the displacement of point loads' fields, a part of the background. net_force: of those on an
     infinite region, that of their fields far away (complex).
     rigid (b, 3): of all rigid bodies the forces or motions.
+    carried (m, 2): traction, along n and s, that faces which a stage opens still carry in it.
     """
 
     values: Real
@@ -59,6 +60,7 @@ class Load:
     background: Complex
     of_points: Complex
     rigid: Real
+    carried: Real
     net_force: complex = 0j
 
 
@@ -133,6 +135,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         of_points=_sample(mesh, [each.of_points for each in backgrounds])[0],
         net_force=sum((each.net_force for each in points), 0j),
         rigid=rigid,
+        carried=np.zeros((mesh.pairs.count, 2)),
     )
 
 

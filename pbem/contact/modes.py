@@ -76,7 +76,7 @@ def linearise(
     tangent[closed, G_N, 0] = (laws.compliance_n * traction_scale)[closed]
     tangent[stick, P_S, 1] = traction_scale
     tangent[stick, G_S, 1] = (laws.compliance_s * traction_scale)[stick]
-    offset[stick, G_S] = memory.slip[stick]
+    offset[stick, G_S], offset[stick, G_N] = memory.slip[stick], laws.rest[stick]
     # Rounding must not put a pair without cohesion beyond the apex of its cone, where friction has no slope.
     admissible = np.minimum(p_n, tensile_limit(laws, memory) - pressure)
     strength = evaluate_strength(laws, admissible, memory.look_ahead(slip_ahead(modes, memory, slip)), pressure)

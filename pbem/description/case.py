@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
-from pbem.description.families import find_families, spread_conditions, spread_laws, spread_stage
+from pbem.description.families import find_families, list_named, spread_conditions, spread_laws, spread_stage
 from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
@@ -105,7 +105,8 @@ class Case:
         if expansion is not None:
             values |= {field.name: getattr(expansion, field.name) for field in fields(Expansion)}
         named = [*values["interfaces"], *values["boundary"]]
-        named += [name for stage in values["stages"] for name in (*stage.interfaces, *stage.boundary)]
+        named += [name for stage in values["stages"]
+                  for name in (*stage.interfaces, *stage.boundary, *list_named(stage))]
         families = find_families(named, values["curves"])
         if families:
             values["boundary"] = spread_conditions(values["boundary"], families)

@@ -40,11 +40,28 @@ def spread_conditions(
     return {**spread, **{name: table for name, table in conditions.items() if name not in families}}
 
 
+# What a stage says of interfaces by lists of names.
+NAMED = ("open", "close", "release")
+
+
+def list_named(stage: StageTable) -> list[str]:
+    """Names of interfaces in the lists of a stage."""
+    return [name for key in NAMED for name in getattr(stage, key)]
+
+
+def spread_named(stage: StageTable, families: Mapping[str, Sequence[str]]) -> dict[str, tuple[str, ...]]:
+    """The lists of a stage, with the members of families in the place of these."""
+    return {
+        key: tuple(each for name in getattr(stage, key) for each in families.get(name, (name,))) for key in NAMED
+    }
+
+
 def spread_stage(stage: StageTable, families: Mapping[str, Sequence[str]]) -> StageTable:
     """The stage with what it says of families said of their members, and what it says of a single one instead."""
-    if not families.keys() & {*stage.interfaces, *stage.boundary}:
+    if not families.keys() & {*stage.interfaces, *stage.boundary, *list_named(stage)}:
         return stage
     return stage.model_copy(update={
+        **spread_named(stage, families),
         "interfaces": spread_conditions(stage.interfaces, families),
         "boundary": spread_conditions(stage.boundary, families),
     })

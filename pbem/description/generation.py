@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pbem.description.effects import combine_laws
+from pbem.description.families import list_named, spread_named
 from pbem.description.finding import Finding
 from pbem.description.placement import Area, Body, make_ground, place_bodies
 from pbem.description.schema import CaseFile, CurveTable, GenerateTable, LawTable, RegionTable, StageTable
@@ -159,6 +160,9 @@ def _add_to_regions(regions: dict[str, RegionTable], table: GenerateTable, names
 
 def _spread_groups(stage: StageTable, groups: tuple[GeneratedGroup, ...]) -> StageTable:
     """What a stage says of the name of a table it says of all that the table made, and that of a single one instead."""
+    members = {group.name: group.members for group in groups}
+    if members.keys() & set(list_named(stage)):
+        stage = stage.model_copy(update=spread_named(stage, members))
     told = {group.name: group for group in groups if group.name in stage.interfaces}
     if not told:
         return stage

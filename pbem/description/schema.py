@@ -194,6 +194,10 @@ class ContactTable(LawTable):
     initial gap follows from the geometry. All keys of `[interfaces.CURVE]` are accepted as well."""
 
     between: tuple[Text, Text] = Field(description="the two curves, in any order; results lie on the first one")
+    overlap: NotNegative = Field(
+        0.0, description="length by which the bodies may lie in each other as they are drawn, at most, as for a press "
+        "fit; the first step drives them apart",
+    )
 
 
 class GenerateTable(LawTable):
@@ -352,6 +356,21 @@ class StageTable(Table):
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
     point_loads: Mapping[str, PointForceTable] = Field({}, description="`fx`, `fy`, `moment` at the end of the stage")
     point_supports: Mapping[str, PointShiftTable] = Field({}, description="`ux`, `uy` at the end of the stage")
+    remove: tuple[Text, ...] = Field(
+        (), description="regions that are taken away; what they carried on their interfaces is released in proportion "
+        "over the steps of the stage",
+    )
+    open: tuple[Text, ...] = Field(
+        (), description="interfaces, cracks and contacts that never touch from this stage on; what they carried is "
+        "released in proportion over its steps",
+    )
+    close: tuple[Text, ...] = Field(
+        (), description="interfaces, cracks and contacts that are bonded from this stage on, as they lie at its "
+        "beginning",
+    )
+    release: tuple[Text, ...] = Field(
+        (), description="of what stages before have closed or opened: from this stage on it follows its law"
+    )
 
 
 class SolverTable(Table):

@@ -53,10 +53,13 @@ class Coupling:
     shared: Real
 
 
-def couple_curves(slave: Elements, master: Elements, local: Real, others: Elements) -> Coupling:
+def couple_curves(
+    slave: Elements, master: Elements, local: Real, others: Elements, overlap: float = 0.0
+) -> Coupling:
     """Integrate products of shapes over the parts of the slave whose normals meet the master (theory, 64).
 
     others: elements that hide the master where they stand in between; the slave's and the master's may be among them.
+    overlap: how far behind the slave the master may lie (length).
     """
     shapes = interpolate_shapes(local)
     count = len(local)
@@ -70,7 +73,8 @@ def couple_curves(slave: Elements, master: Elements, local: Real, others: Elemen
         single = slave.select(np.array([element]))
         s, weight = _divide_element(single, master)
         x, n = single.place(s)[0], single.normals(s)[0]
-        seen = project_nodes(x, n, master, OVERLAP * np.minimum(length, own_length[element]))
+        behind = np.maximum(OVERLAP * np.minimum(length, own_length[element]), overlap)
+        seen = project_nodes(x, n, master, behind)
         hit = seen.element >= 0
         away = np.flatnonzero(hit & (seen.distance > CLEAR * own_length[element]))
         if len(away):

@@ -14,6 +14,7 @@ from pbem.mesh.mortar import LEAST_COVER, OVERLAP, Coupling, couple_curves, meas
 from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
 from pbem.model.rigid_body_modes import ROUNDINGS
+from pbem.model.sight import REACH
 
 Columns = dict[str, np.ndarray]
 
@@ -53,14 +54,15 @@ def pair_contact(
     """
     both = sorted((chains[joint.first], chains[joint.second]), key=lambda chain: order.index(chain.curve))
     others = Elements.join([chain.elements for chain in chains.values()])
-    slave, master, seen = _choose_slave(both[0], both[1], others)
+    behind = REACH * joint.overlap
+    slave, master, seen = _choose_slave(both[0], both[1], others, behind)
     met = seen.cover > LEAST_COVER
     own_weight, other_weight = (weigh_nodes(chain.elements, chain.local).ravel() for chain in (slave, master))
     used = met[seen.slave]
     own, other, product = seen.slave[used], seen.master[used], seen.product[used]
 
     nodes = np.flatnonzero(met)
-    made = _place_on_first(slave, master, nodes, slave.curve == joint.first)
+    made = _place_on_first(slave, master, nodes, slave.curve == joint.first, behind)
     sort = np.argsort(made["arc_length"], kind="stable")
     made, nodes = {name: values[sort] for name, values in made.items()}, nodes[sort]
     pair_of_node = np.full(len(met), -1)
@@ -87,7 +89,9 @@ def pair_contact(
         "second": slave_node if follows else nearest,
         "slave": slave_node,
         "sense": np.full(len(nodes), 1.0 if follows else -1.0),
-        "distance": np.where(distance > _rounding(slave.elements, master.elements), distance, 0.0),
+        "distance": np.where(
+            (distance if behind == 0 else np.abs(distance)) > _rounding(slave.elements, master.elements), distance, 0.0
+        ),
     }
     return made, links
 
@@ -102,18 +106,18 @@ def describe_sparse_meshes(contacts: Sequence[tuple[str, Integer]], order: int) 
     )
 
 
-def _choose_slave(one: Chain, other: Chain, others: Elements) -> tuple[Chain, Chain, Coupling]:
+def _choose_slave(one: Chain, other: Chain, others: Elements, behind: float) -> tuple[Chain, Chain, Coupling]:
     """Slave, master and what couples them: the slave is the one that is nowhere much finer than the other, unless its
     elements are so long that they lose much of the length over which the two face each other."""
     if one.rigid or other.rigid:  # a tool has no tractions of its own
         slave, master = (other, one) if one.rigid else (one, other)
-        return slave, master, couple_curves(slave.elements, master.elements, slave.local, others)
-    seen = couple_curves(one.elements, other.elements, one.local, others)
+        return slave, master, couple_curves(slave.elements, master.elements, slave.local, others, behind)
+    seen = couple_curves(one.elements, other.elements, one.local, others, behind)
     worse, better = measure_contrast(seen, one.elements, other.elements)
     chosen = (one, other, seen)
     if worse <= better * (1 + EQUAL) and 0 < seen.shared.sum() <= _carried(chosen) / MOST_CARRIED:
         return chosen
-    exchanged = (other, one, couple_curves(other.elements, one.elements, other.local, others))
+    exchanged = (other, one, couple_curves(other.elements, one.elements, other.local, others, behind))
     coarser, finer = (chosen, exchanged) if worse <= better * (1 + EQUAL) else (exchanged, chosen)
     return finer if _carried(coarser) < MOST_CARRIED * _carried(finer) else coarser
 
@@ -125,7 +129,7 @@ def _carried(chosen: tuple[Chain, Chain, Coupling]) -> float:
     return float((weight * seen.cover)[seen.cover > LEAST_COVER].sum())
 
 
-def _place_on_first(slave: Chain, master: Chain, nodes: Integer, slave_first: bool) -> Columns:
+def _place_on_first(slave: Chain, master: Chain, nodes: Integer, slave_first: bool, behind: float) -> Columns:
     """Geometry of the pairs of some nodes of the slave: there, or where their normals meet the master."""
     placed = place_pairs(slave)
     chain_order = np.argsort(placed.pop("first"), kind="stable")
@@ -134,7 +138,7 @@ def _place_on_first(slave: Chain, master: Chain, nodes: Integer, slave_first: bo
         return made
     elements = master.elements
     lengths = np.repeat(slave.elements.lengths, slave.order + 1)[nodes]
-    overlap = OVERLAP * np.minimum(elements.lengths, lengths.min(initial=np.inf))
+    overlap = np.maximum(OVERLAP * np.minimum(elements.lengths, lengths.min(initial=np.inf)), behind)
     seen = project_nodes(made["position"], made["normal"], elements, overlap)
     hit = seen.element >= 0
     # A node at the end of the master may face it with most of its weight, and just pass it with its own normal.

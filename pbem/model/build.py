@@ -15,6 +15,7 @@ from pbem.geometry.junction import find_crossings, format_point, split_at_juncti
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.approach import find_closing
 from pbem.model.coincidence import find_coincidences
+from pbem.model.construction import arrange_model, group_stages
 from pbem.model.crack import (
     check_inside,
     check_near_misses,
@@ -40,7 +41,12 @@ from pbem.model.point_loads import PointLoads, place_point_loads, split_at_point
 from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.resultants import describe_unbalance, find_unbalanced_force
 from pbem.model.rigid_body import find_tractions
-from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
+from pbem.model.rigid_body_modes import (
+    RigidBodyMode,
+    find_least_stiffness,
+    find_plane_translations,
+    find_rigid_body_modes,
+)
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
@@ -65,6 +71,7 @@ class _Topology:
     supports: Mapping[str, PointSupport]
     notes: tuple[str, ...]
     faults: tuple[Fault, ...]
+    overlaps: Mapping[str, float]
 
 
 def build_model(case: Case) -> Model:
@@ -147,10 +154,12 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     infinite = {name for name, table in case.regions.items() if table.infinite}
     loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
     faults = [*shapes.faults, *crossings, *wrong]
+    overlaps: dict[str, float] = {}
     notes = [*cut.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
-        faults += check_contacts(case, curves, loops, roles, shapes.tolerance)
+        overlaps, wrong = check_contacts(case, curves, loops, roles, shapes.tolerance)
+        faults += wrong
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
         loops = {**loops, **orient_tools(case, curves, loops, roles)}
@@ -172,7 +181,8 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults))
+    return _Topology(
+        curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults), overlaps)
 
 
 def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
@@ -193,7 +203,9 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         for name, condition in loading.conditions.items()
     }
     behaviour |= {
-        name: (interface.first, interface.second, interface.law) for name, interface in loading.interfaces.items()
+        name: (interface.first, interface.second, interface.law,
+               tuple(stage.construction.joints.get(name) for stage in loading.stages))
+        for name, interface in loading.interfaces.items()
     }
     behaviour |= {curve: ("contact", name) for curve, name in roles.in_contact.items()}
     with_tips = frozenset(roles.cracks) if case.analysis.tips else frozenset()
@@ -230,7 +242,8 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         notes=(*topology.notes, *grading, *fitted.notes, *_note_choices(case)),
         initial_stress=loading.initial_stress,
         rest_gravity=loading.rest_gravity,
-        contacts=loading.contacts,
+        contacts={name: replace(each, overlap=topology.overlaps.get(name, 0.0))
+                  for name, each in loading.contacts.items()},
         rigid=loading.rigid.bodies,
         groups=case.groups,
         ties=fitted.ties,
@@ -273,6 +286,7 @@ def _note_loads(model: Model) -> list[str]:
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
     loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]
+    loads += [contact.overlap for contact in model.contacts.values() if contact.law.kind != "open"]
     return [] if any(loads) else [
         "No load: all prescribed displacements and tractions, pressures, stresses far away, weights, in-situ stresses, "
         "swellings, point loads and interferences are zero, and so will be the results."
@@ -294,24 +308,48 @@ def _leave_out_point_loads(model: Model) -> Model:
     ))
 
 
-def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
-    """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
+def _check_hold(
+    model: Model, now: Model, stages: Sequence[int], motions: Sequence[RigidBodyMode], later: bool
+) -> tuple[list[Fault], list[str]]:
+    """Of stages with the same construction: faults for bodies that nothing holds, and motions whose loads balance.
+
+    now: the model as it is there, with free motions. later: these are not the first stages.
+    """
     faults, balanced = [], []
     regions = {region.name: region for region in model.regions}
-    motions = find_rigid_body_modes(model)
     for motion in motions:
         found = f"a free rigid motion ({motion.text})"
-        unbalance = describe_unbalance(model, motion, [regions[name] for name in motion.regions])
+        unbalance = describe_unbalance(now, motion, [regions[name] for name in motion.regions], stages)
         if unbalance is None:
             balanced.append(motion.text)
             continue
         soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
+        if later:
+            found = f"from stage '{model.stages[stages[0]].name}' on {found}"
         free = motion.regions[0]
         loc: KeyPath = ("tools" if regions[free].rigid else "regions", free)
         faults.append(Fault.at(loc, f"{found}: {unbalance}", expected))
-    faults += check_independent(list(model.point_supports.values()), motions)
+    return faults, balanced
+
+
+def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
+    """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
+    faults: list[Fault] = []
+    balanced: list[str] = []
+    free: dict[str, RigidBodyMode] = {}
+    for stages in group_stages(model):
+        number = stages[0]
+        now = arrange_model(model, number)
+        motions = find_rigid_body_modes(now)
+        wrong, resting = _check_hold(model, now, stages, motions, faults == [] and number > 0)
+        faults += wrong
+        balanced += resting
+        free |= {motion.text: motion for motion in motions}
+    faults += check_independent(list(model.point_supports.values()), list(free.values()))
+    balanced = [*dict.fromkeys(balanced)]
+    regions = {region.name: region for region in model.regions}
     notes = []
     if model.closing:
         names = list_names([f"'{name}'" for name in sorted(model.closing)])

@@ -174,6 +174,8 @@ def _check_effect(case: Case, loc: KeyPath, table: LawTable, kind: Kind) -> Iter
         expected = f'law = "coulomb" with it, or no such key: it has no effect with {chosen}'
         for number, stage in enumerate(case.stages):
             pressures = stage.interfaces if loc[0] == "interfaces" else stage.contacts
+            if any(loc[-1] in each.open for each in case.stages[: number + 1]):
+                continue
             if loc[-1] in pressures and pressures[str(loc[-1])].pressure:
                 place = ("stages", number, loc[0], loc[-1])
                 yield Fault.at(place, f"a pressure in '{loc[-1]}'", expected)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,6 +11,7 @@ from pbem.description.effects import TIMED
 from pbem.description.schema import LawTable, StageConditionTable, StageInterfaceTable
 from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
+from pbem.model.construction import list_bared, list_removed, read_construction
 from pbem.model.given import read_value
 from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
@@ -92,12 +93,14 @@ def read_loading(case: Case, roles: Roles) -> Loading:
     faults += wrong
     support_values, wrong = read_support_values(case)
     faults += wrong
+    construction, wrong = read_construction(case, roles, joints)
+    faults += wrong
     stages = tuple(
         replace(stage, swelling=swelling, point_forces=forces, support_values=shifts, remote_growth=growth,
-                rigid={name: values[name] for name in rigid.bodies})
-        for stage, swelling, forces, shifts, growth, values in zip(
-            _find_stages(case, conditions, [*interfaces, *contacts], backgrounds), swellings.stages, point_forces,
-            support_values, backgrounds.remote, rigid.stages, strict=True,
+                rigid={name: values[name] for name in rigid.bodies}, construction=there)
+        for stage, swelling, forces, shifts, growth, values, there in zip(
+            _find_stages(case, conditions, joints, backgrounds), swellings.stages, point_forces,
+            support_values, backgrounds.remote, rigid.stages, construction, strict=True,
         )
     )
     faults += _check_durations(case, joints, stages)
@@ -152,7 +155,12 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
     for prefix, names in places:
         for name in names:
             loc = (*prefix, "boundary", name)
-            if name in two_sided:
+            if name in two_sided and prefix and name in list_bared(roles, list_removed(case, int(prefix[1]))):
+                table = case.stages[int(prefix[1])].boundary[name]
+                if {key for key in table.model_fields_set if getattr(table, key) is not None} != {"pressure"}:
+                    found = f"conditions on '{name}', where a region is gone"
+                    faults.append(Fault.at(loc, found, "pressure = ... and nothing else"))
+            elif name in two_sided:
                 kind = "an interface" if name in roles.shared else "a crack"
                 expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
                 faults.append(Fault.at(loc, f"conditions on '{name}', {kind}", expected))
@@ -257,7 +265,7 @@ def _is_late(case: Case, curve: str, order: int) -> bool:
 
 
 def _find_stages(
-    case: Case, conditions: Mapping[str, Condition], joints: list[str], backgrounds: Backgrounds
+    case: Case, conditions: Mapping[str, Condition], joints: Collection[str], backgrounds: Backgrounds
 ) -> tuple[Stage, ...]:
     """joints: names of the interfaces, cracks and contacts."""
     values: dict[str, list[Value]] = {name: [0.0, 0.0] for name in conditions}
@@ -278,10 +286,11 @@ def _find_stages(
         for name in conditions:
             _update(values[name], stage.boundary.get(name))
             _move_ends(ends, name, stage.boundary.get(name))
-        changes = {**stage.contacts, **stage.interfaces}
+        bared = {name: table for name, table in stage.boundary.items() if name in joints}
+        changes: dict[str, StageInterfaceTable | StageConditionTable] = {**stage.contacts, **stage.interfaces, **bared}
         for name in joints:
             if name in changes:
-                pressure[name] = _read(changes[name].pressure)
+                pressure[name] = _read(changes[name].pressure or 0.0)
         name = stage.name or f"stage {number + 1}"
         duration = stage.duration or 0.0
         stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number], duration=duration,

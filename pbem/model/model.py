@@ -22,6 +22,8 @@ from pbem.model.varying import Value, Varying
 # Of a tool, for points that no number of turns is inside for.
 NO_INSIDE = -(10**6)
 Quantity = Literal["displacement", "traction"]
+# How faces are held that do not follow their law.
+Hold = Literal["closed", "open"]
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class Region:
     """loops: the outer one (absent if infinite) and the inner ones; cracks: names of curves inside, two faces each.
 
     A rigid tool is the rigid body of the same name; its loops are its curves, open or closed, each by itself.
+    removed: gone, in a model as it is in a stage (see pbem.model.construction).
     """
 
     name: str
@@ -36,6 +39,7 @@ class Region:
     loops: tuple[Loop, ...]
     cracks: tuple[str, ...] = ()
     infinite: bool = False
+    removed: bool = False
 
     @property
     def rigid(self) -> bool:
@@ -93,13 +97,15 @@ class Contact:
     """Two different outer curves that may touch; their meshes need not match, the gap follows from the geometry.
 
     first, second: names of the curves; the pairs lie on the first, which gives their normal. Neither has a
-    Condition: where they do not touch they are free of traction.
+    Condition: where they do not touch they are free of traction. overlap: how deep the bodies lie in each other as they
+    are drawn, at most (length); 0 where they do not.
     """
 
     name: str
     first: str
     second: str
     law: Law
+    overlap: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -125,6 +131,19 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class Construction:
+    """What there is in a stage.
+
+    joints: of interfaces, cracks and contacts that do not follow their law: "closed" faces are bonded where they lie,
+    "open" ones never touch, as are those whose region is gone. removed: regions that are gone, in the order of the
+    file.
+    """
+
+    joints: Mapping[str, Hold] = field(default_factory=dict)
+    removed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Stage:
     """A part of the load history: the values at its end, linear from those at the end of the stage before (0 at first);
     what depends on time by itself has its own value at every time.
@@ -136,6 +155,7 @@ class Stage:
     point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
     point support. ends: of the curves whose springs' far ends move: by how much, along the normal and the curve.
     rigid: of every rigid body its three forces or motions, rotations in degrees.
+    construction: which faces are held otherwise than by their law, and which regions are gone.
     """
 
     name: str
@@ -151,6 +171,7 @@ class Stage:
     ends: Mapping[str, tuple[Value, Value]] = field(default_factory=dict)
     remote_growth: LinearStress = AT_REST
     rigid: Mapping[str, Values] = field(default_factory=dict)
+    construction: Construction = field(default_factory=Construction)
 
 
 def list_timed(stage: Stage) -> list[Varying]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -126,21 +127,38 @@ def _overlap(
 
 def check_contacts(
     case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: Tolerance
-) -> list[Fault]:
-    """A fault for every contact one of whose curves begins inside the other's region, with the deepest place found."""
-    faults = []
+) -> tuple[dict[str, float], list[Fault]]:
+    """By name the overlap that is allowed of contacts whose bodies lie in each other as they are drawn; a fault for
+    every one in which they do by more, with the deepest place found."""
+    faults, overlaps = [], {}
     for name, (first, second) in roles.contacts.items():
         for curve, other in ((first, second), (second, first)):
             region = roles.outer[other]
             if region not in loops or region == roles.outer[curve] or curve not in curves:
                 continue
             depth, point = _find_deepest(curves[curve], _make_body(case, curves, region, loops[region]))
-            if depth > tolerance.of(curve):
+            allowed = case.contacts[name].overlap
+            if depth > max(tolerance.of(curve), allowed * (1 + ROUNDED)):
                 found = f"curve '{curve}' inside region '{region}', {depth:.3g} deep at {format_point(point)}"
-                expected = "bodies that at most touch before they are loaded"
+                expected = ("bodies that at most touch before they are loaded; or, for a press fit, "
+                            f"overlap = {_round_up(depth):g} in [contacts.{name}], the depth that is meant, at most")
+                if allowed:
+                    expected = f"at most overlap = {allowed:g} deep, as [contacts.{name}] says, or a larger overlap"
                 faults.append(Fault.at(("contacts", name), found, expected))
                 break
-    return faults
+            if depth > tolerance.of(curve):
+                overlaps[name] = allowed
+    return overlaps, faults
+
+
+# Depths are known to this part of them.
+ROUNDED = 1e-6
+
+
+def _round_up(depth: float) -> float:
+    """The next number of two digits."""
+    unit = 10.0 ** (math.floor(math.log10(depth)) - 1)
+    return math.ceil(depth * (1 - ROUNDED) / unit) * unit
 
 
 def _find_deepest(curve: Curve, body: _Body) -> tuple[float, complex]:

@@ -27,12 +27,15 @@ FRACTIONS = (0.1, 0.35, 0.6, 0.85, 1.0)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
-def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Region]) -> str | None:
+def describe_unbalance(
+    model: Model, motion: RigidBodyMode, moving: Sequence[Region], stages: Sequence[int] | None = None
+) -> str | None:
     """What drives a free motion: the first stage whose loads do work on it, with their resultant; None if none.
 
-    moving: the motion's regions.
+    moving: the motion's regions. stages: numbers of the stages that are looked at, all by default.
     """
-    for number, stage in enumerate(model.stages):
+    for number in range(len(model.stages)) if stages is None else stages:
+        stage = model.stages[number]
         fractions = FRACTIONS if list_timed(stage) else (1.0,)
         least = BALANCED_EXPRESSION if _has_expressions(stage) else BALANCED
         for fraction in fractions:

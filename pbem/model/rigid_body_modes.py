@@ -126,7 +126,7 @@ def _constrain(motions: Complex, directions: list[Complex]) -> Real:
 def _link_to_ground(model: Model, center: complex, scale: float, plane_held: bool) -> Iterator[Link]:
     rigid = {name for body in model.rigid.values() for name in body.curves}
     for number, region in enumerate(model.regions):
-        if region.infinite and plane_held:  # by what is far away
+        if (region.infinite and plane_held) or region.removed:  # by what is far away; what is gone has no motion
             yield number, GROUND, np.eye(3)
         for side in (side for loop in region.loops for side in loop.sides):
             condition = model.conditions.get(side.curve)
@@ -214,6 +214,8 @@ def _touches(model: Model, joint: Interface | Contact) -> bool:
         return True
     if isinstance(joint, Interface) and not isinstance(joint.law.gap, Varying):
         return joint.law.gap <= 0
+    if isinstance(joint, Contact) and joint.overlap > 0:
+        return True
     names = [joint.name] if isinstance(joint, Interface) else [joint.first, joint.second]
     shorter = min(model.curves[name].length for name in names)
     largest = max(abs(point) for name in names for leg in model.curves[name].legs for point in (leg.start, leg.end))

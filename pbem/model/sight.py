@@ -25,6 +25,8 @@ OPPOSITE = -0.5
 NARROW = 0.25
 # Faces that touch may lie in one another by this part of the shorter curve (rounding, chords of curved sides).
 OVERLAP = 1e-3
+# Normals of bodies that lie in each other meet the other face farther behind than these are deep, by this factor.
+REACH = 2.0
 # A leg is not split nearer to its ends than this part of its mean element, nor for faces farther away than that.
 LEAST_PIECE = 0.25
 
@@ -109,7 +111,7 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
         facing = Surroundings(side_legs(model.curves, sides[other]))
         for leg in side_legs(model.curves, sides[curve]):
             points = inner_points(leg, max(SAMPLES, 4 * leg.elements))
-            seen = facing.look_along(points, leg.normals(points), -OVERLAP * shorter)
+            seen = facing.look_along(points, leg.normals(points), -max(OVERLAP * shorter, REACH * contact.overlap))
             if ((seen.leg >= 0) & (seen.product < 0)).any():
                 return True
     return False

@@ -33,7 +33,8 @@ def draw_body(
     none = np.zeros_like(results.nodes.position)
     displacement = none if step is None else results.displacement_at(step)
     outlines = trace_outlines(results.nodes, results.elements, displacement)
-    _fill_regions(axes, choose_shades(results.nodes.region_names, results.groups), outlines, magnify)
+    gone = np.zeros(len(results.nodes.region_names), dtype=bool) if step is None else results.find_gone(step)
+    _fill_regions(axes, choose_shades(results.nodes.region_names, results.groups), outlines, magnify, gone)
     axes.add_collection(LineCollection([each.position for each in outlines], colors="0.7", linewidths=0.6, zorder=1))
     lines = [each.position + magnify * each.displacement for each in outlines]
     axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.8, zorder=3))
@@ -70,15 +71,19 @@ def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: 
             )
 
 
-def _fill_regions(axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float) -> None:
-    """Shade the regions; the holes stay free since inner loops run the other way round. Cavities of infinite regions
-    are left white in a shaded plane."""
+def _fill_regions(
+    axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float, gone: Bool
+) -> None:
+    """Shade the regions but those that are gone; the holes stay free since inner loops run the other way round.
+    Cavities of infinite regions are left white in a shaded plane."""
     loops: list[list[Real]] = [[] for _ in shade]
     for each in outlines:
         if not each.crack:
             loops[each.region].append(each.position + magnify * each.displacement)
     bodies, shades, cavities = [], [], []
     for region, shapes in enumerate(loops):
+        if gone[region]:
+            continue
         if any(_area(shape) > 0 for shape in shapes):
             bodies.append(OutlinePath.make_compound_path(*(OutlinePath(shape, closed=True) for shape in shapes)))
             shades.append(shade[region])
@@ -103,7 +108,7 @@ def _displace_pairs(results: Results, displacement: Real, magnify: float) -> Rea
     size = float(np.ptp(results.nodes.position, axis=0).max())
     tree = cKDTree(np.hstack([results.nodes.position, size * results.nodes.normal]))
     _, nodes = tree.query(np.hstack([pairs.position, size * pairs.normal]))
-    return np.asarray(results.nodes.position[nodes] + magnify * displacement[nodes])
+    return np.asarray(results.nodes.position[nodes] + magnify * np.nan_to_num(displacement[nodes]))
 
 
 def _mark_modes(axes: Axes, results: Results, step: int, places: Real, box: Box) -> list[Line2D]:

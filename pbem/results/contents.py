@@ -77,13 +77,16 @@ class Energies:
     """Over the k stored steps (k,), per unit of thickness (stress times length squared), since before any load.
 
     external: work of loads and conditions; elastic: stored; dissipated: by friction and by bonds that were lost;
-    released: set free where faces ran away within a step. external = elastic + dissipated + released.
+    released: set free where faces ran away within a step; removed: taken out where stages open faces or take regions
+    away.
+    external = elastic + dissipated + released + removed.
     """
 
     external: Real
     elastic: Real
     dissipated: Real
     released: Real
+    removed: Real
 
 
 @dataclass(frozen=True)

@@ -132,8 +132,9 @@ def _contact_rows(results: Results) -> list[list[str]]:
     mode, opening, slip = (pairs.at(quantity, -1) for quantity in ("mode", "opening", "slip"))
     counts = [np.bincount(row[mode == which], minlength=len(titles)) for which in (STICK, SLIP, OPEN)]
     largest = [np.full(len(titles), -np.inf) for _ in range(2)]
-    np.maximum.at(largest[0], row, opening)
-    np.maximum.at(largest[1], row, np.abs(slip))
+    for found, values in zip(largest, (opening, np.abs(slip)), strict=True):
+        np.fmax.at(found, row, values)
+        found[found == -np.inf] = np.nan  # beside regions that are gone
     numbers = zip(titles, np.bincount(row, minlength=len(titles)), *counts, *largest, strict=True)
     return [[title, *map(str, each[:4]), *map(_number, each[4:])] for title, *each in numbers]
 
@@ -157,10 +158,11 @@ def _describe_traces(results: Results, most: int) -> list[str]:
 
 def _describe_energy(results: Results) -> list[str]:
     """The balance, and what it lacks: a measure of the mesh."""
-    external, elastic, dissipated, released = (float(each[-1]) for each in vars(results.energy).values())
-    scale = max(abs(external), abs(elastic), dissipated, released)
-    lacks = (external - elastic - dissipated - released) / scale if scale else 0.0
+    external, elastic, dissipated, released, removed = (float(each[-1]) for each in vars(results.energy).values())
+    scale = max(abs(external), abs(elastic), dissipated, released, abs(removed))
+    lacks = (external - elastic - dissipated - released - removed) / scale if scale else 0.0
     free = f" + released {_number(released)}" if released else ""
+    free += f" + removed {_number(removed)}" if removed else ""
     return [f"external work {_number(external)} = elastic {_number(elastic)} + dissipated {_number(dissipated)}{free}, "
             f"to {abs(lacks):.1e} of the largest", *_shorten(_describe_runaways(results), 6)]
 

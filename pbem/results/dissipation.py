@@ -46,7 +46,8 @@ class PairWork:
     what the tractions, falling in proportion to the jumps, do beyond what is stored and dissipated (negative where a
     pair begins to slip within the step).
     friction (<= dissipated): what the laws take if bonds that are lost take nothing; surplus (m,): of each pair, what
-    its traction does beyond this and the joint. Where faces run away this is set free.
+    its traction does beyond this and the joint. Where faces run away this is set free. taken: what the tractions of
+    faces that a stage has opened do as it releases them.
     """
 
     stored: float
@@ -55,6 +56,7 @@ class PairWork:
     excess: float
     friction: float
     surplus: Real
+    taken: float
 
 
 def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairRecord:
@@ -81,8 +83,11 @@ def measure_stored(weight: Real, record: PairRecord) -> float:
     return float(weight @ _store(record))
 
 
-def measure_work(laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord) -> PairWork:
-    """The work in a step; weight (m,): length of the boundary that belongs to each pair (theory, 76)."""
+def measure_work(
+    laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord, opened: Bool | None = None
+) -> PairWork:
+    """The work in a step; weight (m,): length of the boundary that belongs to each pair; opened (m,): those that a
+    stage has opened (theory, 76, 93)."""
     moved, slid = new.g_n - old.g_n, new.g_s - old.g_s
     pressed = 0.5 * (old.p_n + old.pressure + new.p_n + new.pressure) * moved
     trapezoid = pressed + 0.5 * (old.p_s + new.p_s) * slid
@@ -99,13 +104,17 @@ def measure_work(laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord)
             by_law[group.pairs] = _integrate_bound(laws, group, old, new, slipped)
     dissipated = np.where(slides & ~lost, by_law, falling) + torn
     friction = np.where(slides, by_law, np.where(lost, 0.0, falling))
+    opened = np.zeros(laws.count, dtype=bool) if opened is None else opened
+    taken = np.where(opened, trapezoid - stored, 0.0)
+    dissipated, friction = (np.where(opened, 0.0, each) for each in (dissipated, friction))
     return PairWork(
         stored=float(weight @ stored),
         dissipated=float(weight @ dissipated),
         fluid=float(weight @ (0.5 * (old.pressure + new.pressure) * moved)),
-        excess=float(weight @ (trapezoid - stored - dissipated)),
+        excess=float(weight @ (trapezoid - stored - dissipated - taken)),
         friction=float(weight @ friction),
-        surplus=weight * (trapezoid - stored - friction),
+        surplus=weight * (trapezoid - stored - friction - taken),
+        taken=float(weight @ taken),
     )
 
 

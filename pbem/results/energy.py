@@ -32,6 +32,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
+from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load
 from pbem.mesh.interpolation import interpolate_tips, locate_nodes
@@ -69,13 +70,16 @@ class Energy:
     elastic: stored in the regions, in springs under outer curves and in the elastic joints of interfaces.
     dissipated: by friction and by bonds that parted; it never falls.
     released: set free where faces ran away within a step, as motion that the quasi-static balance does not follow.
-    external = elastic + dissipated + released, as exactly as the discrete fields obey Betti's theorem.
+    removed: taken out where a stage opens faces or takes regions away: what these had stored, and the work against the
+    tractions that are released.
+    external = elastic + dissipated + released + removed, as exactly as the discrete fields obey Betti's theorem.
     """
 
     external: float
     elastic: float
     dissipated: float
     released: float = 0.0
+    removed: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -153,11 +157,22 @@ class EnergyBalance:
         self._in_situ = self._sample_in_situ()
         self._reached = reached or Energy(0.0, 0.0, 0.0)
         self.runaway: Runaway | None = None
+        self._last = last
+        self._there: Arrangement | None = None
+        self._all_weight = self._weight
+        if last is not None:
+            self._arrange(last.stage)
         self._state = self._describe_rest() if last is None else self._describe(last)
 
     def add(self, step: Step) -> Energy:
         """The energies after the next step; `runaway` tells whether faces ran away in it (theory, 75)."""
-        old, new, before = self._state, self._describe(step), self._reached
+        old, before, lost = self._state, self._reached, 0.0
+        if step.stage != (0 if self._last is None else self._last.stage) or self._last is None:
+            held = self._add_stored(old)
+            self._arrange(step.stage)
+            old = self._describe_rest() if self._last is None else self._describe(self._last)
+            lost = held - self._add_stored(old)  # with the regions that are taken away
+        new, self._last = self._describe(step), step
         nodes = self._outer.node
         moved = (new.displacement - old.displacement)[nodes]
         work = _dot(self._weight[nodes], 0.5 * (old.traction + new.traction)[nodes], moved)
@@ -165,9 +180,11 @@ class EnergyBalance:
         work += float(0.5 * (old.load + new.load) @ (new.conjugate - old.conjugate))
         # What swells does work against the stress.
         work -= _dot(self._weight, 0.5 * (old.traction + new.traction), new.swollen - old.swollen)
-        pairs = measure_work(self.laws, self._pair_weight, old.pairs, new.pairs)
+        opened = None if self._there is None else self._there.opened
+        pairs = measure_work(self.laws, self._pair_weight, old.pairs, new.pairs, opened)
+        fluid, bared = self._measure_bared(old, new)
         # What springs take from the boundary they store, and what fluid does is work of its own.
-        work += new.springs - old.springs + pairs.fluid
+        work += new.springs - old.springs + pairs.fluid + fluid
         self._state = new
         self.runaway = self._find_runaway(old, new, moved, pairs, abs(before.elastic) + abs(work))
         dissipated, released = pairs.dissipated, 0.0
@@ -178,9 +195,10 @@ class EnergyBalance:
             work -= pairs.excess
         self._reached = Energy(
             external=before.external + work,
-            elastic=new.stored + new.springs + measure_stored(self._pair_weight, new.pairs),
+            elastic=self._add_stored(new),
             dissipated=before.dissipated + dissipated,
             released=before.released + released,
+            removed=before.removed + lost + pairs.taken + bared,
         )
         if self._model.grows_without_end:  # so would the energy
             return replace(self._reached, external=np.nan, elastic=np.nan)
@@ -213,7 +231,38 @@ class EnergyBalance:
     @property
     def _pair_weight(self) -> Real:
         pairs = self._mesh.pairs
-        return np.where(pairs.crack, self._weight[pairs.first], pairs.weight)
+        whole = np.where(pairs.crack, self._weight[pairs.first], pairs.weight)
+        return whole if self._there is None else np.where(self._there.bared, 0.0, whole)
+
+    def _add_stored(self, state: _State) -> float:
+        """All that is stored: in the regions, in springs and in elastic joints."""
+        return state.stored + state.springs + measure_stored(self._pair_weight, state.pairs)
+
+    def _arrange(self, stage: int) -> None:
+        """From now on sums are those of what is there in a stage."""
+        self._there = find_arrangement(self._model, self._mesh, self._outer, stage)
+        self._weight = self._all_weight
+        if self._there is not None:
+            self._weight = np.where(self._there.regions[self._faces.region], 0.0, self._all_weight)
+
+    def _measure_bared(self, old: _State, new: _State) -> tuple[float, float]:
+        """On faces whose other side is gone: work of the fluid, and what the tractions take that are released.
+
+        (theory, 93)
+        """
+        there, mesh = self._there, self._mesh
+        if there is None or not there.bared.any():
+            return 0.0, 0.0
+        pairs, links, count = mesh.pairs, mesh.links, mesh.nodes
+        pressure = np.where(there.bared, 0.5 * (old.pairs.pressure + new.pairs.pressure), 0.0)
+        pressed = np.zeros(count, dtype=complex)
+        pressed[pairs.slave] = pairs.sense * pressure * pairs.normal
+        given = links.traction_weight * pressed[pairs.slave[links.traction_pair]]
+        np.subtract.at(pressed, links.traction_node, given)
+        at = there.bare
+        moved = (new.displacement - old.displacement)[at]
+        fluid = _dot(self._weight[at], pressed[at], moved)
+        return fluid, fluid - _dot(self._weight[at], 0.5 * (old.traction + new.traction)[at], moved)
 
     def _describe_rest(self) -> _State:
         nothing = np.zeros(len(self._weight), dtype=complex)
@@ -246,6 +295,10 @@ class EnergyBalance:
         if self._model.point_loads:
             stored += 0.5 * float(point_forces @ moved)
         for reference in self._forces:
+            if self._there is not None and self._there.regions[self._faces.region[reference.faces[0]]]:
+                loads.append(np.zeros(2))
+                conjugates.append(np.zeros(2))
+                continue
             balanced, _ = backgrounds[self._faces.region[reference.faces[0]]]
             moved = reference.conjugate(self._weight, elastic, displacement, point_forces)
             moved += (np.conj(balanced.force) * reference.integral).real

@@ -67,11 +67,14 @@ class Evaluator:
         self._run: RebuiltRun = rebuild_run(str(path), nodes, elements, configuration)
         self._fine: Resampling = resample(self._run.mesh)
 
-    def evaluate(self, points: ArrayLike, steps: Sequence[int], tips: Complex, side: Side = "first") -> Evaluation:
+    def evaluate(
+        self, points: ArrayLike, steps: Sequence[int], tips: Complex, side: Side = "first", beside: bool = True
+    ) -> Evaluation:
         """The field at points (q, 2), after the steps stored at these places in the file.
 
         tips: places of crack tips, in the user's coordinates. side: of a crack or interface that a point lies on. On an
-        outer boundary the values are the limits from inside.
+        outer boundary the values are the limits from inside. beside: where a region is gone on the one side, those of
+        the other are given.
         """
         run, given = self._run, read_points(points)
         mesh, model = run.mesh, run.model
@@ -89,6 +92,14 @@ class Evaluator:
             displacement[k] = np.stack([values.displacement.real, values.displacement.imag], axis=1)
             stress[k] = values.stress
         displacement[:, where.region < 0], stress[:, where.region < 0] = np.nan, np.nan
+        for k, at in enumerate(steps):
+            gone = self._find_gone(at)[where.region] & (where.region >= 0)
+            displacement[k, gone], stress[k, gone] = np.nan, np.nan
+            bared = np.flatnonzero(gone & (where.face >= 0))
+            if len(bared) and beside:
+                other: Side = "second" if side == "first" else "first"
+                left = self.evaluate(given[bared].view(float).reshape(-1, 2), [at], tips, other, beside=False)
+                displacement[k, bared], stress[k, bared] = left.displacement[0], left.stress[0]
         stress[:, at_tip] = np.nan
         names = np.array([*mesh.region_names, ""])
         return Evaluation(
@@ -124,7 +135,8 @@ class Evaluator:
         last = np.searchsorted(where.region[by_region], regions)
         densities, totals = [], []
         for at in steps:
-            moved, traction, hoop_stress = self._read(at)
+            stored = self._read(at)
+            moved, traction, hoop_stress = np.nan_to_num(stored[0]), np.nan_to_num(stored[1]), np.nan_to_num(stored[2])
             first, opposite = split_faces(mesh, moved)
             u, t = np.where(crack, first - opposite, first), np.where(crack, 0.0, traction[: mesh.nodes])
             stage, factor = int(self._steps.stage[at]), float(self._steps.factor[at])
@@ -166,6 +178,13 @@ class Evaluator:
         strained = np.stack([take_off_rigid_motions(each, self._rigid) for each in v.T], axis=1)
         displacement, stress = field.sample(v, strained)
         return [Values(displacement[:, k], stress[:, k]) for k in range(len(densities))]
+
+    def _find_gone(self, at: int) -> Bool:
+        """Which regions are gone at a stored step: what is stored of them is not a number."""
+        moved, region = self._read(at)[0], self._run.mesh.node_region
+        gone = np.zeros(len(self._run.model.regions), dtype=bool)
+        gone[region[np.isnan(moved[: len(region)])]] = True
+        return gone
 
     def _read(self, at: int) -> tuple[Complex, Complex, Real]:
         with open_quietly(self._path) as file:

@@ -109,7 +109,8 @@ class FieldPicture:
         )
         self._magnify = 0.0
         if options.displaced:
-            largest = max((results.displacement_at(at) for at in self._steps), key=lambda u: float(np.abs(u).max()))
+            largest = max((np.nan_to_num(results.displacement_at(at)) for at in self._steps),
+                          key=lambda u: float(np.abs(u).max()))
             size = float(np.ptp(results.nodes.position, axis=0).max())
             self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
         # The same for all steps.
@@ -148,7 +149,9 @@ class FieldPicture:
         moved = self._magnify * self._values.displacement[self._steps.index(step)]
         places = to_columns(self._triangles.position) + moved
         low, high, colours = self._choose_colours()
-        triangulation = Triangulation(*places.T, self._triangles.corners)
+        gone = self._results.find_gone(step)[self._triangles.region]
+        mask = gone[self._triangles.corners].any(axis=1)
+        triangulation = Triangulation(*places.T, self._triangles.corners, mask=mask if mask.any() else None)
         drawn = axes.tripcolor(
             triangulation, values, shading="gouraud", cmap=colours, vmin=low, vmax=high, rasterized=True, zorder=1
         )

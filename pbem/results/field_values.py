@@ -62,8 +62,11 @@ class VertexField:
         for number, step in enumerate(steps):
             lateral[number] -= self._young[region] * self._evaluate_swelling(step)
         whole = np.concatenate([stress, lateral[:, :, None]], axis=2)
-        self._tips = self._tips | ~np.isfinite(whole).all(axis=(0, 2))
-        return VertexValues(np.nan_to_num(moved), self._smooth_tips(whole), ~self._tips)
+        gone = np.array([self._results.find_gone(step)[region] for step in steps])
+        infinite = ~np.isfinite(whole).all(axis=2) & ~gone
+        whole[gone] = 0.0
+        self._tips = self._tips | infinite.any(axis=0)
+        return VertexValues(np.nan_to_num(moved), self._smooth_tips(whole), ~self._tips & ~gone.all(axis=0))
 
     def _evaluate_swelling(self, step: int) -> Real:
         """Strain across the plane without stress, at all vertices."""

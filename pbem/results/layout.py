@@ -36,7 +36,7 @@ STEP_DATASETS = {"stage": "i4", "factor": "f8", "iterations": "i4", "residual": 
 # Of the pairs, with what an interface shows; beside them the internal variables of the laws.
 SHOWN = {"mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8"}
 TIP_DATASETS = ("KI", "KII", "J", "T")
-ENERGIES = ("external", "elastic", "dissipated", "released")
+ENERGIES = ("external", "elastic", "dissipated", "released", "removed")
 CHUNK_BYTES = 32768
 
 

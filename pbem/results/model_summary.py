@@ -57,6 +57,7 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
              "pressure": {name: to_plain(value) for name, value in stage.pressure.items() if value},
              "remote": dict(zip(("sxx", "syy", "sxy"), describe_remote(stage, model.origin), strict=True)),
              "gravity": dict(zip(("gx", "gy"), stage.gravity, strict=True)),
+             "joints": dict(stage.construction.joints), "removed": [*stage.construction.removed],
              "swelling": {name: each.describe(model.origin) for name, each in stage.swelling.items()}}
             for stage in model.stages
         ],

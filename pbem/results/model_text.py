@@ -12,6 +12,7 @@ from pbem.forecast.forecast import Forecast
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
 from pbem.mesh.mesh import Mesh
+from pbem.model.construction import describe_construction
 from pbem.model.model import Condition, Law, Model, Region, Stage
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference
 from pbem.results.doubts import list_doubts
@@ -169,7 +170,7 @@ def describe_law(law: Law) -> str:
 def _describe_loads(model: Model) -> list[str]:
     """The stages, with the loads that do not belong to a curve; then the in-situ stresses."""
     lines = []
-    for stage in model.stages:
+    for number, stage in enumerate(model.stages):
         parts = [f"{stage.name}: {count(stage.steps, 'step')}"]
         if stage.duration:
             parts.append(f"duration {stage.duration:g}")
@@ -178,6 +179,7 @@ def _describe_loads(model: Model) -> list[str]:
             parts.append("remote stress sxx, syy, sxy = {}, {}, {}".format(*given))
         if any(stage.gravity):
             parts.append("gravity {:g}, {:g}".format(*stage.gravity))
+        parts += describe_construction(model, number)
         pressure = {name: value for name, value in stage.pressure.items() if value}
         parts += shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
         lines.append(", ".join(parts))

@@ -33,7 +33,8 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
     """The loops of all regions, then the first, then the second faces of cracks; displacement (n, 2) at the nodes.
 
     The displacement is continuous along a loop, while each element has its own polynomial: where two elements meet,
-    and where the faces of a crack meet at its tip, the outline goes through the mean.
+    and where the faces of a crack meet at its tip, the outline goes through the mean. Regions that are gone, whose
+    displacement is not a number, have none.
     """
     t = choose_points(len(elements.vertices))
     values = interpolate_elements(nodes, elements, displacement, t)
@@ -43,7 +44,8 @@ def trace_outlines(nodes: Nodes, elements: Elements, displacement: Real) -> list
     chains = find_chains(elements)
     join_tips(elements, chains, values)
     outlines = []
-    for chain in chains:
+    there = np.isfinite(values).all(axis=(1, 2))
+    for chain in (each for each in chains if there[each].all()):
         closed = not elements.crack[chain[0]] and bool((end[chain[-1]] == start[chain[0]]).all())
         outlines.append(Outline(
             region=int(elements.region[chain[0]]), crack=bool(elements.crack[chain[0]]),

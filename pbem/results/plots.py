@@ -85,7 +85,7 @@ class BodyPicture:
         else:
             self._labels = find_names(options.labels, names)
         size = float(np.ptp(results.nodes.position, axis=0).max())
-        moved = [results.displacement_at(at) for at in self._steps]
+        moved = [np.nan_to_num(results.displacement_at(at)) for at in self._steps]
         largest = max(moved, key=lambda each: float(np.abs(each).max(initial=0.0)), default=np.zeros((1, 2)))
         self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
         places = [results.nodes.position, *(results.nodes.position + self._magnify * each for each in moved)]

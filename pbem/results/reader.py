@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.description.generation import GeneratedGroup
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
@@ -115,6 +115,12 @@ class Results:
         """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
         with open_quietly(self.path) as file:
             return file["fields/displacement"][range(len(self.steps))[step]]
+
+    def find_gone(self, step: int) -> Bool:
+        """Which regions (r,) a stage has taken away by a stored step."""
+        gone = np.zeros(len(self.nodes.region_names), dtype=bool)
+        gone[self.nodes.region[np.isnan(self.displacement_at(step)).any(axis=1)]] = True
+        return gone
 
     def evaluate(
         self, points: ArrayLike, steps: int | Sequence[int] | None = None, *, side: Side = "first"
@@ -291,9 +297,9 @@ def _read_status(path: Path, attributes: Mapping[str, Any]) -> str:
 
 
 def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
-    """Files of earlier versions tell nothing of what was released, which they added to the rest."""
+    """Files of earlier versions tell nothing of what was released, which they added to the rest, or removed."""
     group = file["energy"]
-    return np.asarray(group[kind][:k]) if kind in group or kind != "released" else np.zeros(k)
+    return np.asarray(group[kind][:k]) if kind in group or kind not in ("released", "removed") else np.zeros(k)
 
 
 def _read_steps(file: h5py.File) -> Steps:

@@ -11,6 +11,7 @@ import numpy as np
 from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.results.absent import fill
 from pbem.results.configuration import find_change
 from pbem.results.energy import Energy
 from pbem.results.layout import (
@@ -78,19 +79,20 @@ def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:
     for name, values in contact.items() if len(pairs) else ():
         values[pairs] = file["all/contact"][name][k - 1]
     fields = {name: file["fields"][name][k - 1] @ np.array([1, 1j]) for name in ("displacement", "traction")}
-    return Step(
+    return fill(Step(
         number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
         iterations=(), residual=float(steps["residual"][k - 1]), **fields,
         contact=ContactState(**{name: contact.pop(name) for name in SHOWN}, internal=contact),
-    )
+    ))
 
 
 def read_last_energy(file: h5py.File) -> Energy:
     """The energies at the last step that was stored completely."""
     k = count_steps(file)
     group = file["energy"]
-    if "released" not in group:  # a file of an earlier version
-        extend(create_energy(group, "released"), np.zeros(len(group["external"])))
+    for kind in ("released", "removed"):
+        if kind not in group:  # a file of an earlier version
+            extend(create_energy(group, kind), np.zeros(len(group["external"])))
     return Energy(**{kind: float(group[kind][k - 1]) for kind in ENERGIES})
 
 

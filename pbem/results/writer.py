@@ -19,6 +19,7 @@ from pbem.contact.custom import find_fault
 from pbem.errors import ConvergenceError, LawError, ResultFileError, StopError, StorageError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.results.absent import Absence
 from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance, describe_runaway
@@ -148,6 +149,8 @@ class ResultWriter:
         self._pairs = join_pairs(sort_pairs(mesh))
         self._tip_rules = collect_tip_rules(model, mesh)
         self._balance = EnergyBalance(model, mesh, last_step, reached)
+        points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
+        self._absence = Absence(model, mesh, points)
         self._pending: Step | None = None
 
     @property
@@ -199,7 +202,14 @@ class ResultWriter:
     def _store(self, step: Step) -> None:
         self._pending = None
         file = self._file
-        append_row(file["fields/hoop_stress"], self._evaluate_hoop_stress(step))
+        hoop_stress, reactions = self._evaluate_hoop_stress(step), self._sum_reactions(step.traction)
+        tips = self._tip_rules.evaluate_all(step) if self._tip_rules.cracks else {}
+        gone = self._absence.list_faces(step.stage)
+        if gone is not None:
+            hoop_stress = np.where(gone, np.nan, hoop_stress)
+            tips = self._absence.blank_tips(step.stage, self._tip_rules.cracks, tips)
+            step = self._absence.blank(step)
+        append_row(file["fields/hoop_stress"], hoop_stress)
         if "interior" in file:
             count = len(self._model.interior_points)
             none = Interior(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
@@ -210,16 +220,14 @@ class ResultWriter:
         append_row(file["fields/traction"], to_columns(step.traction))
         together = file["all"]
         if self._model.conditions or self._model.point_supports:
-            none = np.full(2, np.nan)
-            supports = [step.support_reactions.get(name, none) for name in self._model.point_supports]
-            forces = to_columns(self._sum_reactions(step.traction))
-            append_row(together["reactions"], np.concatenate([forces, np.array(supports).reshape(-1, 2)]))
+            unknown = np.full(2, np.nan)
+            supports = [step.support_reactions.get(name, unknown) for name in self._model.point_supports]
+            append_row(together["reactions"], np.concatenate([to_columns(reactions), np.array(supports).reshape(-1, 2)]))
         contact = {name: getattr(step.contact, name) for name in SHOWN} | dict(step.contact.internal)
         for quantity in list_pair_datasets(self._model) if len(self._pairs) else ():
             append_row(together["contact"][quantity], contact[quantity][self._pairs])
-        if self._tip_rules.cracks:
-            for kind, at_tips in self._tip_rules.evaluate_all(step).items():
-                append_row(together["tips"][kind], at_tips)
+        for kind, at_tips in tips.items():
+            append_row(together["tips"][kind], at_tips)
         for name, dataset in file["estimates"].items():
             unknown = np.full(dataset.shape[1:], np.nan)
             append_row(dataset, np.asarray(self._estimates.get(name, unknown)))

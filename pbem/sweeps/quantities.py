@@ -22,7 +22,7 @@ COMPONENTS = ("x", "y", "moment")
 FIELDS = ("slip", "opening", "traction_n", "traction_s")
 MODES = {"stick": STICK, "slip": SLIP, "open": OPEN}
 ENDS = {"start": 0, "end": 1, "0": 0, "1": 1}
-ENERGIES = ("external", "elastic", "dissipated", "released")
+ENERGIES = ("external", "elastic", "dissipated", "released", "removed")
 STEPS = ("number", "load_factor", "iterations", "residual")
 STATISTICS = ("max", "min", "mean", "largest", "integral")
 KINDS = {
@@ -31,7 +31,7 @@ KINDS = {
     "contact": "contact.NAME.slip.largest (FIELD slip, opening, traction_n or traction_s; max, min, mean, largest or "
                "integral), contact.NAME.status.slip (stick, slip or open), without NAME of all",
     "tips": "tips.NAME.KI (KI, KII, J or T), tips.NAME.start.KI or end, without NAME of all",
-    "energy": "energy.external, elastic, dissipated or released",
+    "energy": "energy.external, elastic, dissipated, released or removed",
     "steps": "steps.number, load_factor, iterations or residual",
 }
 # Without a choice: so many interfaces, and so many cracks, have columns of their own.

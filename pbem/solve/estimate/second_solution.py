@@ -20,9 +20,9 @@ from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.launch.watch import Watch
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.problem.arranged import Arranged, begin_stage, describe_rest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, SilentReporter, Step
-from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.kept import KeptProblems
@@ -44,13 +44,18 @@ class SecondSolution:
         self.beside = beside
         model, mesh = beside.model, beside.mesh
         self.problem: Problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
-        self.tangent: TangentOperator = kept.take_tangent(self.problem) if kept else self.problem.make_tangent()
-        self._kept = kept is not None
+        self._whole = self.problem
+        self._arranged = Arranged(self.problem, kept.take_tangent(self.problem) if kept else None)
         self.memory: Memory = start_memory(self.problem.laws)
+        self._contact, self._stage = describe_rest(self.problem), -1
         self._watch = Watch(comm, SilentReporter(), signals or StopSignals())
         self._watch.look_after(self.problem.laws)
         if start is not None:
             self._take_over(start.contact)
+            if start.factor < 1:
+                self._enter(start.stage, start.factor)
+            else:
+                self._stage = start.stage
 
     def follow(self, step: Step) -> Step:
         """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
@@ -58,6 +63,9 @@ class SecondSolution:
         Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
         custom law fails with what it is asked here; there is no further step then.
         """
+        if step.stage != self._stage:
+            self.memory = begin_stage(self._whole, step.stage, self.memory, self._contact)
+            self._enter(step.stage, 0.0)
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)
@@ -67,7 +75,13 @@ class SecondSolution:
             raise
         self.memory = commit(self.problem.laws, solution.memory, solution.modes, solution.pairs)
         self._watch.check()
-        return describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
+        found = describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
+        self._contact = found.contact
+        return found
+
+    def _enter(self, stage: int, factor: float) -> None:
+        self.problem, self.tangent = self._arranged.enter(stage, factor, self._contact)
+        self._stage = stage
 
     def _solve(self, step: Step, load: Load) -> Solution:
         begun = replace(self.memory, modes=self._guess_modes(step.contact), duration=step.duration)
@@ -96,7 +110,7 @@ class SecondSolution:
         if not solved.checked:
             solved = self.tangent.check(solved, constraints, load, law)
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
-        return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, ())
+        return Solution(solved.unknowns, solved.v, pairs.bear(load.carried), modes, memory, solved.residual, ())
 
     def _carry_internal(self, contact: ContactState) -> dict[str, NDArray[Any]]:
         """The internal variables of the run's pairs, carried over as they are declared to be."""
@@ -127,8 +141,11 @@ class SecondSolution:
             self._guess_modes(contact), slip - laws.compliance_s * tangential, self._carry_internal(contact),
             beside.carry_pairs(contact.traction_n, jumps=False),
         )
+        self._contact = ContactState(
+            self.memory.modes.mode, beside.carry_pairs(contact.opening, jumps=True), slip,
+            beside.carry_pairs(contact.traction_n, jumps=False), tangential, self.memory.internal,
+        )
 
     def destroy(self) -> None:
         """Free the storage; after an exception of one rank it is not called."""
-        if not self._kept:
-            self.tangent.destroy()
+        self._arranged.leave()

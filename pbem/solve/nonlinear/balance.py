@@ -221,6 +221,8 @@ def _measure_whole(
     """
     outer = np.zeros(problem.mesh.nodes, dtype=bool)
     outer[problem.outer.node] = True
+    if problem.arrangement is not None:
+        outer[problem.arrangement.bare] = True  # what a region that is gone still carries, or fluid in its place
     # Tools act by what their contacts carry.
     tools = np.array([region.rigid for region in problem.model.regions])[of]
     acting = outer[faces.node] | tools

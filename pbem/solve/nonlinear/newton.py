@@ -174,7 +174,8 @@ def _search_modes(
             problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
-            return Solution(solved.unknowns, solved.v, pairs, modes, memory, solved.residual, tuple(iterations))
+            whole = pairs.bear(load.carried)
+            return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations))
         refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
         if refused:
             forcing.used = False  # no solution was asked for that

@@ -16,6 +16,7 @@ from pbem.bem.interior import Values
 from pbem.bem.location import Location
 from pbem.contact.anchor import Anchor
 from pbem.contact.approach import approach_pairs
+from pbem.contact.arrangement import Arrangement
 from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.custom import asked_by_one_rank
 from pbem.contact.cut_parts import CutMotion, CutParts
@@ -94,7 +95,9 @@ class Problem:
     """What stays the same through a run; equal on all ranks but for `system`, which holds this rank's rows.
 
     traction_scale: modulus/length, the unit of traction unknowns. equation_scale (nodes,): factors of the equations.
-    anchors: in the system, for good; anchored: the free motions for which they were made.
+    anchors: in the system, for good; anchored: the free motions for which they were made. arrangement: of a stage in
+    which not all is as the laws say, whose problem it is (see pbem.solve.problem.arranged); carried (m, 2): traction of
+    the pairs that open in it at its beginning.
     """
 
     comm: MPI.Intracomm
@@ -107,6 +110,8 @@ class Problem:
     equation_scale: Real
     anchors: tuple[Anchor, ...]
     anchored: tuple[RigidBodyMode, ...]
+    arrangement: Arrangement | None = None
+    carried: Real | None = None
 
     @property
     def unknowns(self) -> int:
@@ -196,7 +201,8 @@ class Problem:
 
     def constrain(self, law: Linearisation, load: Load) -> ConstraintMap:
         """The constraint map for linearised laws and a load."""
-        return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale)
+        gone = None if self.arrangement is None else self.arrangement.nodes
+        return build_constraints(self.mesh, self.outer, self.laws.gap, law, load, self.traction_scale, gone)
 
     def apply(self, v: Real, load: Load, released: Real | None = None) -> Real:
         """This rank's rows of the integral equations, less the part that comes from far away; lengths (theory, 15, 44).
@@ -229,7 +235,11 @@ class Problem:
         return pattern.tocsr(), functional.tocsr()
 
     def evaluate_load(self, stage: int, factor: float) -> Load:
-        return evaluate_load(self.model, self.mesh, self.outer, stage, factor)
+        """What acts at a fraction of a stage."""
+        load = evaluate_load(self.model, self.mesh, self.outer, stage, factor)
+        if self.arrangement is None or self.carried is None:
+            return load
+        return self.arrangement.adapt(load, self.mesh, self.outer, (1 - factor) * self.carried)
 
     def measure(self, part: Real) -> float:
         """Norm of a vector spread over the ranks."""

@@ -68,6 +68,8 @@ def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target:
         return None
     if problem.model.timed and target > reached:
         return None  # loads are not linear in between
+    if problem.arrangement is not None:
+        return None  # faces bear what no law gives them
     loads = [problem.evaluate_load(stage, factor) for factor in (reached, target)]
     matrix, before, after = _sum_up(problem, loads, np.flatnonzero(finite))
     size = max(np.abs(before).max(), np.abs(after).max())

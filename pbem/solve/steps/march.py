@@ -13,6 +13,7 @@ from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError, StopError
 from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.problem.arranged import Arranged, begin_stage, describe_rest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, Reporter, Step, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
@@ -32,17 +33,19 @@ Guess = Callable[[int, float], ModeState | None]
 
 @dataclass(frozen=True)
 class Start:
-    """Where a march begins: after a number of steps, at a fraction of a stage, with the memory of the pairs."""
+    """Where a march begins: after a number of steps, at a fraction of a stage, with the memory and state of the pairs.
+    """
 
     number: int
     stage: int
     factor: float
     memory: Memory
+    contact: ContactState
 
 
 def start_from_rest(problem: Problem) -> Start:
     """The unloaded state: closed pairs stick."""
-    return Start(0, 0, 0.0, start_memory(problem.laws))
+    return Start(0, 0, 0.0, start_memory(problem.laws), describe_rest(problem))
 
 
 def resume_modes(contact: ContactState) -> ModeState:
@@ -55,7 +58,7 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     modes = resume_modes(contact)
     elastic = problem.laws.compliance_s * contact.traction_s
     memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n)
-    return Start(number, stage, factor, memory)
+    return Start(number, stage, factor, memory, contact)
 
 
 def go_on(unfinished: Unfinished | None) -> Guess | None:
@@ -85,12 +88,16 @@ def march(
     with which the search for those of a step begins.
     """
     begin = start or start_from_rest(problem)
-    tangent = kept or problem.make_tangent()
-    number, memory, noted, told, depth = begin.number, begin.memory, 0.0, 0.0, 0.0
+    arranged, whole = Arranged(problem, kept), problem
+    number, memory, contact, noted, told, depth = begin.number, begin.memory, begin.contact, 0.0, 0.0, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
             steps = problem.model.stages[stage].steps
             reached = begin.factor if stage == begin.stage else 0.0
+            if reached == 0.0:
+                memory = begin_stage(whole, stage, memory, contact)
+            if reached < 1.0:
+                problem, tangent = arranged.enter(stage, reached, contact)
             ceiling = Ceiling()
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
@@ -103,16 +110,15 @@ def march(
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)
                 depth = note_passing(problem, step, depth, reporter)
+                contact = step.contact
                 with note_place(stage, reached, solution.modes):
                     reporter.accept(step)
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
-        if kept is None:
-            tangent.destroy()
+        arranged.leave()
         raise
-    if kept is None:
-        tangent.destroy()
+    arranged.leave()
 
 
 def _advance(

@@ -11,7 +11,8 @@ from pbem.contact.laws import PairLaws, collect_laws
 from pbem.contact.loads import OuterNodes, collect_outer_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.rigid_body_modes import RigidBodyMode, find_rigid_body_modes
+from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.model.support import find_anchored_motions
 from pbem.solve.problem.problem import Problem, System
 from pbem.solve.system.choice import choose_system
 
@@ -22,7 +23,7 @@ def assemble_problem(model: Model, mesh: Mesh, comm: MPI.Intracomm) -> Problem:
     Raises ConvergenceError ("linear solver") where the system cannot be as exact as is asked for.
     """
     outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
-    anchored = find_rigid_body_modes(model)
+    anchored = find_anchored_motions(model)
     anchors = anchor_motions(mesh, anchored)
     system = choose_system(model, mesh).assemble(comm, model, mesh, outer, laws, anchors)
     return join_problem(comm, model, mesh, outer, laws, system, anchors, anchored)

@@ -15,7 +15,7 @@ from pbem.contact.laws import ModeState, PairLaws, collect_laws, find_linear
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.rigid_body_modes import find_rigid_body_modes
+from pbem.model.support import find_anchored_motions
 from pbem.solve.petsc.session import PETSc
 from pbem.solve.problem.problem import Problem, System
 from pbem.solve.problem.step import ContactState
@@ -63,7 +63,7 @@ class KeptProblems:
     def assemble(self, model: Model, mesh: Mesh) -> Problem:
         """As `assemble_problem`, with a kept operator if there is one. Raises ConvergenceError as it does."""
         outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
-        anchored = find_rigid_body_modes(model)
+        anchored = find_anchored_motions(model)
         anchors = anchor_motions(mesh, anchored)
         solver = model.solver
         key = digest((

@@ -1,0 +1,36 @@
+"""A strap that is bolted to a bar under load."""
+
+import numpy as np
+
+from pbem.results.reader import Results
+
+TITLE = "A strap bolted to a bar under load"
+SUBJECT = "contact"
+PROBLEM = """A bar is stretched by 100 MPa. A strap beside it, still without stress, is bolted to it as it lies: from
+then on the seam keeps the slip of 0.05 mm at its end. Another 50 MPa on both stretch both by 0.025 mm more, with nothing
+across the seam. When 100 MPa are taken off the ends of both, they shorten by 0.05 mm: the bar is left with 50 MPa, the
+strap with -50 MPa, and the seam with its slip (Poisson's ratio is 0)."""
+SOURCE = """Superposition: what comes after the bolting is a uniform stress of both bars, u = s x/E."""
+EXPECTED = {
+    "slip at the end of the seam when bolted, mm": (0.05, 1e-6),
+    "displacement of the strap's end when both are stretched, mm": (0.025, 1e-6),
+    "slip that is left in the end, mm": (0.05, 1e-6),
+    "displacement of the bar's end in the end, mm": (0.025, 1e-6),
+}
+PICTURES = [("displaced, in the end: the seam keeps its slip", ["plot"])]
+
+
+def compute(results: Results) -> dict[str, float]:
+    """The slip at the last pairs, carried on to the end of the seam."""
+    seam, moved = results.contact["seam"], results.evaluate([[100.0, 5.0], [100.0, 15.0]]).displacement[:, :, 0]
+
+    def find_end(step: int) -> float:
+        line = np.polyfit(seam.arc_length, np.abs(seam.slip[step]), 1)
+        return float(np.polyval(line, 100.0))
+
+    return {
+        "slip at the end of the seam when bolted, mm": find_end(0),
+        "displacement of the strap's end when both are stretched, mm": moved[1, 1],
+        "slip that is left in the end, mm": find_end(-1),
+        "displacement of the bar's end in the end, mm": moved[2, 0],
+    }

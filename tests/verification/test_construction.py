@@ -1,0 +1,242 @@
+"""Construction in stages: a tunnel against Kirsch's solution, faces that open and close, and what a joint remembers."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.driver import Reporter
+from pbem.solve.problem.step import SilentReporter
+
+YOUNG, POISSON = 1e4, 0.25
+HORIZONTAL, VERTICAL = -5.0, -10.0
+IN_SITU = {"rock": {"sxx": HORIZONTAL, "syy": VERTICAL}}
+REMOTE = {"sxx": HORIZONTAL, "syy": VERTICAL}
+
+
+def make_tunnel(
+    stages: Sequence[Mapping[str, Any]], unit: float = 1.0, at: tuple[float, float] = (0.0, 0.0), joint: bool = False,
+    elements: int = 32, **more: Any,
+) -> dict[str, Any]:
+    """A tunnel of radius `unit` around a place in an infinite rock, full of the same rock at first."""
+    x, y = at
+    case: dict[str, Any] = {
+        "materials": {"rock": {"young": YOUNG, "poisson": POISSON}},
+        "curves": {"wall": {"center": [x, y], "radius": unit, "elements": elements}},
+        "regions": {"core": {"material": "rock", "boundary": ["wall"]},
+                    "rock": {"material": "rock", "boundary": ["wall"], "infinite": True}},
+        "initial_stress": IN_SITU, "stages": [dict(each) for each in stages],
+    }
+    if joint:
+        points = [[x - 1.5 * unit, y + 1.6 * unit], [x + 1.9 * unit, y + 1.1 * unit]]
+        case["curves"]["joint"] = {"points": points, "elements": 10}
+        case["regions"]["rock"]["cracks"] = ["joint"]
+        case["interfaces"] = {"joint": {"friction": 0.3}}
+    return case | more
+
+
+REST = {"name": "rest", "steps": 1}
+CUT = {"name": "cut", "steps": 2, "remove": ["core"]}
+
+
+def find_own(results: pbem.Results, region: str) -> np.ndarray:
+    return np.flatnonzero(results.nodes.region == results.nodes.region_names.index(region))
+
+
+def lacks(results: pbem.Results) -> np.ndarray:
+    """What the energy balance lacks after every step, to the largest work."""
+    energy = results.energy
+    left = energy.external - energy.elastic - energy.dissipated - energy.released - energy.removed
+    return np.asarray(np.abs(left) / np.abs(energy.external).max())
+
+
+@pytest.mark.parametrize(
+    ("scheme", "operator", "unit", "at"),
+    [("SST", "dense", 1.0, (0.0, 0.0)), ("DBEM", "hierarchical", 1e3, (1e6, -2e6)), ("HST", "dense", 1e-3, (0.0, 1.0)),
+     ("THST", "hierarchical", 1.0, (0.0, 0.0))],
+)  # fmt: skip
+def test_an_excavated_tunnel_is_that_of_kirsch(
+    scheme: str, operator: Any, unit: float, at: tuple[float, float], tmp_path: Path
+) -> None:
+    points = [[at[0], at[1] + 0.5 * unit], [at[0] + 2 * unit, at[1]]]
+    case = make_tunnel([REST, CUT], unit, at, analysis={"scheme": scheme}, output={"points": points})
+    results = pbem.run(case, tmp_path / "tunnel.h5", operator=operator)
+    own, gone = find_own(results, "rock"), find_own(results, "core")
+    angle = np.angle((results.nodes.position[own] - at) @ [1, 1j])
+    # Nothing moves before; then half of the traction is released, then all.
+    assert np.abs(results.displacement[0]).max() < 1e-12 * unit
+    mean, half = 0.5 * (HORIZONTAL + VERTICAL), 0.5 * (HORIZONTAL - VERTICAL)
+    shear = YOUNG / (2 * (1 + POISSON))
+    inward = (mean + half * (3 - 4 * POISSON) * np.cos(2 * angle)) / (2 * shear) * unit
+    for step, share in ((1, 0.5), (2, 1.0)):
+        moved = (results.displacement[step, own] * np.stack([np.cos(angle), np.sin(angle)], axis=1)).sum(axis=1)
+        np.testing.assert_allclose(moved, share * inward, atol=1e-4 * np.abs(inward).max())
+        hoop = (1 - 0.5 * share) * 0.0 + 2 * mean * share - 4 * half * share * np.cos(2 * angle)
+        along = HORIZONTAL * np.sin(angle) ** 2 + VERTICAL * np.cos(angle) ** 2
+        np.testing.assert_allclose(
+            results.hoop_stress[step, own], hoop + (1 - share) * along, atol=1e-3 * np.abs(hoop).max()
+        )
+    assert np.isnan(results.displacement[1:, gone]).all() and not np.isnan(results.displacement[0]).any()
+    stress, ratio = results.interior.stress[-1], 0.25
+    radial = mean * (1 - ratio) + half * (1 - 4 * ratio + 3 * ratio**2)
+    assert np.isnan(stress[0]).all() and stress[1, 0] == pytest.approx(radial, abs=1e-4)
+    evaluated = results.evaluate(points, steps=[0, -1]).stress
+    np.testing.assert_allclose(evaluated[0, 0], [HORIZONTAL, VERTICAL, 0.0], atol=1e-9)
+    np.testing.assert_allclose(evaluated[1], stress, atol=1e-8)
+    assert np.isnan(results.contact["wall"].opening[-1]).all()
+    np.testing.assert_allclose(results.contact["wall"].traction_n[-1], 0.0, atol=1e-12)
+    # What is set free by dead tractions is half of their work; a core at rest had stored nothing, one that sinks has.
+    assert lacks(results).max() < 1e-9
+    assert results.energy.removed[-1] == pytest.approx(results.energy.elastic[-1] / 2, rel=1e-3)
+
+
+def test_a_joint_beside_the_tunnel(tmp_path: Path) -> None:
+    """It slips as it does where the tunnel is there from the start and the stress comes from far away; but support
+    that comes after the slip does not undo it."""
+    excavated = pbem.run(make_tunnel([REST, {**CUT, "steps": 3}], joint=True), tmp_path / "a.h5")
+    at_once = make_tunnel([{"steps": 1, "remote": REMOTE}], joint=True, initial_stress={})
+    del at_once["regions"]["core"]
+    loaded = pbem.run(at_once, tmp_path / "b.h5")
+    slip, other = (each.contact["joint"].slip[-1] for each in (excavated, loaded))
+    assert np.abs(slip).max() > 1e-4
+    np.testing.assert_allclose(slip, other, atol=1e-4 * np.abs(slip).max())
+    np.testing.assert_array_equal(excavated.contact["joint"].mode[-1], loaded.contact["joint"].mode[-1])
+    assert lacks(excavated).max() < 1e-5 and excavated.energy.dissipated[-1] > 0
+    support = {"boundary": {"wall": {"pressure": 7.5}}}
+    late = pbem.run(make_tunnel([REST, CUT, {"steps": 2, **support}], joint=True), tmp_path / "late.h5")
+    early = pbem.run(make_tunnel([REST, {**CUT, **support}], joint=True), tmp_path / "early.h5")
+    kept, less = (np.abs(each.contact["joint"].slip[-1]).max() for each in (late, early))
+    np.testing.assert_allclose(late.contact["wall"].traction_n[-1], -7.5, rtol=1e-9)
+    np.testing.assert_allclose(early.contact["wall"].traction_n[-1], -7.5, rtol=1e-9)
+    assert less < 0.2 * kept
+    assert lacks(late).max() < 1e-5
+
+
+def make_seam(stages: Sequence[Mapping[str, Any]], laws: Mapping[str, Any], **more: Any) -> dict[str, Any]:
+    """Two blocks on each other, joined along s1 and s2."""
+    lines = {"a": [[2, 0], [0, 0]], "ra": [[2, 0], [2, 1]], "la": [[0, 1], [0, 0]], "s1": [[0, 1], [1, 1]],
+             "s2": [[1, 1], [2, 1]], "rb": [[2, 1], [2, 2]], "b": [[2, 2], [0, 2]], "lb": [[0, 2], [0, 1]]}
+    return {
+        "materials": {"m": {"young": 1e3, "poisson": 0.3}},
+        "curves": {name: {"points": points, "elements": 6} for name, points in lines.items()},
+        "regions": {"lower": {"material": "m", "boundary": ["a", "ra", "s1", "s2", "la"]},
+                    "upper": {"material": "m", "boundary": ["b", "rb", "s1", "s2", "lb"]}},
+        "boundary": {"a": {"ux": 0.0, "uy": 0.0}}, "interfaces": dict(laws), "stages": [dict(each) for each in stages],
+    } | more  # fmt: skip
+
+
+PULL = {"name": "pull", "steps": 1, "boundary": {"b": {"tx": 0.2, "ty": 1.0}}}
+LET_GO = {"name": "let go", "steps": 2, "boundary": {"b": {"tx": 0.0, "ty": 0.0}}}
+
+
+def test_a_seam_that_is_cut_under_load(tmp_path: Path) -> None:
+    """The end is as if it had been open from the start; half of the way half of the traction is left."""
+    cut = pbem.run(make_seam([PULL, {"name": "cut", "steps": 2, "open": ["s1"]}], {}), tmp_path / "cut.h5")
+    open_ = pbem.run(make_seam([PULL], {"s1": {"law": "open"}}), tmp_path / "open.h5")
+    whole = pbem.run(make_seam([PULL], {}), tmp_path / "whole.h5")
+    scale = np.abs(open_.displacement[-1]).max()
+    np.testing.assert_allclose(cut.displacement[-1], open_.displacement[-1], atol=1e-9 * scale)
+    mean = 0.5 * (open_.displacement[-1] + whole.displacement[-1])
+    np.testing.assert_allclose(cut.displacement[1], mean, atol=1e-9 * scale)
+    np.testing.assert_allclose(
+        cut.contact["s1"].traction_n[1], 0.5 * whole.contact["s1"].traction_n[-1], rtol=1e-8
+    )
+    assert lacks(cut).max() < 1e-4 and cut.energy.removed[-1] > 0 and cut.energy.dissipated[-1] == 0
+
+
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_a_gap_that_is_bolted_stays(operator: Any, tmp_path: Path) -> None:
+    """Welded as it gapes, it keeps its jump without the load, and springs back once it is left to its law."""
+    bolt = {"name": "bolt", "steps": 1, "close": ["s1"]}
+    case = make_seam([PULL, bolt, LET_GO, {"name": "free", "steps": 1, "release": ["s1"]}], {"s1": {"law": "coulomb"}})
+    results = pbem.run(case, tmp_path / "bolt.h5", operator=operator)
+    seam = results.contact["s1"]
+    assert seam.opening[0].max() > 1e-3 and (seam.mode[1:4] == 0).all()
+    np.testing.assert_allclose(seam.opening[1:4], seam.opening[:1].repeat(3, axis=0), rtol=1e-12)
+    np.testing.assert_allclose(seam.slip[1:4], seam.slip[:1].repeat(3, axis=0), rtol=1e-12, atol=1e-15)
+    assert seam.traction_n[3].min() < -0.5  # what the wedge in the gap bears
+    scale = np.abs(results.displacement[0]).max()
+    assert np.abs(results.displacement[-1]).max() < 1e-9 * scale
+    # Loads that come back find the state that was bolted.
+    again = pbem.run(make_seam([PULL, bolt, LET_GO, {**PULL, "name": "again"}], {"s1": {"law": "coulomb"}}),
+                     tmp_path / "again.h5")
+    np.testing.assert_allclose(again.displacement[-1], again.displacement[0], atol=1e-9 * scale)
+
+
+class _Interrupt(SilentReporter):
+    def __init__(self, steps: int) -> None:
+        self.left = steps
+
+    def start_step(self, stage: int, reached: float, target: float) -> None:
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("steps", [2, 3, 5])
+def test_a_construction_is_gone_on_with(steps: int, tmp_path: Path) -> None:
+    """Stopped within the excavation, after it, and after the joint was welded."""
+    stages = [REST, CUT, {"steps": 1, "boundary": {"wall": {"pressure": 4.0}}}, {"steps": 1, "close": ["joint"]},
+              {"steps": 1, "boundary": {"wall": {"pressure": 0.0}}}]
+    case = make_tunnel(stages, joint=True, elements=16)
+    whole = pbem.run(case, tmp_path / "whole.h5")
+    reporter: Reporter = _Interrupt(steps)
+    with pytest.raises(KeyboardInterrupt):
+        pbem.run(case, tmp_path / "part.h5", reporter=reporter)
+    results = pbem.run(case, tmp_path / "part.h5", resume=True)
+    assert len(results.steps) == len(whole.steps) == 6
+    scale = np.nanmax(np.abs(whole.displacement[-1]))
+    np.testing.assert_allclose(results.displacement[-1], whole.displacement[-1], atol=1e-11 * scale)
+    for name in ("external", "elastic", "dissipated", "removed"):
+        np.testing.assert_allclose(getattr(results.energy, name), getattr(whole.energy, name), rtol=1e-9, atol=1e-12)
+    joint = whole.contact["joint"]
+    np.testing.assert_array_equal(joint.slip[-1], joint.slip[3])
+
+
+def test_a_body_that_floats_goes_on_floating(tmp_path: Path) -> None:
+    """Nothing holds two blocks that are pulled in balance; without the lower one the upper is as it is alone."""
+    pulled = {"rb": {"tx": 1.0}, "lb": {"tx": -1.0}}
+    case = make_seam([REST, {"name": "cut", "steps": 2, "remove": ["lower"]}], {}, boundary=pulled)
+    results = pbem.run(case, tmp_path / "both.h5")
+    alone = copy.deepcopy(case) | {"stages": [REST]}
+    del alone["regions"]["lower"], alone["curves"]["a"], alone["curves"]["ra"], alone["curves"]["la"]
+    single = pbem.run(alone, tmp_path / "alone.h5")
+    own = find_own(results, "upper")
+    at = [np.lexsort(each.T.round(9)) for each in (results.nodes.position[own], single.nodes.position)]
+    np.testing.assert_allclose(results.displacement[-1, own][at[0]], single.displacement[-1][at[1]], atol=1e-12)
+
+
+def test_a_block_that_loses_its_hold_is_refused(tmp_path: Path) -> None:
+    case = make_seam([REST, {"name": "cut", "open": ["s1", "s2"]}], {}, gravity={"gy": -1.0})
+    case["materials"]["m"]["density"] = 1.0
+    with pytest.raises(pbem.CaseError, match=r"from stage 'cut' on a free rigid motion .* of 'upper'"):
+        pbem.run(case, tmp_path / "loose.h5")
+    assert not (tmp_path / "loose.h5").exists()
+
+
+def test_names_are_checked(tmp_path: Path) -> None:
+    stages = [
+        {"open": ["s1", "a", "s3"], "close": ["s1", "s2"], "remove": ["lover"]},
+        {"release": ["s2"], "open": ["s1"], "boundary": {"s1": {"pressure": 1.0}}},
+        {"remove": ["lower"], "open": ["s2"], "boundary": {"s1": {"tx": 1.0}}},
+    ]
+    with pytest.raises(pbem.CaseError) as raised:
+        pbem.run(make_seam(stages, {}), tmp_path / "names.h5")
+    said = str(raised.value)
+    for text in (
+        "stages[1].remove: found unknown region 'lover'; did you mean 'lower'?",
+        "stages[1].open: found 'a', a curve of one region",
+        "stages[1].open: found unknown interface, crack or contact 's3'",
+        "stages[1].close: found 's1', which is in 'open' of this stage too",
+        "stages[1].close: found 's2', which is bonded by its law",
+        "stages[2].boundary.s1: found conditions on 's1', an interface",
+        "stages[3].open: found 's2', a curve of a region that is gone",
+        "stages[3].boundary.s1: found conditions on 's1', where a region is gone; expected pressure = ...",
+    ):
+        assert text in said

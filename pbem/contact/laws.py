@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.contact.cohesive import Cohesive
 from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
 from pbem.contact.friction_bound import Strength
 from pbem.contact.strength import choose_strength
@@ -95,13 +96,14 @@ class Memory:
     """What the pairs bring into a step, (m,) each: of the last converged one, and how long this one takes.
 
     slip: plastic slip; internal: values of the internal variables that the laws declare, by their names;
-    normal_traction: stress. duration: of the step that is being solved, 0 where there is no time.
+    normal_traction: stress; opening: g_n. duration: of the step that is being solved, 0 where there is no time.
     """
 
     modes: ModeState
     slip: Real
     internal: Mapping[str, NDArray[Any]]
     normal_traction: Real
+    opening: Real
     duration: float = 0.0
 
     @property
@@ -278,7 +280,7 @@ def start_memory(laws: PairLaws) -> Memory:
     for variable, at, parameters in _list_parts(laws):
         internal[variable.name][at] = variable.start(parameters)
     zeros = np.zeros(laws.count)
-    return Memory(modes, zeros, internal, zeros).lose(laws.brittle & is_open)
+    return Memory(modes, zeros, internal, zeros, laws.gap).lose(laws.brittle & is_open)
 
 
 def lay_out(laws: PairLaws) -> dict[str, NDArray[Any]]:
@@ -314,4 +316,12 @@ def commit(laws: PairLaws, memory: Memory, modes: ModeState, state: PairState) -
     for variable, at, parameters in _list_parts(laws):
         old = memory.internal[variable.name][at]
         internal[variable.name][at] = variable.advance(old, slipped[at], memory.duration, parameters)
-    return Memory(modes, slip, internal, state.p_n)
+    for group in laws.strengths:
+        if isinstance(group.law, Cohesive):
+            at = group.pairs
+            start = {name: values[at] for name, values in memory.internal.items()}
+            jump = np.stack([state.g_n - laws.compliance_n * state.p_n, slip], axis=1)[at]
+            own = group.law.advance(start, jump, modes.mode[at] == OPEN, slipped[at], group.parameters)
+            for name, values in own.items():
+                internal[name][at] = values
+    return Memory(modes, slip, internal, state.p_n, state.g_n)

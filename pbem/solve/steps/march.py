@@ -48,7 +48,7 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     """The state of a stored step."""
     modes = ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
     elastic = problem.laws.compliance_s * contact.traction_s
-    memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n)
+    memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n, contact.opening)
     return Start(number, stage, factor, memory)
 
 

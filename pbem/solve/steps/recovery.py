@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.contact.laws import Memory
+from pbem.contact.separating import stick_bonded
 from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.newton import Solution
 from pbem.solve.problem.problem import Problem
@@ -45,7 +46,8 @@ def describe_step(
             traction_s=pairs.p_s,
             internal=memory.internal,
         ),
-        balance=measure_balance(problem, solution.v, load, problem.find_free_motions(solution.modes)),
+        balance=measure_balance(problem, solution.v, load, problem.find_free_motions(
+            stick_bonded(problem.laws, memory, solution.modes))),
         linearity=measure_linearity(mesh, everywhere, pairs.g_s),
         duration=solution.memory.duration,
     )

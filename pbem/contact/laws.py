@@ -43,7 +43,8 @@ class PairLaws:
     strengths: the friction laws, each pair in one group. tensile_strength: stress; gap: initial opening, length.
     bonded pairs always stick without plastic slip; parted pairs ("open") never touch. brittle pairs lose cohesion and
     tensile strength for good. fluid_inside: the fluid pressure also acts in closed parts. compliance_n, compliance_s:
-    length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length.
+    length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length; own_stiffness: of
+    the surroundings of each pair alone.
     leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
     """
 
@@ -57,6 +58,7 @@ class PairLaws:
     compliance_n: Real
     compliance_s: Real
     stiffness: Real
+    own_stiffness: Real
     leader: Integer
 
     @property
@@ -160,6 +162,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         compliance_n=spread([1 / law.normal_stiffness if law.normal_stiffness else 0.0 for law in laws]),
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
         stiffness=SOFTNESS * modulus / length,
+        own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
         leader=_find_leaders(model, mesh),
     )
 

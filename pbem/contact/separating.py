@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.cohesive import Cohesive, Separating
-from pbem.contact.laws import OPEN, STICK, Memory, ModeState, PairLaws, PairState, commit, plastic_slip
+from pbem.contact.cohesive import SEPARATION, Cohesive, Separating
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, commit, plastic_slip
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Bonds:
     start: Mapping[str, NDArray[Any]]
 
     def choose_stiffness(self, laws: PairLaws) -> Real:
-        return self.law.choose_stiffness(laws.stiffness[self.pairs], self.parameters)
+        return self.law.choose_stiffness(laws.own_stiffness[self.pairs], self.parameters)
 
 
 def list_bonds(laws: PairLaws, memory: Memory) -> Iterator[Bonds]:
@@ -95,6 +95,30 @@ def linearise_bonds(
                np.maximum(jump[bonds.pairs[own]], [0.0, -np.inf]))
 
 
+def choose_bond_slip(
+    laws: PairLaws, modes: ModeState, memory: Memory, state: PairState, pressure: Real, slip: Real
+) -> Real:
+    """Plastic slips (m,) at which the laws in these modes are taken next: of the last solution, and of bonded pairs that
+    slip those that belong to their trial values, which softening does not overshoot (theory, 95)."""
+    result, found = slip, plastic_slip(laws, state)
+    for bonds in list_bonds(laws, memory):
+        own = np.flatnonzero(modes.mode[bonds.pairs] == SLIP)
+        if not len(own):
+            continue
+        at, parameters = bonds.pairs[own], {name: values[own] for name, values in bonds.parameters.items()}
+        before = bonds.start[SEPARATION.name][own]
+        effective = state.p_n[at] + np.where(laws.fluid_inside[at], pressure[at], 0.0)
+        rubbing = parameters["friction"] * np.maximum(-effective, 0.0)
+        unit, sign = bonds.law.find_units(parameters)[:, 1], modes.sign[at]
+        ahead = sign * (found[at] - memory.slip[at])
+        relative = bonds.choose_stiffness(laws)[own]
+        trial = (sign * state.p_s[at] - rubbing) / parameters["cohesion"] + relative * (before + ahead / unit)
+        x = np.maximum(bonds.law.softening.invert(trial, relative), before)
+        result = result.copy() if result is slip else result
+        result[at] = memory.slip[at] + sign * unit * (x - before)
+    return result
+
+
 @dataclass(frozen=True)
 class Parting:
     """Of bonded pairs (m,): which they are, which open next, and how far from a change that is (stress)."""
@@ -116,7 +140,7 @@ def judge_bonds(
         strength = bonds.parameters["tensile_strength"]
         pull = trial[:, 0] * strength
         size, slack = np.hypot(np.maximum(trial[:, 0], 0.0), trial[:, 1]), margin / strength
-        gone = bonds.start["separation"] > 0
+        gone = bonds.start[SEPARATION.name] > 0
         gives = gone | np.where(was, size > 1 - slack, size > 1 + slack)
         live[at], opens[at] = True, np.where(was, pull > -margin, pull > margin) & gives
         violation[at] = np.maximum(np.where(gone, 0.0, np.abs(size - 1) * strength), np.abs(pull))

@@ -24,7 +24,7 @@ from pbem.contact.modes import (
     measure_law_error,
     update_active_set,
 )
-from pbem.contact.separating import begin_jump, choose_jump
+from pbem.contact.separating import begin_jump, choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
@@ -210,6 +210,7 @@ def _search_modes(
             found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]
                 now.fingerprint(), at, new, now.mode == SLIP))
         slip = choose_slip(laws, modes, memory, slip, found, former)
+        slip = choose_bond_slip(laws, modes, memory, pairs, load.pressure, slip)
         jump = choose_jump(laws, former, memory, pairs, load.pressure)
         if search.just_returned:
             kept = (modes, normal_traction, slip, jump)

@@ -1,7 +1,7 @@
 """Cohesive faces: tension and shear that fall with opening and slip, until the fracture energies are spent.
 
-Bonds are rigid up to their strengths, sigma in tension and tau in shear. Then the faces separate by (g_n, g_s), and with
-the separations d_n = factor G_I/sigma, d_s = factor G_II/tau and the largest x = |(g_n/d_n, g_s/d_s)| so far the
+Bonds are rigid up to their strengths, sigma in tension and tau in shear. Then the faces separate by (g_n, g_s), with
+the separations d_n = factor G_I/sigma, d_s = factor G_II/tau and the largest x = |(g_n/d_n, g_s/d_s)| so far:
 tractions are S(x) (sigma g_n/d_n, tau g_s/d_s), S = f(x)/x (V. Tvergaard, Mater. Sci. Eng. A 125, 1990; for f linear:
 G. T. Camacho, M. Ortiz, Int. J. Solids Struct. 33, 1996). They part where (p_n/sigma)^2 + (p_s/tau)^2 = 1; along a
 constant ratio of opening and slip they spend G_n and G_s with G_n/G_I + G_s/G_II = 1. Unloading is towards the origin.

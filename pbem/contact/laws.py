@@ -43,8 +43,8 @@ class PairLaws:
     strengths: the friction laws, each pair in one group. tensile_strength: stress; gap: initial opening, length.
     bonded pairs always stick without plastic slip; parted pairs ("open") never touch. brittle pairs lose cohesion and
     tensile strength for good. fluid_inside: the fluid pressure also acts in closed parts. compliance_n, compliance_s:
-    length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length; own_stiffness: of
-    the surroundings of each pair alone.
+    length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length;
+    own_stiffness: of the surroundings of each pair alone.
     leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
     """
 

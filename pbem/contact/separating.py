@@ -98,8 +98,8 @@ def linearise_bonds(
 def choose_bond_slip(
     laws: PairLaws, modes: ModeState, memory: Memory, state: PairState, pressure: Real, slip: Real
 ) -> Real:
-    """Plastic slips (m,) at which the laws in these modes are taken next: of the last solution, and of bonded pairs that
-    slip those that belong to their trial values, which softening does not overshoot (theory, 95)."""
+    """Plastic slips (m,) at which the laws in these modes are taken next: of the last solution, and of bonded pairs
+    that slip those that belong to their trial values, which softening does not overshoot (theory, 95)."""
     result, found = slip, plastic_slip(laws, state)
     for bonds in list_bonds(laws, memory):
         own = np.flatnonzero(modes.mode[bonds.pairs] == SLIP)

@@ -62,7 +62,8 @@ def scale_cohesion(laws: PairLaws, factor: float) -> tuple[StrengthGroup, ...]:
 def remember(slip: Real | float, count: int = 1, path: Real | float = 0.0) -> Memory:
     """A memory of pairs that stuck with the given slip."""
     none = np.zeros(count)
-    return Memory(make_modes(STICK, count=count), none + slip, {"slip_path": none + path, "broken": none > 0}, none, none)
+    internal = {"slip_path": none + path, "broken": none > 0}
+    return Memory(make_modes(STICK, count=count), none + slip, internal, none, none)
 
 
 def friction_bound(laws: PairLaws, p_n: Real, pressure: Real) -> Strength:

@@ -94,7 +94,7 @@ def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState
         Memory(
             _take_modes(memory.modes, pairs), memory.slip[pairs],
             {name: values[pairs] for name, values in memory.internal.items()}, memory.normal_traction[pairs],
-            memory.duration,
+            memory.opening[pairs], memory.duration,
         ),
         pressure[pairs],
         _take_modes(modes, pairs),

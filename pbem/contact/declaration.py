@@ -95,12 +95,14 @@ class FrictionLaw(ABC):
 
     variables: what it remembers beside the common variables. linear: the bound is cohesion - friction p_n whatever was
     before, as Coulomb's. creeps: the bound rises with the rate of slip from nothing, so that closed pairs never stick;
-    then it depends on the step's duration, and `guess_slip` is asked.
+    then it depends on the step's duration, and `guess_slip` is asked. bonds: open pairs have tractions until their
+    bonds are lost (see pbem.contact.cohesive).
     """
 
     variables: tuple[InternalVariable, ...] = ()
     linear = False
     creeps = False
+    bonds = False
 
     @abstractmethod
     def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.contact.cohesive import Cohesive
 from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
 from pbem.contact.friction_bound import Strength
 from pbem.contact.strength import choose_strength
@@ -42,7 +43,8 @@ class PairLaws:
     strengths: the friction laws, each pair in one group. tensile_strength: stress; gap: initial opening, length.
     bonded pairs always stick without plastic slip; parted pairs ("open") never touch. brittle pairs lose cohesion and
     tensile strength for good. fluid_inside: the fluid pressure also acts in closed parts. compliance_n, compliance_s:
-    length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length.
+    length/stress of elastic joints, 0 if rigid. stiffness: trial stiffness r of the mode choice, stress/length;
+    own_stiffness: of the surroundings of each pair alone.
     leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
     rest: the opening of pairs that stick and carry nothing, 0 but where a stage has closed faces that were apart.
     """
@@ -57,6 +59,7 @@ class PairLaws:
     compliance_n: Real
     compliance_s: Real
     stiffness: Real
+    own_stiffness: Real
     leader: Integer
     rest: Real = field(default_factory=lambda: np.zeros(0))
 
@@ -105,13 +108,14 @@ class Memory:
     """What the pairs bring into a step, (m,) each: of the last converged one, and how long this one takes.
 
     slip: plastic slip; internal: values of the internal variables that the laws declare, by their names;
-    normal_traction: stress. duration: of the step that is being solved, 0 where there is no time.
+    normal_traction: stress; opening: g_n. duration: of the step that is being solved, 0 where there is no time.
     """
 
     modes: ModeState
     slip: Real
     internal: Mapping[str, NDArray[Any]]
     normal_traction: Real
+    opening: Real
     duration: float = 0.0
 
     @property
@@ -168,6 +172,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         compliance_n=spread([1 / law.normal_stiffness if law.normal_stiffness else 0.0 for law in laws]),
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
         stiffness=SOFTNESS * modulus / length,
+        own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
         leader=_find_leaders(model, mesh),
     )
 
@@ -288,7 +293,7 @@ def start_memory(laws: PairLaws) -> Memory:
     for variable, at, parameters in _list_parts(laws):
         internal[variable.name][at] = variable.start(parameters)
     zeros = np.zeros(laws.count)
-    return Memory(modes, zeros, internal, zeros).lose(laws.brittle & is_open)
+    return Memory(modes, zeros, internal, zeros, laws.gap).lose(laws.brittle & is_open)
 
 
 def lay_out(laws: PairLaws) -> dict[str, NDArray[Any]]:
@@ -324,4 +329,12 @@ def commit(laws: PairLaws, memory: Memory, modes: ModeState, state: PairState) -
     for variable, at, parameters in _list_parts(laws):
         old = memory.internal[variable.name][at]
         internal[variable.name][at] = variable.advance(old, slipped[at], memory.duration, parameters)
-    return Memory(modes, slip, internal, state.p_n)
+    for group in laws.strengths:
+        if isinstance(group.law, Cohesive):
+            at = group.pairs
+            start = {name: values[at] for name, values in memory.internal.items()}
+            jump = np.stack([state.g_n - laws.compliance_n * state.p_n, slip], axis=1)[at]
+            own = group.law.advance(start, jump, modes.mode[at] == OPEN, slipped[at], group.parameters)
+            for name, values in own.items():
+                internal[name][at] = values
+    return Memory(modes, slip, internal, state.p_n, state.g_n)

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.contact.cohesive import Cohesive
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -25,6 +26,7 @@ from pbem.contact.laws import (
     plastic_slip,
     resists_slip,
 )
+from pbem.contact.separating import begin_jump, judge_bonds, linearise_bonds, measure_bond_error
 
 Frozen = Literal["nothing", "slip", "strength"]
 P_N, P_S, G_N, G_S = range(4)
@@ -57,10 +59,12 @@ def linearise(
     pressure: Real,
     traction_scale: float,
     frozen: Frozen = "nothing",
+    jump: Real | None = None,
 ) -> Linearisation:
     """The affine law of every pair in its mode; a traction is traction_scale times its unknown, a jump the unknown.
 
     p_n, slip (m,): normal tractions and plastic slips at which the friction bound is taken; pressure (m,): of fluid.
+    jump (m, 2): at which the laws of bonds that separate are taken; None for those of the last step.
     frozen: what is left out of the tangent. "slip": how the bound changes with slip; where friction weakens faster than
     the bodies unload, the tangent sends the slip backwards, and with a bound fixed in each iteration it runs on until
     it finds the next equilibrium. "strength": how it changes with the normal traction, too (Tresca's law in each
@@ -98,9 +102,31 @@ def linearise(
     tangent[is_open, G_N, 0] = 1.0
     tangent[is_open, G_S, 1] = 1.0
     offset[is_open, P_N] = -pressure[is_open]
+    _linearise_bonds(laws, modes, memory, begin_jump(laws, memory) if jump is None else jump, frozen, traction_scale,
+                     tangent, offset)
     tangent[laws.follows], offset[laws.follows] = 0.0, 0.0
     tangent[laws.follows, P_N, 0] = tangent[laws.follows, P_S, 1] = traction_scale
     return Linearisation(tangent, offset, laws.leader)
+
+
+def _linearise_bonds(
+    laws: PairLaws, modes: ModeState, memory: Memory, jump: Real, frozen: Frozen, traction_scale: float,
+    tangent: Real, offset: Real,
+) -> None:
+    """Enter open pairs whose bonds act, with what joints add (theory, 92).
+
+    Bonds that have hardly given way are all but rigid in a direction: the unknowns are those that keep the two states
+    that they stand for apart.
+    """
+    units = np.array([traction_scale, traction_scale, 1.0, 1.0])[:, None]
+    for at, law, taken in linearise_bonds(laws, modes, memory, jump, frozen == "nothing"):
+        by_jump, size = law.tangent, np.stack([laws.compliance_n[at], laws.compliance_s[at]], axis=1)
+        constant = law.traction - np.einsum("kij,kj->ki", by_jump, taken)
+        along = np.concatenate([by_jump, np.eye(2) + size[:, :, None] * by_jump], axis=1)
+        if len(at):
+            tangent[at] = np.linalg.qr(along / units)[0] * units
+        offset[at, P_N:G_N] += constant
+        offset[at, G_N:] = size * offset[at, P_N:G_N]
 
 
 def carry_over(state: Real, after: Linearisation, traction_scale: float) -> Real:
@@ -117,8 +143,13 @@ def carry_over(state: Real, after: Linearisation, traction_scale: float) -> Real
 
 
 def tensile_limit(laws: PairLaws, memory: Memory) -> Real:
-    """Tensile strength (m,), none where a brittle bond is lost."""
-    return np.where(memory.broken, 0.0, laws.tensile_strength)
+    """Tensile strength (m,), none where a brittle bond is lost, and what is left of those that soften."""
+    limit = np.where(memory.broken, 0.0, laws.tensile_strength)
+    for group in laws.strengths:
+        if isinstance(group.law, Cohesive):
+            start = {name: values[group.pairs] for name, values in memory.internal.items()}
+            limit[group.pairs] = group.law.find_tension(start, group.parameters)
+    return limit
 
 
 def slip_ahead(modes: ModeState, memory: Memory, slip: Real) -> Real:
@@ -149,7 +180,8 @@ def measure_law_error(
         low, middle, high = (np.sign(each) * find_bound(np.abs(each)) for each in moved)
         inside = (np.minimum(low, high) <= state.p_s) & (state.p_s <= np.maximum(low, high))
         error = np.where(creeps, np.where(inside, 0.0, np.abs(state.p_s - middle)), error)
-    return float(error[slips].max(initial=0.0) / scale) if scale > 0 else 0.0
+    worst = max(float(error[slips].max(initial=0.0)), measure_bond_error(laws, modes, state, memory, pressure))
+    return worst / scale if scale > 0 else 0.0
 
 
 def _largest_traction(state: PairState) -> float:
@@ -255,6 +287,10 @@ def update_active_set(
     same_sign = (modes.mode == SLIP) & (kept | free)
     slips = np.where(same_sign, ahead > -margin, excess > margin) | free | creeps
     intact = laws.brittle & ~memory.broken
+    bonds = judge_bonds(laws, modes, state, memory, pressure, margin)
+    opens = np.where(bonds.live, bonds.opens, opens)
+    # The bond gives way to tension and shear together, no sooner.
+    slips &= ~(bonds.live & (state.p_n + pressure > margin) & ~is_open)
     opens = (opens | laws.parted) & ~laws.bonded & ~intact
     slips &= ~laws.bonded & ~opens & ~intact
     mode = np.where(opens, OPEN, np.where(slips, SLIP, STICK)).astype(np.int8)
@@ -264,6 +300,7 @@ def update_active_set(
     mode, sign, slips, parting, excess = mode[led], sign[led], slips[led], parting[led], excess[led]
     changed = (mode != modes.mode) | (slips & (sign != modes.sign))
     crossing = (mode == OPEN) != is_open
+    parting = np.where(bonds.live, bonds.violation, parting)
     violation = np.where(changed, np.maximum(np.where(crossing, np.abs(parting), np.abs(excess)), 1e-300), 0.0)
     return Proposal(ModeState(mode, sign), violation)
 

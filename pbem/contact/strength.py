@@ -15,6 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pbem.arrays import Bool, Real
+from pbem.contact.cohesive import COHESIVE
 from pbem.contact.custom import CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
 from pbem.contact.friction_bound import Strength
@@ -72,8 +73,9 @@ def _evaluate_cone(p_n: Real, friction: Real, cohesion: Real) -> Strength:
 
 
 coulomb, slip_weakening = Coulomb(), SlipWeakening()
-# Further laws by their names in a case; they are given the keys of their own.
-LAWS: Mapping[str, FrictionLaw] = {"rate_and_state": RateAndState()}
+# Further laws by their names in a case; they are given the keys of their own. Shapes of softening are told apart by
+# `choose_strength`.
+LAWS: Mapping[str, FrictionLaw] = {"rate_and_state": RateAndState(), "cohesive": COHESIVE["linear"]}
 
 
 def list_model_variables(model: Model) -> tuple[InternalVariable, ...]:
@@ -83,6 +85,9 @@ def list_model_variables(model: Model) -> tuple[InternalVariable, ...]:
 
 def choose_strength(law: Law, text: str | None = None) -> tuple[FrictionLaw, dict[str, Value]]:
     """The law and the parameters of an interface; text: of a custom law's file, which is read if not given."""
+    if law.softening is not None:
+        own = {"friction": law.friction, "cohesion": law.cohesion, "tensile_strength": law.tensile_strength}
+        return COHESIVE[law.softening], {**own, **law.parameters}
     if law.kind in LAWS:
         return LAWS[law.kind], dict(law.parameters)
     if law.kind == "custom":

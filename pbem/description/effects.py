@@ -6,32 +6,39 @@ from typing import Any, Literal
 
 from pbem.description.schema import LawTable
 
-Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "custom"]
+Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "custom"]
 
 _FRICTION = ("friction", "friction_angle", "cohesion")
+_STRENGTH = (*_FRICTION, "tensile_strength")
 _WEAKENING = ("friction_dynamic", "slip_distance")
 _JOINT = ("normal_stiffness", "tangential_stiffness")
 _FILE = ("file", "parameters")
 # Keys of further laws that all have to be there, friction as `friction` or `friction_angle`; and those that need not.
 NEEDED: dict[Kind, tuple[str, ...]] = {
     "rate_and_state": ("friction", "rate_effect", "state_effect", "reference_rate", "slip_distance"),
+    "cohesive": ("tensile_strength", "fracture_energy"),
 }
-OPTIONAL: dict[Kind, tuple[str, ...]] = {"rate_and_state": ("initial_state",)}
+OPTIONAL: dict[Kind, tuple[str, ...]] = {
+    "rate_and_state": ("initial_state",),
+    "cohesive": ("cohesion", "fracture_energy_shear", "softening", "friction"),
+}
 # The laws that depend on time.
 TIMED: tuple[Kind, ...] = ("rate_and_state",)
 # Of these the keys that no other law has.
 OWN_KEYS: dict[Kind, tuple[str, ...]] = {
-    kind: tuple(key for key in (*NEEDED[kind], *OPTIONAL[kind]) if key not in (*_FRICTION, *_WEAKENING))
+    kind: tuple(key for key in (*NEEDED[kind], *OPTIONAL[kind]) if key not in (*_STRENGTH, *_WEAKENING))
     for kind in NEEDED
 }
 _FURTHER = tuple(key for keys in OWN_KEYS.values() for key in keys)
+_COHESIVE = OWN_KEYS["cohesive"]
 # Keys of a law's table that would change nothing, by the kind of law.
 WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
     "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", *_FILE, *_FURTHER),
     "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, *_FILE, *_FURTHER),
     "coulomb": (*_FILE, *_FURTHER),
     "frictionless": (*_FILE, *_FURTHER),
-    "rate_and_state": ("cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_FILE),
+    "rate_and_state": ("cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_FILE, *_COHESIVE),
+    "cohesive": ("cohesion_lost", *_WEAKENING, "gap", *_FILE, *OWN_KEYS["rate_and_state"]),
     "custom": (*_FRICTION, *_WEAKENING, *_FURTHER),
 }
 # Keys that say the same.

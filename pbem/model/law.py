@@ -43,6 +43,9 @@ def read_law(
         return Law("bonded", normal_stiffness=joint[0], tangential_stiffness=joint[1]), faults
     if kind == "open":
         return Law("open", gap=gap), faults
+    if kind == "cohesive":
+        law, wrong = _read_cohesive(loc, table, values)
+        return law, [*faults, *wrong]
     if kind in NEEDED:
         parameters, wrong = _read_parameters(loc, table, kind)
         faults += wrong
@@ -71,6 +74,34 @@ def read_law(
         parameters=dict(table.parameters) if kind == "custom" else {},
         frictionless=smooth or 0.0 in (table.friction, table.friction_angle),
     )
+    return law, faults
+
+
+def _read_cohesive(loc: KeyPath, table: LawTable, values: dict[str, Value | None]) -> tuple[Law, list[Fault]]:
+    """The law of bonds that soften; what is not said of shear is as in tension."""
+    given = table.model_fields_set
+    shear = values["cohesion"] if "cohesion" in given else values["tensile_strength"]
+    faults = []
+    missing = [key for key in NEEDED["cohesive"] if key not in given or getattr(table, key) is None]
+    if missing:
+        found = f"law = \"cohesive\" on '{loc[-1]}' without {', '.join(missing)}"
+        faults.append(Fault.at(loc, found, f"all of {', '.join(NEEDED['cohesive'])}"))
+    for key in ("tensile_strength", "cohesion"):
+        if key in given and getattr(table, key) == 0:
+            found = f"{key} = 0 on '{loc[-1]}', whose bonds soften"
+            expected = "a strength > 0, or law = \"coulomb\" for faces without bonds"
+            faults.append(Fault.at((*loc, key), found, expected))
+    tension = table.fracture_energy or 0.0
+    energies = {
+        "fracture_energy": tension,
+        "fracture_energy_shear": tension if table.fracture_energy_shear is None else table.fracture_energy_shear,
+    }
+    law = Law(
+        "cohesive", friction=values["friction"] or 0.0, cohesion=shear or 0.0,
+        tensile_strength=values["tensile_strength"] or 0.0, pressurised=table.pressurised,
+        normal_stiffness=table.normal_stiffness, tangential_stiffness=table.tangential_stiffness, parameters=energies,
+        softening=table.softening or "linear",
+    )  # fmt: skip
     return law, faults
 
 
@@ -147,7 +178,7 @@ def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fau
         found = f"friction_dynamic above the static friction at {format_point(place)}"
         yield Fault.at((*loc, "friction_dynamic"), found, "friction that falls with slip everywhere on the curve")
     least, place = find_least(curve, reaches)
-    if law.tensile_strength and least < 0:
+    if law.tensile_strength and law.softening is None and least < 0:
         found = f"tensile_strength beyond the apex of the cone of friction at {format_point(place)}"
         yield Fault.at((*loc, "tensile_strength"), found, "at most cohesion/friction everywhere on the curve")
 

@@ -53,16 +53,17 @@ class Law:
 
     kind: "bonded" never slips nor parts; "coulomb" sticks, slips, parts; "open" never touches; "custom" is Coulomb-like
     with the friction bound of the function that the Python file `file` registers, called with `parameters`; others are
-    those of `pbem.contact.strength.LAWS`, with these parameters and none of the strengths.
+    those of `pbem.contact.strength.LAWS`, with these parameters and none of the strengths; but "cohesive" has them.
     gap: initial normal opening (length); negative: interference. What may vary along the curve is a number or Varying.
     pressurised: "open": fluid pressure acts in open parts only; "all": in closed parts too.
     cohesion_lost: cohesion and tensile strength are gone after the first slip or parting.
     friction_dynamic, slip_distance: friction falls linearly from `friction` to friction_dynamic over that slip.
     normal_stiffness, tangential_stiffness: elastic joint in front of the law (stress/length); None is rigid.
+    softening: of a cohesive law, its shape (see pbem.contact.softening).
     frictionless: that there is no friction was said, by `law = "frictionless"` or `friction = 0`.
     """
 
-    kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state"]
+    kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state", "cohesive"]
     friction: Value = 0.0
     cohesion: Value = 0.0
     tensile_strength: Value = 0.0
@@ -75,6 +76,7 @@ class Law:
     tangential_stiffness: float | None = None
     file: str | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    softening: str | None = None
     frictionless: bool = field(default=False, compare=False)
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Bool, Complex, Real
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.contact.cohesive import SEPARATION, Cohesive
 from pbem.contact.declaration import BROKEN, SLIP_PATH, Slide
 from pbem.contact.laws import OPEN, SLIP, PairLaws, StrengthGroup, evaluate_strength, start_memory
 from pbem.mesh.mesh import Mesh
@@ -19,7 +20,8 @@ from pbem.solve.problem.step import ContactState
 @dataclass(frozen=True)
 class PairRecord:
     """The pairs (m,) at one time: mode; traction on the first side p_n, p_s; jump g_n, g_s, and what of it the elastic
-    joints do not take, rigid_n and rigid_s; fluid pressure; the internal variables of the laws, by their names."""
+    joints do not take, rigid_n and rigid_s; fluid pressure; the internal variables of the laws, by their names; bond:
+    what bonds that soften would give back in unloading, energy per area."""
 
     mode: NDArray[np.int8]
     p_n: Real
@@ -30,6 +32,7 @@ class PairRecord:
     rigid_s: Real
     pressure: Real
     internal: Mapping[str, NDArray[Any]]
+    bond: Real
 
     @property
     def broken(self) -> Bool:
@@ -65,21 +68,28 @@ def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairR
     n, borne = mesh.pairs.normal, traction[mesh.pairs.first]
     p_n, p_s = (np.conj(n) * borne).real, (np.conj(1j * n) * borne).real
     zeros = np.zeros(laws.count)
-    return PairRecord(memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap, zeros, zeros, memory.internal)
+    return PairRecord(memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap, zeros, zeros, memory.internal, zeros)
 
 
 def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairRecord:
     """After a step, with its fluid pressure (m,)."""
     p_n, p_s = contact.traction_n, contact.traction_s
+    rigid_n, rigid_s = contact.opening - laws.compliance_n * p_n, contact.slip - laws.compliance_s * p_s
+    bond = np.zeros(laws.count)
+    for group in laws.strengths:
+        if isinstance(group.law, Cohesive):
+            at = group.pairs
+            opened = np.where(contact.mode == OPEN, rigid_n, 0.0)
+            jump, state = np.stack([opened, rigid_s], axis=1)[at], _take(contact.internal, at)
+            bond[at] = group.law.store(jump, state, group.parameters)
     return PairRecord(
         contact.mode, p_n, p_s, contact.opening, contact.slip,
-        contact.opening - laws.compliance_n * p_n, contact.slip - laws.compliance_s * p_s,
-        pressure, contact.internal,
+        rigid_n, rigid_s, pressure, contact.internal, bond,
     )  # fmt: skip
 
 
 def measure_stored(weight: Real, record: PairRecord) -> float:
-    """Energy in the elastic joints: half the traction on the joint's part of the jump."""
+    """Energy in the elastic joints, half the traction on the joint's part of the jump, and in bonds that soften."""
     return float(weight @ _store(record))
 
 
@@ -100,10 +110,14 @@ def measure_work(
     falling = np.maximum(0.5 * (np.where(closed, old.p_s, 0.0) + new.p_s) * slipped, 0.0)
     by_law = falling.copy()
     for group in laws.strengths:
-        if group.law.integrates and slides[group.pairs].any():
+        if group.law.integrates and not group.law.bonds and slides[group.pairs].any():
             by_law[group.pairs] = _integrate_bound(laws, group, old, new, slipped)
     dissipated = np.where(slides & ~lost, by_law, falling) + torn
     friction = np.where(slides, by_law, np.where(lost, 0.0, falling))
+    for group in laws.strengths:
+        if isinstance(group.law, Cohesive):
+            at = group.pairs
+            dissipated[at] = friction[at] = _dissipate_bonds(group.law, group, old, new)
     opened = np.zeros(laws.count, dtype=bool) if opened is None else opened
     taken = np.where(opened, trapezoid - stored, 0.0)
     dissipated, friction = (np.where(opened, 0.0, each) for each in (dissipated, friction))
@@ -120,7 +134,28 @@ def measure_work(
 
 def _store(record: PairRecord) -> Real:
     normal, tangential = record.g_n - record.rigid_n, record.g_s - record.rigid_s
-    return 0.5 * (record.p_n * normal + record.p_s * tangential)
+    return 0.5 * (record.p_n * normal + record.p_s * tangential) + record.bond
+
+
+def _take(internal: Mapping[str, NDArray[Any]], pairs: Integer) -> dict[str, NDArray[Any]]:
+    return {name: values[pairs] for name, values in internal.items()}
+
+
+def _dissipate_bonds(law: Cohesive, group: StrengthGroup, old: PairRecord, new: PairRecord) -> Real:
+    """What the pairs (k,) of a cohesive law dissipate in a step, energy per area: by damage where they end open, by the
+    integral of the friction bound, less what is stored more in the bonds, where they slide (theory, 96)."""
+    at, parameters = group.pairs, group.parameters
+    before, after = _take(old.internal, at), _take(new.internal, at)
+    jumps = [
+        np.stack([np.where(each.mode == OPEN, each.rigid_n, 0.0), each.rigid_s], axis=1)[at] for each in (old, new)
+    ]
+    opened = law.dissipate_open(jumps[0], jumps[1], before, after, parameters)
+    pressed = -np.minimum(0.5 * (np.where(old.mode == OPEN, 0.0, old.p_n) + new.p_n)[at], 0.0)
+    slid = np.abs(new.rigid_s - old.rigid_s)[at]
+    bound = law.work_of_bond(before[SEPARATION.name], after[SEPARATION.name], parameters)
+    rubbed = bound + parameters["friction"] * pressed * slid - (new.bond - old.bond)[at]
+    mode = new.mode[at]
+    return np.maximum(np.where(mode == OPEN, opened, np.where(mode == SLIP, rubbed, 0.0)), 0.0)
 
 
 # Gauss points and weights on (0, 1).

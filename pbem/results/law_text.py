@@ -51,7 +51,7 @@ def collect_equal_laws(model: Model) -> list[LawOfMany]:
 # All that tells one law from another, but for the parameters.
 _FIELDS = (
     "kind", "friction", "cohesion", "tensile_strength", "gap", "pressurised", "cohesion_lost", "friction_dynamic",
-    "slip_distance", "normal_stiffness", "tangential_stiffness", "file", "frictionless",
+    "slip_distance", "normal_stiffness", "tangential_stiffness", "file", "softening", "frictionless",
 )  # fmt: skip
 
 
@@ -62,12 +62,14 @@ def list_law_rows(model: Model) -> list[list[str]]:
 
 def _make_row(each: LawOfMany) -> list[str]:
     law = each.law
-    known = law.kind == "coulomb"
+    known = law.kind in ("coulomb", "cohesive")
     strengths = [f"{value:g}" if known else "-" for value in (law.friction, law.cohesion)]
-    tension = f"{law.tensile_strength:g}" if law.kind in ("coulomb", "custom") else "-"
+    tension = f"{law.tensile_strength:g}" if law.kind in ("coulomb", "cohesive", "custom") else "-"
     weakening = []
     if law.friction_dynamic is not None:
         weakening.append(f"friction to {law.friction_dynamic:g} over slip {law.slip_distance or 0.0:g}")
+    if law.softening is not None:
+        weakening.append(f"{law.softening} softening")
     if law.cohesion_lost:
         weakening.append("strength lost at first failure")
     stiffness = (law.normal_stiffness, law.tangential_stiffness)

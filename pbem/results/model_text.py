@@ -161,6 +161,10 @@ def describe_law(law: Law) -> str:
     """The kind of the law with every strength that is not zero."""
     if law.kind != "coulomb":
         numbers = law.parameters if law.kind != "custom" else {}
+        if law.softening is not None:
+            strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
+            told = [f"{name} {value:.4g}" for name, value in {**strengths, **law.parameters}.items()]
+            return ", ".join([law.kind, f"{law.softening} softening", *told]).replace("_", " ")
         return ", ".join([law.kind, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())])
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]

@@ -46,7 +46,7 @@ def make_laws(count: int = 1, friction: object = FRICTION, cohesion: object = 0.
     """Coulomb's law for all pairs: friction without cohesion or strength, unless told otherwise."""
     defaults: dict[str, object] = {
         "tensile_strength": 0.0, "gap": 0.0, "bonded": False, "parted": False, "brittle": False, "fluid_inside": False,
-        "compliance_n": 0.0, "compliance_s": 0.0, "stiffness": STIFFNESS,
+        "compliance_n": 0.0, "compliance_s": 0.0, "stiffness": STIFFNESS, "own_stiffness": STIFFNESS,
     }  # fmt: skip
     parameters = {"friction": np.full(count, friction), "cohesion": np.full(count, cohesion)}
     strengths = (StrengthGroup(coulomb, np.arange(count), parameters),)
@@ -62,7 +62,8 @@ def scale_cohesion(laws: PairLaws, factor: float) -> tuple[StrengthGroup, ...]:
 def remember(slip: Real | float, count: int = 1, path: Real | float = 0.0) -> Memory:
     """A memory of pairs that stuck with the given slip."""
     none = np.zeros(count)
-    return Memory(make_modes(STICK, count=count), none + slip, {"slip_path": none + path, "broken": none > 0}, none)
+    internal = {"slip_path": none + path, "broken": none > 0}
+    return Memory(make_modes(STICK, count=count), none + slip, internal, none, none)
 
 
 def friction_bound(laws: PairLaws, p_n: Real, pressure: Real) -> Strength:

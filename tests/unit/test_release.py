@@ -10,7 +10,7 @@ import pytest
 
 from pbem.case.build import parse_model
 from pbem.contact.free_motions import find_free_motions, find_ties
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.rigid_body_modes import find_rigid_body_modes
@@ -83,7 +83,7 @@ def test_released_anchors_leave_the_equations_without_them(linear: str, tmp_path
     problem = make_stack(tmp_path, linear)
     modes, load = choose_modes(problem, STICK, slice(2, 20)), problem.evaluate_load(0, 1.0)
     law = linearise_pairs(problem, modes)
-    constraints = Hold(problem).release(problem.constrain(law, load), modes)
+    constraints = Hold(problem, start_memory(problem.laws)).release(problem.constrain(law, load), modes)
     tangent = problem.make_tangent()
     assert isinstance(tangent, ReleasedTangent)
     solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
@@ -111,7 +111,7 @@ def test_anchors_of_motions_that_stay_free_go_on_acting(tmp_path: Path) -> None:
     problem = make_stack(tmp_path)
     modes, load = choose_modes(problem, SLIP, slice(0, 24)), problem.evaluate_load(0, 1.0)
     law = linearise_pairs(problem, modes)
-    constraints = Hold(problem).release(problem.constrain(law, load), modes)
+    constraints = Hold(problem, start_memory(problem.laws)).release(problem.constrain(law, load), modes)
     tangent = problem.make_tangent()
     solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
     support = problem.find_free_motions(modes)

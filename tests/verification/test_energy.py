@@ -270,7 +270,8 @@ def test_weights_of_tip_elements_integrate_the_root() -> None:
 
 def make_record(mode: np.int8, p_n: float, p_s: float, g_n: float, slip: float, broken: bool = False) -> PairRecord:
     p, s, g, h, zero = (np.array([float(value)]) for value in (p_n, p_s, g_n, slip, 0))
-    return PairRecord(np.array([mode]), p, s, g, h, g, h, zero, {"slip_path": zero, "broken": np.array([broken])})
+    return PairRecord(np.array([mode]), p, s, g, h, g, h, zero, {"slip_path": zero, "broken": np.array([broken])},
+                      zero)
 
 
 def measure_one(old: PairRecord, new: PairRecord, law: Law) -> PairWork:

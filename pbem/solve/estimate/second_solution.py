@@ -98,7 +98,7 @@ class SecondSolution:
         """
         problem, beside, contact = self.problem, self.beside, step.contact
         memory = replace(self.memory, duration=step.duration).lose(self._carry_internal(contact)[BROKEN.name])
-        hold = Hold(problem)
+        hold = Hold(problem, memory)
         modes = do_on_first(problem.comm, ConvergenceError, lambda: follow_leaders(
             problem.laws, hold.apply(self._guess_modes(contact), problem.laws.gap, np.zeros(problem.laws.count))))
         law = linearise(
@@ -139,7 +139,7 @@ class SecondSolution:
         tangential = beside.carry_pairs(contact.traction_s, jumps=False)
         self.memory = Memory(
             self._guess_modes(contact), slip - laws.compliance_s * tangential, self._carry_internal(contact),
-            beside.carry_pairs(contact.traction_n, jumps=False),
+            beside.carry_pairs(contact.traction_n, jumps=False), beside.carry_pairs(contact.opening, jumps=True),
         )
         self._contact = ContactState(
             self.memory.modes.mode, beside.carry_pairs(contact.opening, jumps=True), slip,

@@ -13,12 +13,14 @@ from pbem.contact.cut_parts import CutMotion
 from pbem.contact.floating import measure_space
 from pbem.contact.free_motions import (
     CLOSED_AT_LEAST,
+    FreeMotions,
     close_nearest_beside,
     close_nearest_pairs,
     stick_calmest_pairs,
 )
-from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, resists_slip
 from pbem.contact.loads import Load
+from pbem.contact.separating import stick_bonded
 from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance
@@ -49,8 +51,9 @@ class Hold:
     pairs push the body, it moves until its contacts hold it: from then on (driven) no free motion is left to anchors.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, memory: Memory) -> None:
+        self.problem, self.memory = problem, memory
+        self.settled: PairState | None = None
         self.pairs: Integer = np.zeros(0, dtype=np.int64)
         self.count = 0
         self.driven = False
@@ -67,7 +70,7 @@ class Hold:
         """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
         if not self.problem.anchors:
             return constraints
-        released = broadcast(self.problem.comm, self.problem.find_free_motions(modes).released)
+        released = broadcast(self.problem.comm, self._find_free_motions(modes).released)
         return replace(constraints, released=released)
 
     def is_driven(self, modes: ModeState, v: Real, load: Load) -> bool:
@@ -77,7 +80,7 @@ class Hold:
         """
         if self.driven or not self.problem.anchors:
             return False
-        support = self.problem.find_free_motions(modes)
+        support = self._find_free_motions(modes)
         carried = measure_balance(self.problem, v, load, support).carried.max(initial=0.0) > DRIVEN
         self.driven = broadcast(self.problem.comm, bool(carried))
         return self.driven
@@ -139,15 +142,15 @@ class Hold:
         Parts are held one pair at a time, as every one that is closed to hold them can pull at them.
         """
         problem = self.problem
-        for body in {body for motion in problem.find_cut_motions(modes) for body in motion.moving}:
+        for body in {body for motion in self._find_cut_motions(modes) for body in motion.moving}:
             modes = self._place_block(body, modes, opening, before) if problem.parts.block[body] else modes
-        motions = problem.find_cut_motions(modes)
+        motions = self._find_cut_motions(modes)
         if motions and before is not None and self.count < MOST_HELD:
             beside = problem.cut.find_beside(motions)
             overloaded = np.intersect1d(self._find_overloaded(before, modes), np.flatnonzero(beside >= 0))
-            modes = self._stick(beside, modes, slip, overloaded, lambda trial: not problem.find_cut_motions(trial))
+            modes = self._stick(beside, modes, slip, overloaded, lambda trial: not self._find_cut_motions(trial))
         for _ in range(CLOSED_AT_LEAST):
-            motions = problem.find_cut_motions(modes)
+            motions = self._find_cut_motions(modes)
             if not motions:
                 break
             modes = close_nearest_beside(problem.laws, modes, opening, problem.cut.find_beside(motions))
@@ -191,7 +194,7 @@ class Hold:
             loose = ~(problem.laws.bonded | (problem.laws.tensile_strength > 0))[own]
             if measure_space(pairs.position[own], normal, state.g_n[own]).is_wide:
                 mode[own[loose]] = OPEN
-        return problem.find_cut_motions(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else ()
+        return self._find_cut_motions(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else ()
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of what holds a body in the end."""
@@ -210,7 +213,7 @@ class Hold:
             return ()
         released = ModeState(modes.mode.copy(), modes.sign)
         released.mode[held] = SLIP
-        free = self.find_free(released) or "; ".join(each.text for each in self.problem.find_cut_motions(released))
+        free = self.find_free(released) or "; ".join(each.text for each in self._find_cut_motions(released))
         if not free:
             return ()
         mesh = self.problem.mesh
@@ -223,12 +226,21 @@ class Hold:
 
     def find_free(self, modes: ModeState) -> str | None:
         """The motions that neither pairs nor anchors hold, in words; None if there are none."""
-        support = self.problem.find_free_motions(modes)
+        support = self._find_free_motions(modes)
         return (support.text or None) if self.driven else support.unheld
+
+    def _find_free_motions(self, modes: ModeState) -> FreeMotions:
+        return self.problem.find_free_motions(self._stick_bonded(modes))
+
+    def _find_cut_motions(self, modes: ModeState) -> tuple[CutMotion, ...]:
+        return self.problem.find_cut_motions(self._stick_bonded(modes))
+
+    def _stick_bonded(self, modes: ModeState) -> ModeState:
+        return stick_bonded(self.problem.laws, self.memory, modes, self.settled)
 
     def leaves_free(self, modes: ModeState) -> bool:
         """Whether neither pairs nor anchors hold some body, or part of one, in given modes."""
-        return bool(self.find_free(modes) or self.problem.find_cut_motions(modes))
+        return bool(self.find_free(modes) or self._find_cut_motions(modes))
 
     def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:
         """The error that names what can move freely in the present contact; None if nothing can."""
@@ -236,7 +248,7 @@ class Hold:
         if free:
             advice = "hold it by a condition, or use shorter elements where it touches"
             return ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; {advice}")
-        return self._describe_cut(self.problem.find_cut_motions(modes))
+        return self._describe_cut(self._find_cut_motions(modes))
 
     def describe_floating(self, modes: ModeState) -> ConvergenceError | None:
         """The error of a search that found no end as blocks were held that touch nothing in some place; None if none.
@@ -249,7 +261,7 @@ class Hold:
             if measure_space(self.problem.mesh.pairs.position[own], normal, self.state.g_n[own]).is_wide:
                 mode[own] = OPEN
         free = ModeState(mode, modes.sign)
-        return self._describe_cut(self.problem.find_cut_motions(free)) if (mode != modes.mode).any() else None
+        return self._describe_cut(self._find_cut_motions(free)) if (mode != modes.mode).any() else None
 
     def _describe_cut(self, motions: tuple[CutMotion, ...]) -> ConvergenceError | None:
         if not motions:
@@ -273,8 +285,9 @@ class Hold:
         state: of all pairs in a solution, with the pressure of fluids on them (m,). Single blocks of a network that
         float, where other blocks are held, are noted: all but their own displacement is determined.
         """
+        self.settled = state
         error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
-        self.floating = ()
+        self.settled, self.floating = None, ()
         if error is None and state is not None and pressure is not None:
             floating, block = self.find_floating(modes, state, pressure), self.problem.parts.block
             moving = np.array([body for each in floating for body in each.moving], dtype=np.int64)

@@ -24,6 +24,7 @@ from pbem.contact.modes import (
     measure_law_error,
     update_active_set,
 )
+from pbem.contact.separating import begin_jump, choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
@@ -123,18 +124,18 @@ def _search_modes(
 ) -> Solution:
     """See solve_step; by one search, whose iterations join those before."""
     laws = problem.laws
-    hold = Hold(problem)
+    hold = Hold(problem, memory)
     comm = problem.comm
     modes = problem.decide(lambda: follow_leaders(
         laws, hold.apply(memory.modes, problem.approached, np.zeros(laws.count))))
-    normal_traction, slip = memory.normal_traction, begin_slip(laws, modes, memory)
-    fixed_point, kept = FixedPoint(), (modes, normal_traction, slip)
+    normal_traction, slip, jump = memory.normal_traction, begin_slip(laws, modes, memory), begin_jump(laws, memory)
+    fixed_point, kept = FixedPoint(), (modes, normal_traction, slip, jump)
     products = problem.system.products
     while True:
         begin = time.perf_counter()
         law = linearise(
             laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale,
-            search.globalisation.frozen,
+            search.globalisation.frozen, jump,
         )
         constraints = hold.release(problem.constrain(law, load), modes)
         try:
@@ -186,7 +187,7 @@ def _search_modes(
         if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
         if left:
-            modes, normal_traction, slip = kept
+            modes, normal_traction, slip, jump = kept
             continue
         chosen = cascade.modes if cascade else None
         # The first rank alone knows which pairs hold a body.
@@ -210,8 +211,10 @@ def _search_modes(
             found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]
                 now.fingerprint(), at, new, now.mode == SLIP))
         slip = choose_slip(laws, modes, memory, slip, found, former)
+        slip = choose_bond_slip(laws, modes, memory, pairs, load.pressure, slip)
+        jump = choose_jump(laws, former, memory, pairs, load.pressure)
         if search.just_returned:
-            kept = (modes, normal_traction, slip)
+            kept = (modes, normal_traction, slip, jump)
 
 
 def _tell(reporter: Reporter, iteration: Iteration, modes: ModeState) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbem.contact.cohesive import SEPARATION
 from pbem.contact.laws import Memory
+from pbem.contact.separating import find_bonded
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
 from pbem.solve.steps.ceiling import Ceiling
 from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
 
+# Reasons for which a step without equilibrium can fail.
+UNSETTLED = ("iteration limit", "mode cycle", "singular tangent", "no admissible modes")
 # The end of what is said of a limit load.
 BEYOND = "prescribe a displacement in place of the load to go beyond"
 
@@ -64,6 +68,15 @@ def end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceE
     )
 
 
+def _list_softening(problem: Problem, memory: Memory) -> str:
+    """The interfaces whose bonds have given way in part, quoted; "" if none."""
+    bonded = find_bonded(problem.laws, memory)
+    if not bonded.any():
+        return ""
+    own = np.unique(problem.mesh.pairs.interface[bonded & (memory.internal[SEPARATION.name] > 0)])
+    return ", ".join(repr(problem.mesh.interface_names[number]) for number in own)
+
+
 def end_march(
     problem: Problem, memory: Memory, stage: int, reached: float, target: float, error: ConvergenceError
 ) -> ConvergenceError:
@@ -77,6 +90,14 @@ def end_march(
             "limit load",
             f"limit load reached at fraction {reached:.6g} of stage {name!r}, no equilibrium at {target:.6g}: there "
             f"{error.detail}; {BEYOND}",
+        )
+    softening = _list_softening(problem, memory) if error.reason in UNSETTLED else ""
+    if softening:
+        return ConvergenceError(
+            "limit load",
+            f"limit load reached at fraction {reached:.6g} of stage {name!r}: the bonds of {softening} soften, and no "
+            f"equilibrium was found at {target:.6g} ({error.detail}); more than this they do not bear, or the faces "
+            f"snap back; {BEYOND}",
         )
     # Of the whole stage: whether a try went beyond the bound depends on the steps.
     balanced = find_balanced(problem, memory, stage, reached, 1.0)

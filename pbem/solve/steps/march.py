@@ -57,7 +57,7 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     """The state of a stored step."""
     modes = resume_modes(contact)
     elastic = problem.laws.compliance_s * contact.traction_s
-    memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n)
+    memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n, contact.opening)
     return Start(number, stage, factor, memory, contact)
 
 

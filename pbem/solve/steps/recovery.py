@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.contact.laws import Memory
+from pbem.contact.separating import stick_bonded
 from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.newton import Solution
 from pbem.solve.problem.problem import Problem
@@ -30,7 +31,7 @@ def describe_step(
     order = problem.second_faces
     pairs = solution.pairs
     everywhere = np.concatenate([displacement, opposite[order]])
-    free = problem.find_free_motions(solution.modes)
+    free = problem.find_free_motions(stick_bonded(problem.laws, memory, solution.modes))
     slip, reactions = pairs.g_s, {}
     settled = settle(problem, load, everywhere, traction, stage, factor, free.motions if free.unheld is None else ())
     if settled is not None:

@@ -32,6 +32,7 @@ from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
+from pbem.model.recall import Recall
 from pbem.model.resultants import describe_unbalance
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
@@ -80,24 +81,32 @@ def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     return tuple(shown)
 
 
-def examine(case: Case, conditions_known: bool = True) -> tuple[Model | None, list[Fault]]:
-    """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged."""
-    model, case, faults = _examine(case, conditions_known)
+def examine(
+    case: Case, conditions_known: bool = True, recall: Recall | None = None
+) -> tuple[Model | None, list[Fault]]:
+    """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged.
+
+    recall: what was found of the curves of the last case, for this one if it has the same.
+    """
+    model, case, faults = _examine(case, conditions_known, recall or Recall())
     return model, [case.trace(fault) for fault in faults]
 
 
-def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, list[Fault]]:
+def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model | None, Case, list[Fault]]:
     """As above, with the case in which cracks that cross are cut."""
     roles = resolve_roles(case)
-    cut = cut_cracks(case, roles, shape_curves(case, roles))
+    shown = (roles, case.curves, case.regions, case.analysis, case.origin)
+    shapes = recall.find("shapes", shown, lambda: shape_curves(case, roles))
+    cut = cut_cracks(case, roles, shapes)
     case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
-    topology = _find_topology(cut)
+    drawn = (*shown, cut.notes, cut.faults, case.curves)
+    topology = recall.find("topology", drawn, lambda: _find_topology(cut))
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *topology.faults, *loading.faults, *wrong]
     if faults:
         return None, case, faults
-    model, faults = _compose(case, roles, loading, topology)
+    model, faults = _compose(case, roles, loading, topology, recall)
     model = replace(model, interior_points=interior)
     faults += [*check_turning(case, model.curves), *check_facing(model)]
     varying = [
@@ -154,7 +163,9 @@ def _find_topology(cut: Cut) -> _Topology:
     return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, tuple(notes), tuple(faults))
 
 
-def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
+def _compose(
+    case: Case, roles: Roles, loading: Loading, topology: _Topology, recall: Recall
+) -> tuple[Model, list[Fault]]:
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,
@@ -178,8 +189,10 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         Region(name, materials[table.material], topology.loops[name], tuple(table.cracks), table.infinite)
         for name, table in case.regions.items()
     )
-    fitted = fit_curves(
-        case, curves, regions, topology.tips, frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    jointed = frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    fitted = recall.find(
+        "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed),
+        lambda: fit_curves(case, curves, regions, topology.tips, jointed),
     )
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",

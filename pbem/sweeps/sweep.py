@@ -21,7 +21,9 @@ from pbem.description import case as description
 from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
+from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
@@ -55,7 +57,8 @@ class Plan:
 
 @dataclass(frozen=True)
 class Setting:
-    """What holds for all cases of a sweep. label: how messages name what was set. checked: models that are there."""
+    """What holds for all cases of a sweep. label: how messages name what was set. checked: models that are there;
+    recall: what was found of the last case."""
 
     case: Source
     fixed: Mapping[str, Any]
@@ -65,6 +68,7 @@ class Setting:
     neighbours: bool
     label: Label
     checked: dict[tuple[str, ...], Model] = field(default_factory=dict)
+    recall: Recall = field(default_factory=Recall)
 
     @property
     def name(self) -> str:
@@ -145,7 +149,7 @@ def _cells(values: Mapping[str, Any]) -> tuple[str, ...]:
 def _make_model(setting: Setting, values: Mapping[str, Any]) -> Model:
     model = setting.checked.pop(_cells(values), None)
     if model is None:
-        model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
+        model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label, setting.recall)
     return impose_operator(model, setting.name, setting.operator)
 
 
@@ -158,7 +162,7 @@ def _make_plan(
     cases = list(combine(several))
     first = _check_values_alone(setting, several, cases[0])
     check_options(setting.name, first.solver.petsc, setting.petsc)
-    mesh = generate_mesh(first)
+    mesh = _mesh(setting, first)
     names = list_quantity_names(first, mesh)
     wanted = tuple(choose_quantities(first, names) if quantities is None else quantities)
     columns = read_quantities(wanted, names, option)
@@ -197,7 +201,7 @@ def _check_values_alone(
     tried = [dict(first), *({**first, key: each} for key, values in several.items() for each in values[1:])]
     for values in tried:
         try:
-            model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
+            model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label, setting.recall)
         except CaseError as error:
             faults |= dict.fromkeys(error.faults)
             source = error.source
@@ -317,10 +321,17 @@ def compute_case(
     return Row(_cells(values), tuple(found), status, outcome.iterations, time.perf_counter() - begun, reason)
 
 
+def _mesh(setting: Setting, model: Model) -> Mesh:
+    """The mesh of the last case if this one has the same: neither laws nor conditions are part of it."""
+    joints = [(each.name, each.first, each.second) for each in (*model.interfaces.values(), *model.contacts.values())]
+    given = (model.curves, model.regions, joints, len(model.contacts), model.crack_tips, model.analysis, model.size)
+    return setting.recall.find("mesh", given, lambda: generate_mesh(model))
+
+
 def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems, signals: StopSignals) -> None:
     """March through the history, without a result file."""
     comm = kept.comm
-    mesh = generate_mesh(model)
+    mesh = _mesh(setting, model)
     check_shares(model, mesh, comm.size)
     if comm.rank == 0:
         outcome.expect(model, mesh)

@@ -31,13 +31,14 @@ from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
+from pbem.solve.steps.prediction import Place
 from pbem.solve.system.kept import KeptProblems
 from pbem.sweeps.files import name_results
 from pbem.sweeps.outcome import AbsentNameError, Names, Outcome, list_quantity_names
 from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, Table, TableFile
-from pbem.sweeps.values import check_combinations, check_values, combine, write_cell
+from pbem.sweeps.values import check_combinations, check_values, combine, find_place, write_cell
 
 # Models that were made to try the values and are kept until they are computed.
 MOST_CHECKED = 32
@@ -272,7 +273,7 @@ def _compute_all(
         signals.at_once = group.comm.size == 1
 
         def compute(values: dict[str, Any]) -> Row:
-            return compute_case(setting, values, columns, kept, signals)
+            return compute_case(setting, values, columns, kept, signals, find_place(values, keeper.several))
 
         group.share_out(plan.todo, compute, keeper.add)
     return broadcast(comm, do_on_first(comm, PbemError, keeper.finish, share=False))  # type: ignore[no-any-return]
@@ -290,9 +291,13 @@ def _keep(comm: Comm) -> Iterator[KeptProblems]:
 
 
 def compute_case(
-    setting: Setting, values: dict[str, Any], columns: Sequence[Quantity], kept: KeptProblems, signals: StopSignals
+    setting: Setting, values: dict[str, Any], columns: Sequence[Quantity], kept: KeptProblems, signals: StopSignals,
+    place: Place,
 ) -> Row:
-    """The row of one case; all ranks of `kept.comm` call this together, and the first knows the quantities."""
+    """The row of one case; all ranks of `kept.comm` call this together, and the first knows the quantities.
+
+    place: among the other cases.
+    """
     begun = time.perf_counter()
     comm, status, reason = kept.comm, "finished", ""
     outcome = Outcome()
@@ -301,7 +306,7 @@ def compute_case(
         if setting.keep is not None or model.analysis.accuracy is not None:
             _run_with_file(setting, values, outcome, kept)
         else:
-            _solve(model, setting, outcome, kept, signals)
+            _solve(model, setting, outcome, columns, kept, signals, place)
     except CaseError as error:
         status, reason = "refused", "; ".join(str(fault) for fault in error.faults)
     except (ConvergenceError, LawError) as error:
@@ -323,12 +328,16 @@ def compute_case(
 
 def _mesh(setting: Setting, model: Model) -> Mesh:
     """The mesh of the last case if this one has the same: neither laws nor conditions are part of it."""
-    joints = [(each.name, each.first, each.second) for each in (*model.interfaces.values(), *model.contacts.values())]
-    given = (model.curves, model.regions, joints, len(model.contacts), model.crack_tips, model.analysis, model.size)
+    interfaces = [(each.name, each.first, each.second) for each in model.interfaces.values()]
+    contacts = [(each.name, each.first, each.second) for each in model.contacts.values()]
+    given = (model.curves, model.regions, interfaces, contacts, model.crack_tips, model.analysis, model.size)
     return setting.recall.find("mesh", given, lambda: generate_mesh(model))
 
 
-def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems, signals: StopSignals) -> None:
+def _solve(
+    model: Model, setting: Setting, outcome: Outcome, columns: Sequence[Quantity], kept: KeptProblems,
+    signals: StopSignals, place: Place,
+) -> None:
     """March through the history, without a result file."""
     comm = kept.comm
     mesh = _mesh(setting, model)
@@ -341,10 +350,10 @@ def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems,
         watch.look_after(problem.laws)
         watch.check()
         try:
-            tangent, guess = kept.take_tangent(problem), kept.guess_modes(problem) if setting.neighbours else None
-            kept.remember_modes(problem, {
-                (step.stage, step.factor): step.contact for step in march(problem, watch, None, tangent, guess)
-            })
+            tangent = kept.take_tangent(problem)
+            guess = kept.guess_modes(problem, place) if setting.neighbours else None
+            steps = march(problem, watch, None, tangent, guess, any(each.of_faces for each in columns))
+            kept.remember(problem, place, {(step.stage, step.factor): step.contact for step in steps})
         except ConvergenceError:
             watch.check()  # a law that failed has answered with no strength
             raise

@@ -18,7 +18,7 @@ from pbem.contact.strength import check_custom_laws, list_laws
 from pbem.description import case as description
 from pbem.description.case import Draft
 from pbem.errors import CaseError
-from pbem.model.build import build_model, examine, shorten
+from pbem.model.build import build_model, examine, limit_faults
 from pbem.model.model import Model
 from pbem.model.recall import Recall
 
@@ -60,7 +60,7 @@ def _build(
         found = add_lines(found, draft.lines)
     faults = [*draft.faults, *found]
     if draft.case is None or model is None or faults:
-        raise CaseError(source, shorten(faults))
+        raise CaseError(source, limit_faults(faults))
     return draft.case, replace(model, overrides=write_overrides(changes))
 
 

@@ -61,11 +61,11 @@ def build_model(case: Case) -> Model:
     """Resolve and check a case. Raises CaseError with every fault of names, topology, laws, loads and support."""
     model, faults = examine(case)
     if model is None or faults:
-        raise CaseError(case.source, shorten(faults))
+        raise CaseError(case.source, limit_faults(faults))
     return model
 
 
-def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
+def limit_faults(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     """Each fault once; of many at the same table [[generate]] the first few, and how many more there are."""
     shown: list[Fault] = []
     counts: Counter[str] = Counter()

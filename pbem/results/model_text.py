@@ -13,7 +13,8 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Condition, Law, Model, Region, Stage
 from pbem.results.doubts import list_doubts
 from pbem.results.law_text import TITLES, list_law_rows
-from pbem.results.text_tables import count, format_bytes, format_number, section, shorten, table
+from pbem.results.text_tables import format_bytes, format_number, section, shorten, table
+from pbem.wording import count
 
 
 def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -> str:

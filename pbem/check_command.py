@@ -32,8 +32,9 @@ def check(case: Path, changes: Mapping[str, Any], ranks: int, as_json: bool, plo
     Raises CaseError with all its faults, LaunchError where there is not the memory for it.
     """
     from pbem.case.build import read_checked_model
+    from pbem.environment import is_set
     from pbem.forecast.forecast import make_forecast, refuse_memory
-    from pbem.forecast.limits import is_allowed, read_limits
+    from pbem.forecast.limits import OVERRIDE, read_limits
     from pbem.mesh.generate import generate_mesh
     from pbem.results.model_summary import summarise_model
     from pbem.results.model_text import describe_model
@@ -45,7 +46,7 @@ def check(case: Path, changes: Mapping[str, Any], ranks: int, as_json: bool, plo
     mesh = generate_mesh(model)
     forecast = make_forecast(model, mesh, ranks)
     refusal = refuse_memory(forecast, ranks, read_limits(os.environ))
-    if refusal and not is_allowed(os.environ):
+    if refusal and not is_set(os.environ, OVERRIDE):
         raise LaunchError(f"{case}: {refusal}")
     if as_json:
         text = json.dumps(summarise_model(model, mesh, forecast), indent=1)

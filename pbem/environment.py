@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pbem.wording import count
+
 # Rank and number of ranks as launchers write them. What was started last comes first: mpirun within a job step of
 # Slurm leaves the variables of both.
 LAUNCHERS = (
@@ -176,7 +178,7 @@ def refuse_threads(sites: Sequence[Site]) -> str | None:
     if max(threads) <= 1 or sum(threads) <= cores:
         return None
     name, most = max((pair for site in sites for pair in site.threads), key=lambda pair: pair[1])
-    ranks = _count(len(sites), "rank")
+    ranks = count(len(sites), "rank")
     bound = max(len(site.cores) for site in sites) < sites[0].online
     binding = (
         ",\n  or give each rank more cores: mpirun --map-by slot:PE=THREADS or --bind-to none, srun --cpus-per-task"
@@ -185,7 +187,7 @@ def refuse_threads(sites: Sequence[Site]) -> str | None:
     )
     return (
         f"{ranks} on node {sites[0].host} with up to {most} threads each ({name} = {most}) are {sum(threads)} threads, "
-        f"but the ranks may use {cores:g} of its {_count(sites[0].online, 'core')}.\n  Set {name}=1{binding}; "
+        f"but the ranks may use {cores:g} of its {count(sites[0].online, 'core')}.\n  Set {name}=1{binding}; "
         f"{OVERRIDE}=1 runs it all the same"
     )
 
@@ -202,7 +204,7 @@ def note_ranks(sites: Sequence[Site]) -> str | None:
             f"{sites[0].online} cores; unless the job has no more: mpirun --bind-to core or --bind-to none, "
             "srun --cpu-bind=cores"
         )
-    return f"more ranks than cores on node {sites[0].host}: {len(sites)} ranks take turns on {_count(cores, 'core')}"
+    return f"more ranks than cores on node {sites[0].host}: {len(sites)} ranks take turns on {count(cores, 'core')}"
 
 
 def note_threads(sites: Sequence[Site]) -> str | None:
@@ -224,7 +226,7 @@ def judge_nodes(nodes: Sequence[Sequence[Site]], allowed: bool) -> tuple[str | N
     for judge in (refuse_threads, note_ranks, note_threads):
         said = [text for text in map(judge, nodes) if text]
         if said:
-            found[judge] = said[0] + (f" (also on {_count(len(said) - 1, 'more node')})" if len(said) > 1 else "")
+            found[judge] = said[0] + (f" (also on {count(len(said) - 1, 'more node')})" if len(said) > 1 else "")
     refusal = found.pop(refuse_threads, None)
     notes = tuple(found.values())
     if refusal is None or not allowed:
@@ -232,13 +234,9 @@ def judge_nodes(nodes: Sequence[Sequence[Site]], allowed: bool) -> tuple[str | N
     return None, (re.sub(r"\s*\n\s*", " ", refusal), *notes)
 
 
-def is_allowed(environ: Mapping[str, str]) -> bool:
-    """Whether the user wants more threads than cores."""
-    return environ.get(OVERRIDE, "").lower() in ("1", "yes", "true")
-
-
-def _count(number: float, noun: str) -> str:
-    return f"{number:g} {noun}{'' if number == 1 else 's'}"
+def is_set(environ: Mapping[str, str], name: str) -> bool:
+    """Whether the user has said yes by a variable, such as OVERRIDE: to more threads than cores."""
+    return environ.get(name, "").lower() in ("1", "yes", "true")
 
 
 def split_petsc_options(arguments: Sequence[str]) -> tuple[dict[str, str], list[str]]:

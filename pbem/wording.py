@@ -40,6 +40,12 @@ def suggest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean '{near[0]}'?" if near else ""
 
 
+def count(number: float, noun: str) -> str:
+    """So many of a thing: "1 step", "2 steps"."""
+    digits = f"{number:g}" if isinstance(number, float) else str(number)
+    return f"{digits} {noun}{'s' * (number != 1)}"
+
+
 def list_names(names: Iterable[str], most: int = 20) -> str:
     """Names for a message, shortened."""
     listed = list(names)

@@ -18,8 +18,9 @@ from pbem.contact.strength import check_custom_laws, list_laws
 from pbem.description import case as description
 from pbem.description.case import Draft
 from pbem.errors import CaseError
-from pbem.model.build import build_model, examine, shorten
+from pbem.model.build import build_model, examine, limit_faults
 from pbem.model.model import Model
+from pbem.model.recall import Recall
 
 # What a model can be made from: a case, its tables, or the path of its file.
 Source = description.Case | Mapping[str, Any] | str | os.PathLike[str]
@@ -38,36 +39,40 @@ def parse_model(text: str, source: str = "case", overrides: str = "") -> tuple[C
     return _build_text(text, source, read_overrides(overrides), label_key)
 
 
-def _build_text(text: str, source: str, changes: Mapping[str, Any], label: Label) -> tuple[Case, Model]:
-    draft = parse_draft(text, source)
-    model = _build(draft, source, changes, label)
+def _build_text(
+    text: str, source: str, changes: Mapping[str, Any], label: Label, recall: Recall | None = None
+) -> tuple[Case, Model]:
+    draft = (recall or Recall()).find("draft", (text, source), lambda: parse_draft(text, source))
+    model = _build(draft, source, changes, label, recall)
     return Case.take(model[0], text), replace(model[1], source=text)
 
 
 def _build(
-    draft: Draft, source: str, changes: Mapping[str, Any], label: Label
+    draft: Draft, source: str, changes: Mapping[str, Any], label: Label, recall: Recall | None = None
 ) -> tuple[description.Case, Model]:
     """The case and the model of a draft with values set. Raises CaseError with the faults of all together."""
     if changes and draft.case is not None:
         draft = change_draft(draft, changes, label)
-    model, found = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
+    model, found = examine(draft.case, draft.conditions_known, recall) if draft.case else (None, [])
     if isinstance(draft, ChangedDraft):
         found = draft.name_places(found)
     elif isinstance(draft, FileDraft):
         found = add_lines(found, draft.lines)
     faults = [*draft.faults, *found]
     if draft.case is None or model is None or faults:
-        raise CaseError(source, shorten(faults))
+        raise CaseError(source, limit_faults(faults))
     return draft.case, replace(model, overrides=write_overrides(changes))
 
 
-def describe_model(tables: Mapping[str, Any], changes: Mapping[str, Any] | None = None) -> Model:
+def describe_model(
+    tables: Mapping[str, Any], changes: Mapping[str, Any] | None = None, recall: Recall | None = None
+) -> Model:
     """The model of tables given by calls: raises CaseError with the faults of keys and of topology together.
 
     Its text, which the results store, is that of a file with these tables.
     """
     draft = description.draft_tables(tables)
-    _, model = _build(draft, description.UNNAMED, changes or {}, label_key)
+    _, model = _build(draft, description.UNNAMED, changes or {}, label_key, recall)
     assert draft.case is not None
     return replace(model, source=write_tables(draft.case.given))
 
@@ -79,21 +84,24 @@ def find_file(source: Source) -> Path | None:
     return None if isinstance(source, Mapping) else Path(source)
 
 
-def make_checked_model(source: Source, changes: Mapping[str, Any] | None = None, label: Label = label_key) -> Model:
+def make_checked_model(
+    source: Source, changes: Mapping[str, Any] | None = None, label: Label = label_key, recall: Recall | None = None
+) -> Model:
     """The model of a case, of its tables, or of a file, with the texts of its custom laws, which are tried.
 
     changes: values set by keys, see `pbem.case.case.Case.replace`; the results keep them beside the case. label: how
-    messages name them. Raises CaseError with its faults; those of laws come last.
+    messages name them. recall: what was found of the last case, for this one where that is the same.
+    Raises CaseError with its faults; those of laws come last.
     """
     if isinstance(source, description.Case):
         name = source.source
-        model = _build(Draft(source, ()), name, changes, label)[1] if changes else build_model(source)
+        model = _build(Draft(source, ()), name, changes, label, recall)[1] if changes else build_model(source)
         model = replace(model, source=_find_text(source))
     elif isinstance(source, Mapping):
-        name, model = description.UNNAMED, describe_model(source, changes)
+        name, model = description.UNNAMED, describe_model(source, changes, recall)
     else:
         name = str(source)
-        model = _build_text(read_case_text(source), name, changes or {}, label)[1]
+        model = _build_text(read_case_text(source), name, changes or {}, label, recall)[1]
     return _take_laws(model, name)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pbem.errors import printable
-from pbem.wording import list_names
+from pbem.wording import count, list_names
 
 MOST_NAMES = 8
 MOST_LETTERS = 100
@@ -22,7 +22,7 @@ def summarise(case: Any) -> list[tuple[str, str]]:
 
     laws = [f"{name} ({case.interfaces[name].law})" if case.interfaces[name].law else name
             for name in name_own(case.interfaces)]
-    stages = [f"{stage.name or 'stage'} ({_count(stage.steps, 'step')})" for stage in case.stages]
+    stages = [f"{stage.name or 'stage'} ({count(stage.steps, 'step')})" for stage in case.stages]
     rows: list[tuple[str, Sequence[str]]] = [
         ("materials", list(case.materials)),
         ("generated", [f"{group.count} {group.kind} {group.name}" for group in case.groups]),
@@ -32,7 +32,7 @@ def summarise(case: Any) -> list[tuple[str, str]]:
         ("interfaces", laws),
         ("contacts", [f"{name} ({' and '.join(table.between)})" for name, table in case.contacts.items()]),
         ("tools", list(case.tools)),
-        ("stages", stages or [_count(case.analysis.steps, "step")]),
+        ("stages", stages or [count(case.analysis.steps, "step")]),
         ("analysis", [f"{case.analysis.scheme}, order {case.analysis.order}"]),
     ]
     return [(label, _shorten(list_names(names, MOST_NAMES))) for label, names in rows if names]
@@ -41,10 +41,6 @@ def summarise(case: Any) -> list[tuple[str, str]]:
 def _shorten(text: str) -> str:
     text = printable(text)
     return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 4] + " ..."
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def print_case(case: Any) -> str:

@@ -29,6 +29,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.model.refinement import coarsen_model
+from pbem.wording import count
 
 
 @dataclass(frozen=True)
@@ -107,13 +108,8 @@ def note_memory(forecast: Forecast, ranks: int, available: float | None) -> str 
     needed = forecast.whole_memory * ranks / forecast.ranks
     if available is None or needed <= available:
         return None
-    return (f"the run will take about {needed / 1e9:.3g} GB on {count(ranks)}, but {available / 1e9:.3g} GB can be had "
-            "now: others use the rest")
-
-
-def count(ranks: int) -> str:
-    """So many ranks."""
-    return f"{ranks} rank{'s' * (ranks != 1)}"
+    return (f"the run will take about {needed / 1e9:.3g} GB on {count(ranks, 'rank')}, but {available / 1e9:.3g} GB "
+            "can be had now: others use the rest")
 
 
 def refuse_memory(forecast: Forecast, ranks: int, limits: Sequence[Limit]) -> str | None:
@@ -124,7 +120,7 @@ def refuse_memory(forecast: Forecast, ranks: int, limits: Sequence[Limit]) -> st
     needed = forecast.whole_memory * ranks / forecast.ranks
     if not limits or needed <= limits[0].bytes:
         return None
-    where = count(ranks)
+    where = count(ranks, "rank")
     where += f" of {forecast.ranks}" if ranks != forecast.ranks else ""
     least = limits[0]
     return (

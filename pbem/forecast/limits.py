@@ -43,11 +43,6 @@ def read_available(meminfo: Path = Path("/proc/meminfo")) -> float | None:
     return _read_meminfo(meminfo).get("MemAvailable")
 
 
-def is_allowed(environ: Mapping[str, str]) -> bool:
-    """Whether the user wants to run what needs more than there is."""
-    return environ.get(OVERRIDE, "").lower() in ("1", "yes", "true")
-
-
 def _read_meminfo(meminfo: Path) -> dict[str, float]:
     try:
         lines = meminfo.read_text().splitlines()

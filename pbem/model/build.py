@@ -39,6 +39,7 @@ from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
 from pbem.model.point_supports import PointSupport, place_point_supports
+from pbem.model.recall import Recall
 from pbem.model.resultants import describe_unbalance, find_unbalanced_force
 from pbem.model.rigid_body import find_tractions
 from pbem.model.rigid_body_modes import (
@@ -78,11 +79,11 @@ def build_model(case: Case) -> Model:
     """Resolve and check a case. Raises CaseError with every fault of names, topology, laws, loads and support."""
     model, faults = examine(case)
     if model is None or faults:
-        raise CaseError(case.source, shorten(faults))
+        raise CaseError(case.source, limit_faults(faults))
     return model
 
 
-def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
+def limit_faults(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     """Each fault once; of many at the same table [[generate]] the first few, and how many more there are."""
     shown: list[Fault] = []
     counts: Counter[str] = Counter()
@@ -98,24 +99,34 @@ def shorten(faults: Sequence[Fault]) -> tuple[Fault, ...]:
     return tuple(shown)
 
 
-def examine(case: Case, conditions_known: bool = True) -> tuple[Model | None, list[Fault]]:
-    """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged."""
-    model, case, faults = _examine(case, conditions_known)
+def examine(
+    case: Case, conditions_known: bool = True, recall: Recall | None = None
+) -> tuple[Model | None, list[Fault]]:
+    """The model, if any, and all that is wrong with it; conditions_known: whether support can be judged.
+
+    recall: what was found of the curves of the last case, for this one if it has the same.
+    """
+    model, case, faults = _examine(case, conditions_known, recall or Recall())
     return model, [case.trace(fault) for fault in faults]
 
 
-def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, list[Fault]]:
+def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model | None, Case, list[Fault]]:
     """As above, with the case in which cracks that cross are cut."""
     roles = resolve_roles(case)
-    cut = cut_cracks(case, roles, shape_curves(case, roles))
+    shown = (roles, case.curves, case.regions, case.analysis, case.origin)
+    shapes = recall.find("shapes", shown, lambda: shape_curves(case, roles))
+    cut = cut_cracks(case, roles, shapes)
     case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
-    topology = _find_topology(cut, loading)
+    overlaps = [(name, table.between, table.overlap) for name, table in case.contacts.items()]
+    pointed = (case.point_loads, case.point_supports, case.tools, list_held(loading.conditions), overlaps)
+    drawn = (*shown, cut.notes, cut.faults, case.curves, pointed)
+    topology = recall.find("topology", drawn, lambda: _find_topology(cut, loading))
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *check_tools(case, roles), *topology.faults, *loading.faults, *wrong]
     if faults:
         return None, case, faults
-    model, faults = _compose(case, roles, loading, topology)
+    model, faults = _compose(case, roles, loading, topology, recall)
     model = replace(model, interior_points=interior)
     faults += [*check_turning(case, model.curves), *check_facing(model)]
     varying = [
@@ -194,7 +205,9 @@ def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
     return replace(loading, stages=tuple(stages))
 
 
-def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
+def _compose(
+    case: Case, roles: Roles, loading: Loading, topology: _Topology, recall: Recall
+) -> tuple[Model, list[Fault]]:
     loading = _spread_forces(loading, topology.curves)
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
@@ -222,8 +235,10 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) ->
         for name, table in case.regions.items()
     )
     tools = make_tool_regions(case, curves, loading.rigid.bodies, topology.loops)
-    fitted = fit_curves(
-        case, curves, regions, topology.tips, frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    jointed = frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    fitted = recall.find(
+        "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed),
+        lambda: fit_curves(case, curves, regions, topology.tips, jointed),
     )
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",

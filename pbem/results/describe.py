@@ -10,7 +10,6 @@ from pbem.results.contents import Tips
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
 from pbem.results.rigid import COMPONENTS, list_rigid_rows
-from pbem.results.text_tables import count as _count
 from pbem.results.text_tables import format_number as _number
 from pbem.results.text_tables import section as _section
 from pbem.results.text_tables import shorten as _shorten
@@ -18,6 +17,7 @@ from pbem.results.text_tables import table as _table
 from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.results.trace_names import name_trace
 from pbem.results.traces import list_traces
+from pbem.wording import count as _count
 
 MOST_TIPS = 10
 MOST_ERRORS = 10

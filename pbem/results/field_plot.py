@@ -29,7 +29,7 @@ from pbem.results.page import (
     widen_box,
     write_around,
 )
-from pbem.results.picture_limits import Limits, format_number, limit_field
+from pbem.results.picture_limits import Limits, limit_field, print_number
 from pbem.results.plot_style import choose_magnification, describe_step, label, style
 from pbem.results.reader import Results
 from pbem.results.region_points import View
@@ -234,7 +234,7 @@ class FieldPicture:
             # Away from each other, so that they do not meet.
             right, above = x < middle[0], y > places[ends[other]][1]
             axes.annotate(
-                f"{name} {format_number(float(values[vertex]))}", (x, y), zorder=7, fontsize=7,
+                f"{name} {print_number(float(values[vertex]))}", (x, y), zorder=7, fontsize=7,
                 xytext=(5 if right else -5, 4 if above else -4), textcoords="offset points",
                 ha="left" if right else "right", va="bottom" if above else "top", path_effects=HALO,
             )

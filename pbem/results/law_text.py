@@ -10,7 +10,8 @@ from typing import Any
 from pbem.contact.laws import find_joint
 from pbem.model.model import Contact, Law, Model
 from pbem.model.varying import Value, to_plain
-from pbem.results.text_tables import count, shorten
+from pbem.results.text_tables import shorten
+from pbem.wording import count
 
 # A piece of a trace that was cut is called TRACE.NUMBER.
 PIECE = re.compile(r"(?P<trace>.+)\.(?P<number>[1-9]\d*)\Z")

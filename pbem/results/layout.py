@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Integer
 from pbem.contact.laws import find_joint
 from pbem.contact.strength import LAWS, list_model_variables
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
@@ -22,6 +22,7 @@ from pbem.results.configuration import dump_configuration
 from pbem.results.estimates import list_datasets
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.linearity import create_linearity
+from pbem.results.outline import to_columns
 from pbem.results.rigid import create_rigid
 from pbem.results.views import Columns, create_array, create_group, set_attribute
 from pbem.version import __version__
@@ -48,11 +49,6 @@ def list_pair_datasets(model: Model) -> dict[str, str]:
 def join_pairs(interfaces: Mapping[str, Integer]) -> Integer:
     """The indices of `sort_pairs`, one interface after the other: the order of the columns under /all/contact."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *interfaces.values()])
-
-
-def to_columns(points: Complex) -> Real:
-    """(..., 2) x and y components of complex points or vectors (...)."""
-    return np.stack([points.real, points.imag], axis=-1)
 
 
 def write_attributes(

@@ -17,7 +17,8 @@ from pbem.model.model import Condition, Law, Model, Region, Stage
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference
 from pbem.results.doubts import list_doubts
 from pbem.results.law_text import TITLES, list_law_rows
-from pbem.results.text_tables import count, format_bytes, format_number, section, shorten, table
+from pbem.results.text_tables import format_bytes, format_number, section, shorten, table
+from pbem.wording import count
 
 
 def describe_model(model: Model, mesh: Mesh, forecast: Forecast | None = None) -> str:

@@ -85,7 +85,7 @@ def to_complex(columns: Real) -> Complex:
 
 
 def to_columns(points: Complex) -> Real:
-    """x and y (..., 2) of complex points (...)."""
+    """x and y (..., 2) of complex points or vectors (...)."""
     return np.stack([points.real, points.imag], axis=-1)
 
 

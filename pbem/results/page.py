@@ -17,7 +17,7 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.lines import Line2D
 
 from pbem.arrays import Bool, Real
-from pbem.results.picture_limits import format_number, join_sentences
+from pbem.results.picture_limits import join_sentences, print_number
 from pbem.results.plot_style import scale_plane
 from pbem.results.reader import Results
 
@@ -176,5 +176,5 @@ def describe_box(box: Box) -> str:
     """What is said of a picture that shows a part."""
     if not box.asked:
         return ""
-    return (f"part from ({format_number(box.low[0])}, {format_number(box.low[1])}) "
-            f"to ({format_number(box.high[0])}, {format_number(box.high[1])})")
+    return (f"part from ({print_number(box.low[0])}, {print_number(box.low[1])}) "
+            f"to ({print_number(box.high[0])}, {print_number(box.high[1])})")

@@ -39,7 +39,7 @@ class Limits:
 
     def describe_cut(self, quantity: str) -> str:
         """What lies beyond the limits; empty if nothing does."""
-        ends = [format_number(value) for value, cut in ((self.least, self.cuts_low), (self.largest, self.cuts_high))
+        ends = [print_number(value) for value, cut in ((self.least, self.cuts_low), (self.largest, self.cuts_high))
                 if cut]
         return f"cut off: {quantity} reaches {' and '.join(ends)}" if ends else ""
 
@@ -105,7 +105,7 @@ def widen(limits: Limits, share: float = 0.05) -> tuple[float, float]:
     return limits.low - share * span, limits.high + share * span
 
 
-def format_number(value: float, digits: int = 3) -> str:
+def print_number(value: float, digits: int = 3) -> str:
     """A number for a picture: with a power of ten if it is large or small, and a minus sign as long as others."""
     if not math.isfinite(value):
         return str(value)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer
+from pbem.arrays import Integer
 from pbem.errors import ResultFileError
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
@@ -149,9 +149,3 @@ def _read_leg(stored: Mapping[str, Any]) -> Leg:
 
 def _read_point(stored: Any) -> complex:
     return complex(*stored) if isinstance(stored, list) else complex(stored)
-
-
-def to_complex_points(columns: Any) -> Complex:
-    """Complex points (...) of x and y (..., 2)."""
-    values = np.asarray(columns)
-    return np.asarray(values[..., 0] + 1j * values[..., 1])

@@ -43,11 +43,6 @@ def format_number(value: float) -> str:
     return f"{value:.5g}"
 
 
-def count(number: int, noun: str) -> str:
-    """So many of a thing: "1 step", "2 steps"."""
-    return f"{number} {noun}{'s' * (number != 1)}"
-
-
 def format_bytes(size: float) -> str:
     """Three digits with a unit: B, kB, MB, GB, TB of powers of 1000."""
     for unit in ("B", "kB", "MB", "GB"):

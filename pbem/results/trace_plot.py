@@ -21,7 +21,7 @@ from pbem.results.body_plot import write_names
 from pbem.results.outline import trace_outlines
 from pbem.results.page import Page, add_legend_row, choose_box, describe_box, finish_plane, save, write_around
 from pbem.results.pair_weights import find_nodes, weigh_pairs
-from pbem.results.picture_limits import format_number, limit_field
+from pbem.results.picture_limits import limit_field, print_number
 from pbem.results.plot_style import MODES, describe_step, label, scale_axis, style
 from pbem.results.reader import Results
 from pbem.results.trace_names import find_names
@@ -136,7 +136,7 @@ class TracePicture:
         bar.formatter.set_powerlimits((-3, 4))
         bar.locator = MaxNLocator(6)
         bar.update_ticks()
-        ends = [format_number(value) for value, out in
+        ends = [print_number(value) for value, out in
                 ((limits.least, limits.least < low), (limits.largest, limits.largest > high)) if out]
         return [f"colours end before the values: {title} reaches {' and '.join(ends)}"] if ends else []
 

@@ -50,6 +50,8 @@ class Quantity:
     evaluate: Callable[[Outcome], float]
     # Known of a history that ended early as well.
     of_steps: bool = False
+    # Needs the mean displacement of the faces of cracks.
+    of_faces: bool = False
 
 
 class WrongQuantityError(ValueError):
@@ -201,7 +203,7 @@ def _read_tips(parts: Sequence[Part], names: Names) -> list[Quantity]:
         title = "" if name is None else f".{quote(name)}"
         at = "" if end is None else f".{'start' if end == 0 else 'end'}"
         return Quantity(f"tips{title}{at}.{kind}", lambda outcome: _find_largest(
-            outcome, outcome.names.find_members("tips", name), kind, end))
+            outcome, outcome.names.find_members("tips", name), kind, end), of_faces=kind == "T")
 
     return [make(None)] if len(parts) == 1 else [make(each) for each in _select(parts[0], names, "tips")]
 

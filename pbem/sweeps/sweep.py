@@ -21,7 +21,9 @@ from pbem.description import case as description
 from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
+from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
@@ -29,13 +31,14 @@ from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
+from pbem.solve.steps.prediction import Place
 from pbem.solve.system.kept import KeptProblems
 from pbem.sweeps.files import name_results
 from pbem.sweeps.outcome import AbsentNameError, Names, Outcome, list_quantity_names
 from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, Table, TableFile
-from pbem.sweeps.values import check_combinations, check_values, combine, write_cell
+from pbem.sweeps.values import check_combinations, check_values, combine, find_place, write_cell
 
 # Models that were made to try the values and are kept until they are computed.
 MOST_CHECKED = 32
@@ -55,7 +58,8 @@ class Plan:
 
 @dataclass(frozen=True)
 class Setting:
-    """What holds for all cases of a sweep. label: how messages name what was set. checked: models that are there."""
+    """What holds for all cases of a sweep. label: how messages name what was set. checked: models that are there;
+    recall: what was found of the last case."""
 
     case: Source
     fixed: Mapping[str, Any]
@@ -65,6 +69,7 @@ class Setting:
     neighbours: bool
     label: Label
     checked: dict[tuple[str, ...], Model] = field(default_factory=dict)
+    recall: Recall = field(default_factory=Recall)
 
     @property
     def name(self) -> str:
@@ -145,7 +150,7 @@ def _cells(values: Mapping[str, Any]) -> tuple[str, ...]:
 def _make_model(setting: Setting, values: Mapping[str, Any]) -> Model:
     model = setting.checked.pop(_cells(values), None)
     if model is None:
-        model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
+        model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label, setting.recall)
     return impose_operator(model, setting.name, setting.operator)
 
 
@@ -158,7 +163,7 @@ def _make_plan(
     cases = list(combine(several))
     first = _check_values_alone(setting, several, cases[0])
     check_options(setting.name, first.solver.petsc, setting.petsc)
-    mesh = generate_mesh(first)
+    mesh = _mesh(setting, first)
     names = list_quantity_names(first, mesh)
     wanted = tuple(choose_quantities(first, names) if quantities is None else quantities)
     columns = read_quantities(wanted, names, option)
@@ -197,7 +202,7 @@ def _check_values_alone(
     tried = [dict(first), *({**first, key: each} for key, values in several.items() for each in values[1:])]
     for values in tried:
         try:
-            model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label)
+            model = make_checked_model(setting.case, {**setting.fixed, **values}, setting.label, setting.recall)
         except CaseError as error:
             faults |= dict.fromkeys(error.faults)
             source = error.source
@@ -268,7 +273,7 @@ def _compute_all(
         signals.at_once = group.comm.size == 1
 
         def compute(values: dict[str, Any]) -> Row:
-            return compute_case(setting, values, columns, kept, signals)
+            return compute_case(setting, values, columns, kept, signals, find_place(values, keeper.several))
 
         group.share_out(plan.todo, compute, keeper.add)
     return broadcast(comm, do_on_first(comm, PbemError, keeper.finish, share=False))  # type: ignore[no-any-return]
@@ -286,9 +291,13 @@ def _keep(comm: Comm) -> Iterator[KeptProblems]:
 
 
 def compute_case(
-    setting: Setting, values: dict[str, Any], columns: Sequence[Quantity], kept: KeptProblems, signals: StopSignals
+    setting: Setting, values: dict[str, Any], columns: Sequence[Quantity], kept: KeptProblems, signals: StopSignals,
+    place: Place,
 ) -> Row:
-    """The row of one case; all ranks of `kept.comm` call this together, and the first knows the quantities."""
+    """The row of one case; all ranks of `kept.comm` call this together, and the first knows the quantities.
+
+    place: among the other cases.
+    """
     begun = time.perf_counter()
     comm, status, reason = kept.comm, "finished", ""
     outcome = Outcome()
@@ -297,7 +306,7 @@ def compute_case(
         if setting.keep is not None or model.analysis.accuracy is not None:
             _run_with_file(setting, values, outcome, kept)
         else:
-            _solve(model, setting, outcome, kept, signals)
+            _solve(model, setting, outcome, columns, kept, signals, place)
     except CaseError as error:
         status, reason = "refused", "; ".join(str(fault) for fault in error.faults)
     except (ConvergenceError, LawError) as error:
@@ -317,10 +326,21 @@ def compute_case(
     return Row(_cells(values), tuple(found), status, outcome.iterations, time.perf_counter() - begun, reason)
 
 
-def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems, signals: StopSignals) -> None:
+def _mesh(setting: Setting, model: Model) -> Mesh:
+    """The mesh of the last case if this one has the same: neither laws nor conditions are part of it."""
+    interfaces = [(each.name, each.first, each.second) for each in model.interfaces.values()]
+    contacts = [(each.name, each.first, each.second) for each in model.contacts.values()]
+    given = (model.curves, model.regions, interfaces, contacts, model.crack_tips, model.analysis, model.size)
+    return setting.recall.find("mesh", given, lambda: generate_mesh(model))
+
+
+def _solve(
+    model: Model, setting: Setting, outcome: Outcome, columns: Sequence[Quantity], kept: KeptProblems,
+    signals: StopSignals, place: Place,
+) -> None:
     """March through the history, without a result file."""
     comm = kept.comm
-    mesh = generate_mesh(model)
+    mesh = _mesh(setting, model)
     check_shares(model, mesh, comm.size)
     if comm.rank == 0:
         outcome.expect(model, mesh)
@@ -330,10 +350,10 @@ def _solve(model: Model, setting: Setting, outcome: Outcome, kept: KeptProblems,
         watch.look_after(problem.laws)
         watch.check()
         try:
-            tangent, guess = kept.take_tangent(problem), kept.guess_modes(problem) if setting.neighbours else None
-            kept.remember_modes(problem, {
-                (step.stage, step.factor): step.contact for step in march(problem, watch, None, tangent, guess)
-            })
+            tangent = kept.take_tangent(problem)
+            guess = kept.guess_modes(problem, place) if setting.neighbours else None
+            steps = march(problem, watch, None, tangent, guess, any(each.of_faces for each in columns))
+            kept.remember(problem, place, {(step.stage, step.factor): step.contact for step in steps})
         except ConvergenceError:
             watch.check()  # a law that failed has answered with no strength
             raise

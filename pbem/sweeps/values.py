@@ -15,6 +15,7 @@ from pbem.case.writer import write_value
 from pbem.description.plain import make_plain
 from pbem.description.replacement import WRITTEN, split_key
 from pbem.errors import CaseError, Fault
+from pbem.solve.steps.prediction import Place
 from pbem.wording import show
 
 Values = Mapping[str, Sequence[Any]]
@@ -109,6 +110,18 @@ def combine(values: Values) -> Iterator[dict[str, Any]]:
     """All combinations, the last key fastest."""
     for each in itertools.product(*values.values()):
         yield dict(zip(values, each, strict=True))
+
+
+def find_place(values: Mapping[str, Any], several: Values) -> Place:
+    """Where a case is among all combinations: keys whose values are all numbers have an order."""
+    kind, rank, number = [], [], []
+    for key, value in values.items():
+        if all(type(each) in (int, float) for each in several[key]):
+            rank.append(sorted(several[key]).index(value))
+            number.append(value)
+        else:
+            kind.append(write_cell(value))
+    return Place(tuple(kind), np.array(rank, dtype=float), np.array(number, dtype=float))
 
 
 def write_cell(value: Any) -> str:

@@ -23,7 +23,7 @@ from pbem.geometry.junction import find_crossings, split_at_junctions
 from pbem.geometry.loop import find_loops
 from pbem.geometry.shape import Division, draw_circle, draw_expression, draw_polyline, join_ends, measure_extent
 from pbem.geometry.tolerance import make_tolerance
-from pbem.model.build import build_model, examine, shorten
+from pbem.model.build import build_model, examine, limit_faults
 from pbem.model.model import Model
 from tests.cases.bundled import CASES
 from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, change, find_faults
@@ -225,7 +225,7 @@ def read_json(path: Path) -> Model:
     draft = draft_case(json.loads(path.read_text("utf-8")), str(path))
     model, faults = examine(draft.case, draft.conditions_known) if draft.case else (None, [])
     if model is None or draft.faults or faults:
-        raise CaseError(str(path), shorten([*draft.faults, *faults]))
+        raise CaseError(str(path), limit_faults([*draft.faults, *faults]))
     return model
 
 

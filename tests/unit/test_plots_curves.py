@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from pbem.results.curve_picture import CurveOptions, CurvePicture
 from pbem.results.curve_plot import draw_quantity
 from pbem.results.curve_profile import measure_angles, read_profile
-from pbem.results.picture_limits import Limits, format_number, limit_line, widen
+from pbem.results.picture_limits import Limits, limit_line, print_number, widen
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
 from tests.unit.results_sample import make_mesh, make_model, make_steps
@@ -51,7 +51,7 @@ def test_singular_ends_do_not_spoil_the_limits() -> None:
     assert limit_line(x, regular) == Limits(regular[0], regular.max(), regular[0], regular.max())
     limits = limit_line(x, singular)
     assert limits.largest == singular[-1] > 9 and limits.high < 3
-    assert limits.describe_cut("t") == f"cut off: t reaches {format_number(float(singular[-1]))}"
+    assert limits.describe_cut("t") == f"cut off: t reaches {print_number(float(singular[-1]))}"
     # A peak inside is no singular end, nor is one of a closed curve.
     peak = np.where(np.abs(x - 0.5) < 0.02, 50.0, 1.0)
     assert limit_line(x, peak).high == 50.0
@@ -130,8 +130,8 @@ def test_pictures_of_curves_have_the_same_limits_at_all_steps(results: Results) 
 
 
 def test_numbers_of_pictures() -> None:
-    assert format_number(-0.25) == "\N{MINUS SIGN}0.25"
-    assert format_number(123456.0) == r"1.23$\times$10$^{5}$"
-    assert format_number(12345.0) == "12345"
-    assert format_number(1e-9) == r"1$\times$10$^{-9}$"
-    assert format_number(0.0) == "0"
+    assert print_number(-0.25) == "\N{MINUS SIGN}0.25"
+    assert print_number(123456.0) == r"1.23$\times$10$^{5}$"
+    assert print_number(12345.0) == "12345"
+    assert print_number(1e-9) == r"1$\times$10$^{-9}$"
+    assert print_number(0.0) == "0"

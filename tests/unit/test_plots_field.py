@@ -18,7 +18,7 @@ from pbem.results.field_formulas import FIELDS
 from pbem.results.field_plot import FieldOptions, FieldPicture, draw_field, plot_field
 from pbem.results.outline import to_columns
 from pbem.results.page import choose_box
-from pbem.results.picture_limits import CUT, format_number, limit_field
+from pbem.results.picture_limits import CUT, limit_field, print_number
 from pbem.results.plot_style import style
 from pbem.results.reader import Results, open_results
 from pbem.results.region_points import View
@@ -144,8 +144,8 @@ def test_values_are_those_of_the_field_and_the_extremes_are_marked(griffith: Res
     shown = box.contains(to_columns(triangles.position)) & ~triangles.find_tips(griffith.elements)
     figure = picture.draw(0)
     said = list_notes(figure)
-    assert f"max {format_number(float(values[shown].max()))}" in said
-    assert f"min {format_number(float(values[shown].min()))}" in said
+    assert f"max {print_number(float(values[shown].max()))}" in said
+    assert f"min {print_number(float(values[shown].min()))}" in said
     marks = {line.get_label(): line for line in figure.axes[0].get_lines()}
     for name, which in (("_max", np.argmax), ("_min", np.argmin)):
         place = triangles.position[shown][which(values[shown])]
@@ -155,7 +155,7 @@ def test_values_are_those_of_the_field_and_the_extremes_are_marked(griffith: Res
     high = figure.axes[0].collections[0].get_clim()[1]
     assert high < values[shown].max()
     assert "colours end before the values" in said
-    assert format_number(float(values[shown].max())) in said.split("colours end")[1]
+    assert print_number(float(values[shown].max())) in said.split("colours end")[1]
 
 
 def test_formulas_of_fields() -> None:

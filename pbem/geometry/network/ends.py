@@ -8,7 +8,6 @@ import numpy as np
 
 from pbem.arrays import Complex, Integer
 from pbem.geometry.boxes import Boxes
-from pbem.geometry.elements import Elements
 from pbem.geometry.intersection import meeting_points
 from pbem.geometry.network.strands import Log, Strand, collect_legs, gather, sort_places
 
@@ -114,8 +113,3 @@ def _settle(strands: list[Strand], points: Complex, moved: Complex, snap: float)
 def list_nodes(strands: Sequence[Strand]) -> Integer:
     """Numbers of the nodes that strands have."""
     return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(np.array(strand.nodes) for strand in strands)]))
-
-
-def gather_legs(strands: Sequence[Strand]) -> Elements:
-    """The legs of all strands."""
-    return collect_legs(strands)[0]

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 from mpi4py import MPI
 
+from pbem.environment import is_set
 from pbem.errors import LaunchError
 from pbem.forecast.forecast import exceeds_at_most, make_forecast, note_memory, refuse_memory
-from pbem.forecast.limits import Limit, is_allowed, read_available, read_limits
+from pbem.forecast.limits import OVERRIDE, Limit, read_available, read_limits
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import broadcast, do_on_first, gather_by_node
@@ -19,7 +20,7 @@ def check_memory(comm: MPI.Intracomm, model: Model, mesh: Mesh) -> tuple[str, ..
     """Notes on the memory, the same on all ranks. Raises LaunchError, on all alike, where a node grants less than the
     forecast, unless the user wants it so."""
     nodes = gather_by_node(comm, (read_limits(os.environ), read_available()))
-    allowed = broadcast(comm, is_allowed(os.environ))
+    allowed = broadcast(comm, is_set(os.environ, OVERRIDE))
     return do_on_first(comm, LaunchError, lambda: judge_memory(model, mesh, nodes, allowed))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import petsc4py
 from mpi4py import MPI
 
-from pbem.environment import find_launch, is_allowed, judge_nodes, read_site, refuse_copies
+from pbem.environment import OVERRIDE, find_launch, is_set, judge_nodes, read_site, refuse_copies
 from pbem.errors import LaunchError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -50,7 +50,7 @@ def check_start(comm: MPI.Intracomm) -> tuple[str, ...]:
     if copies:
         raise LaunchError(copies)  # each copy is alone: there is nobody to ask
     refuse_together(comm, refuse_libraries(read_libraries(), world.size))
-    allowed = broadcast(comm, is_allowed(os.environ))
+    allowed = broadcast(comm, is_set(os.environ, OVERRIDE))
     refusal, notes = judge_nodes(gather_by_node(comm, read_site(os.environ)), allowed)
     if refusal:
         raise LaunchError(refusal)

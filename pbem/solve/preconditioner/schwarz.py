@@ -39,7 +39,7 @@ class LocalInverse:
 
     inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
     eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
-    formed: whether it has been tried.
+    formed: whether it has been tried; drift: by how much the constraint map has changed in what it sees since then.
     """
 
     group: Subdomain
@@ -50,6 +50,7 @@ class LocalInverse:
     solved: Integer
     matrix: Real | None = None
     formed: bool = False
+    drift: float = 0.0
 
 
 class SchwarzPreconditioner:
@@ -74,6 +75,7 @@ class SchwarzPreconditioner:
         self._less: Elimination | None = None
         self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
         self.singular = 0  # groups without an inverse, of those formed last
+        self.most_drift = 0.0  # inverses serve until the constraint map has changed by more than this part
         self.inverses = [self._place(group) for group in groups]
 
     def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
@@ -89,18 +91,22 @@ class SchwarzPreconditioner:
 
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
-        matrix = constraints.matrix
-        changed = _find_changes(self._formed, matrix)
+        matrix, former = constraints.matrix, self._less
+        change = _measure_changes(self._formed, matrix)
         self._formed = matrix
-        changed |= self._find_anchored(constraints)
+        change[self._find_anchored(constraints)] = np.inf
         by_column = matrix.tocsc()
         free = (self.free @ matrix).tocsr()
         less = self._less = eliminate_tractions(matrix, free, self._node_crack)
+        if former is not None:
+            change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
         count, self.singular = 0, 0
         with clock.piece("preconditioner"):
             for inverse in self.inverses:
-                if not inverse.formed or changed[inverse.around].any():
+                inverse.drift += float(change[inverse.around].max())
+                if not inverse.formed or inverse.drift > self.most_drift:
                     self._invert(inverse, by_column, free, less)
+                    inverse.drift = 0.0
                     count += 1
         return count
 
@@ -352,12 +358,18 @@ def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
     return place, known[place] == numbers
 
 
-def _find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
-    """Columns (unknowns,) in which two constraint maps differ."""
-    changed = np.zeros(matrix.shape[1], dtype=bool)
+def _measure_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Real:
+    """By which part of itself each column (unknowns,) of a constraint map differs from what it was before."""
     if before is None:
-        changed[:] = True
-    else:
-        difference = (matrix - before).tocoo()
-        changed[difference.col[difference.data != 0]] = True
-    return changed
+        return np.full(matrix.shape[1], np.inf)
+    change = _find_largest(matrix - before)
+    changed = change > 0
+    change[changed] /= np.maximum(_find_largest(before), _find_largest(matrix))[changed]
+    return change
+
+
+def _find_largest(matrix: sparse.csr_matrix) -> Real:
+    """The largest size of an entry in each column."""
+    largest = np.zeros(matrix.shape[1])
+    np.maximum.at(largest, matrix.indices, np.abs(matrix.data))
+    return largest

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from pbem.arrays import Real
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError, StopError
@@ -27,8 +28,9 @@ from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_
 TRIED_FROM_REST = 2
 
 
-# The modes that are expected at a fraction of a stage; None where nothing is.
-Guess = Callable[[int, float], ModeState | None]
+# The modes that are expected at a fraction of a stage, from the memory before it and the fluid's pressure; None where
+# nothing is.
+Guess = Callable[[int, float, Memory, Real], ModeState | None]
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def go_on(unfinished: Unfinished | None) -> Guess | None:
         return None
     modes = ModeState(unfinished.mode, unfinished.sign)
 
-    def guess(stage: int, factor: float) -> ModeState | None:
+    def guess(stage: int, factor: float, memory: Memory, pressure: Real) -> ModeState | None:
         same = stage == unfinished.stage and abs(factor - unfinished.factor) <= 1e-12
         return modes if same else None
 
@@ -76,7 +78,7 @@ def go_on(unfinished: Unfinished | None) -> Guess | None:
 
 def march(
     problem: Problem, reporter: Reporter, start: Start | None = None, kept: TangentOperator | None = None,
-    guess: Guess | None = None,
+    guess: Guess | None = None, recover: bool = True,
 ) -> Iterator[Step]:
     """Yield the converged steps of all stages in turn.
 
@@ -85,7 +87,7 @@ def march(
     that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
     always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
     the steps before it were yielded. kept: a tangent operator that is used and not destroyed. guess: the modes
-    with which the search for those of a step begins.
+    with which the search for those of a step begins. recover: see `describe_step`.
     """
     begin = start or start_from_rest(problem)
     arranged, whole = Arranged(problem, kept), problem
@@ -106,7 +108,7 @@ def march(
                 )
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
                 number += 1
-                step = describe_step(problem, solution, memory, number, stage, reached)
+                step = describe_step(problem, solution, memory, number, stage, reached, recover)
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)
                 depth = note_passing(problem, step, depth, reporter)
@@ -141,8 +143,9 @@ def _advance(
         try:
             load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
             begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
+            guessed = guess and guess(stage, target, begin, load.pressure)
             with note_place(stage, target):
-                solution = _solve_guessed(problem, tangent, begin, load, reporter, guess and guess(stage, target))
+                solution = _solve_guessed(problem, tangent, begin, load, reporter, guessed)
                 solution = solution or solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:

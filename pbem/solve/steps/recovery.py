@@ -15,16 +15,21 @@ from pbem.solve.steps.settling import settle
 
 
 def describe_step(
-    problem: Problem, solution: Solution, memory: Memory, number: int, stage: int, factor: float
+    problem: Problem, solution: Solution, memory: Memory, number: int, stage: int, factor: float,
+    recover: bool = True,
 ) -> Step:
-    """Displacements and tractions on all faces, crack faces recovered from their displacement equation, and contact."""
+    """Displacements and tractions on all faces, crack faces recovered from their displacement equation, and contact.
+
+    recover: without, the mean displacement of both faces of a crack is left out, so that they are half the jump apart
+    from 0: enough for energies, in which it has no part, and for all that follows from jumps and tractions.
+    """
     mesh = problem.mesh
     values = solution.v[0::2] + 1j * solution.v[1::2]
     displacement, traction = values[: mesh.nodes].copy(), values[mesh.nodes :]
     cracks = problem.all_crack_nodes
     jump = displacement[cracks]
     load = problem.evaluate_load(stage, factor)
-    mean = problem.recover_crack_displacement(solution.v, load)
+    mean = problem.recover_crack_displacement(solution.v, load) if recover else np.zeros(len(jump), dtype=complex)
     displacement[cracks] = mean + jump / 2
     opposite = np.zeros(mesh.nodes, dtype=complex)
     opposite[cracks] = mean - jump / 2

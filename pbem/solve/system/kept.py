@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pbem.contact.anchor import anchor_motions
-from pbem.contact.laws import ModeState, PairLaws, collect_laws, find_linear
+from pbem.contact.laws import PairLaws, collect_laws, find_linear
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -21,25 +21,28 @@ from pbem.solve.problem.problem import Problem, System
 from pbem.solve.problem.step import ContactState
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.march import Guess
+from pbem.solve.steps.prediction import History, Place, predict_modes, weigh_histories
 from pbem.solve.system.assembly import join_problem
 from pbem.solve.system.choice import choose_system
 
 # Of a run and of its second solution on a coarser mesh.
 MOST_KEPT = 2
+# The states of former cases take up to so many bytes on each rank.
+MOST_BYTES = 1 << 28
 
 
 @dataclass
 class _Kept:
     """The last problem of an operator, and its tangent operator once that is made. key, tangent_key: of `digest`.
 
-    statuses: modes of the last history that was finished, by stage and fraction.
+    histories: those that were finished, the last ones of them.
     """
 
     key: bytes
     problem: Problem
     tangent: TangentOperator | None = None
     tangent_key: bytes = b""
-    statuses: dict[tuple[int, float], ModeState] = field(default_factory=dict)
+    histories: list[History] = field(default_factory=list)
 
     def drop_tangent(self) -> None:
         """Free its storage; by all ranks together."""
@@ -98,29 +101,29 @@ class KeptProblems:
         if found.tangent is None or found.tangent_key != key:
             found.drop_tangent()
             if found.tangent_key != key:
-                found.statuses = {}
+                found.histories = []
             found.tangent, found.tangent_key = problem.make_tangent(), key
         else:
             found.tangent.take_over(problem)
         return found.tangent
 
-    def guess_modes(self, problem: Problem) -> Guess | None:
-        """The modes of the history that was finished last, where those of a state are known by its tractions alone.
+    def guess_modes(self, problem: Problem, place: Place) -> Guess | None:
+        """The modes expected from histories that were finished, where those of a state are known by its tractions.
 
         Not where laws remember or change with the slip: the way to a state is then part of it.
         """
-        found = self._find(problem)
         laws = problem.laws
-        if not found.statuses or laws.brittle.any() or not find_linear(laws).all():
+        if laws.brittle.any() or not find_linear(laws).all():
             return None
-        modes = found.statuses
-        return lambda stage, factor: modes.get((stage, factor))
+        weighed = weigh_histories(self._find(problem).histories, place)
+        return lambda stage, factor, memory, pressure: predict_modes(weighed, laws, stage, factor, memory, pressure)
 
-    def remember_modes(self, problem: Problem, states: Mapping[tuple[int, float], ContactState]) -> None:
+    def remember(self, problem: Problem, place: Place, states: Mapping[tuple[int, float], ContactState]) -> None:
         """A history is finished; its states by stage and fraction."""
-        self._find(problem).statuses = {
-            place: ModeState(state.mode, np.where(state.traction_s < 0, -1.0, 1.0)) for place, state in states.items()
-        }
+        histories = self._find(problem).histories
+        histories.append(History(place, dict(states)))
+        while len(histories) > 1 and sum(each.size for each in histories) > MOST_BYTES:
+            histories.pop(0)
 
     def _find(self, problem: Problem) -> _Kept:
         return next(each for each in self._kept if each.problem is problem)

@@ -34,6 +34,9 @@ MOST_ATTEMPTS = 4
 # WIDENING times as much, up to MOST_WIDENING times.
 SLOW = 60
 WIDENING, MOST_WIDENING = 4, 16
+# Other friction in a further case changes the operator a little in every group: the inverses of the former one serve
+# until the constraint map has changed by this part.
+MOST_DRIFT = 0.9
 # GMRES goes on to this part of the tolerance of Newton's method.
 SAFETY = 0.1
 # The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
@@ -325,6 +328,7 @@ class KrylovTangent(TangentOperator):
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
         self.problem = problem
+        self.preconditioner.most_drift = MOST_DRIFT
         self.expected = self._sweeps = None
 
     def destroy(self) -> None:

@@ -68,7 +68,7 @@ setup(
     cmdclass={"build_ext": BuildKernels, "sdist": CompleteSource},
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases"],
     package_dir={"pbem.cases": "cases"},
-    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"], "pbem.pages": ["*.md"]},
+    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml", "networks/*"], "pbem.pages": ["*.md"]},
     ext_modules=[
         Extension(
             "pbem.bem._kernels",

@@ -29,7 +29,7 @@ def list_bundled_cases() -> dict[str, Path]:
     """The cases that come with the program, by name: in the package, or beside it in a checkout."""
     package = Path(__file__).resolve().parent
     for folder in (package / "cases", package.parent / "cases"):
-        cases = {path.stem: path for path in sorted(folder.glob("*.toml"))}
+        cases = {path.stem: path for path in sorted([*folder.glob("*.toml"), *folder.glob("networks/*.toml")])}
         if cases:
             return cases
     return {}

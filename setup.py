@@ -68,7 +68,7 @@ setup(
     cmdclass={"build_ext": BuildKernels, "sdist": CompleteSource},
     packages=[*find_packages(include=["pbem", "pbem.*"]), "pbem.cases", "pbem.cases.gallery"],
     package_dir={"pbem.cases": "cases", "pbem.cases.gallery": "cases/gallery"},
-    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml"], "pbem.cases.gallery": ["*.toml"],
+    package_data={"pbem.bem": ["*.pyi"], "pbem.cases": ["*.toml", "networks/*"], "pbem.cases.gallery": ["*.toml"],
                   "pbem.pages": ["*.md"]},
     ext_modules=[
         Extension(

@@ -45,7 +45,7 @@ def list_bundled_cases() -> dict[str, Path]:
     """
     package = Path(__file__).resolve().parent
     for folder in (package / "cases", package.parent / "cases"):
-        cases = {path.stem: path for path in sorted(folder.glob("*.toml"))}
+        cases = {path.stem: path for path in sorted([*folder.glob("*.toml"), *folder.glob("networks/*.toml")])}
         if cases:
             return cases | {GALLERY + path.stem: path for path in sorted((folder / "gallery").glob("*.toml"))}
     return {}

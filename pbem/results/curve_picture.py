@@ -47,7 +47,7 @@ class CurvePicture:
     def _list_panels(self, name: str) -> list[list[str]]:
         """The quantities in each panel of a curve: those of one unit share one."""
         if self._options.quantities is None:
-            own = name in self._results.contact
+            own = self._results.contact.get(name) is not None
             return [["traction_n", "traction_s"], ["opening", "slip"]] if own else [["normal", "shear"], ["ux", "uy"]]
         panels: dict[bool | None, list[str]] = {}
         for quantity in self._options.quantities:
@@ -97,6 +97,13 @@ class CurvePicture:
 
 
 def find_curves(results: Results, names: Sequence[str]) -> list[str]:
-    """Interfaces, cracks and outer curves of these names, patterns or traces. Raises ValueError if there are none."""
+    """Interfaces, cracks and outer curves of these names or patterns, and traces, each of them as one curve.
+
+    Raises ValueError if there are none.
+    """
     known = list(dict.fromkeys([*results.contact, *results.nodes.curve_names]))
-    return list(dict.fromkeys(name for each in find_names(names, known).values() for name in each))
+    found = find_names(names, known)
+    return list(dict.fromkeys(
+        each for name, chosen in found.items()
+        for each in ([name] if name not in known and results.contact.get(name) is not None else chosen)
+    ))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Integer, Real
 from pbem.results.contents import Elements
-from pbem.results.lazy import Contact
+from pbem.results.lazy import Contact, JoinedContact
 from pbem.results.outline import to_complex
 from pbem.results.reader import Results
 from pbem.wording import list_names, suggest
@@ -64,7 +64,8 @@ class Profile:
 
 def list_quantities(results: Results, name: str) -> list[str]:
     """What there is along a curve of this name."""
-    pairs = [*PAIR_QUANTITIES, *results.contact[name].internal] if name in results.contact else []
+    contact = results.contact.get(name)
+    pairs = [*PAIR_QUANTITIES, *contact.internal] if contact else []
     nodes = list(NODE_QUANTITIES) if name in results.nodes.curve_names else []
     return [*pairs, *(each for each in nodes if each not in pairs)]
 
@@ -72,7 +73,7 @@ def list_quantities(results: Results, name: str) -> list[str]:
 def check_curve(results: Results, name: str) -> None:
     """Raises ValueError, with a near miss, if there is no interface, crack or curve of this name."""
     known = [*results.contact, *(each for each in results.nodes.curve_names if each not in results.contact)]
-    if name not in known:
+    if name not in known and results.contact.get(name) is None:
         raise ValueError(f"there is no interface, crack or curve '{name}'{suggest(name, known)}; there are: "
                          f"{list_names(known)}")
 
@@ -99,8 +100,9 @@ def read_profile(
         raise ValueError(f"there is no quantity '{quantity}' along '{name}'{suggest(quantity, known)}; there are: "
                          f"{', '.join(known)}")
     at = range(len(results.steps))[step]
-    if name in results.contact and (quantity in PAIR_QUANTITIES or quantity in results.contact[name].internal):
-        return _read_pairs(results, results.contact[name], quantity, at, abscissa)
+    contact = results.contact.get(name)
+    if contact and (quantity in PAIR_QUANTITIES or quantity in contact.internal):
+        return _read_pairs(results, contact, quantity, at, abscissa)
     return _read_nodes(results, name, quantity, at, abscissa)
 
 
@@ -139,6 +141,11 @@ def find_crack_ends(results: Results, contact: Contact) -> list[tuple[bool, Real
     """The ends of a crack that are tips: whether it is the first, its point (2,), its arc length, and whether jumps
     there have the square-root shape."""
     elements, names = results.elements, results.nodes.curve_names
+    if isinstance(contact, JoinedContact):
+        # Those of the trace: the start of its first piece, and the end of the last one.
+        first = [end for end in find_crack_ends(results, contact.pieces[0]) if end[0]]
+        last = [end for end in find_crack_ends(results, contact.pieces[-1]) if not end[0]]
+        return first + [(False, point, arc + contact.starts[-1], rooted) for _, point, arc, rooted in last]
     if contact.name not in names or not len(contact.arc_length):
         return []
     own = first_faces(elements, names.index(contact.name))

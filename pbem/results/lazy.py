@@ -20,6 +20,7 @@ from pbem.results.contents import Elements
 from pbem.results.journal import OverlaidFile
 from pbem.results.pair_weights import JUMPS, weigh_pairs
 from pbem.results.tail import DamageError, find_unapplied
+from pbem.results.trace_names import is_piece, number_piece
 from pbem.wording import suggest
 
 INTEGRABLE = ("opening", "slip", "traction_n", "traction_s")
@@ -96,18 +97,57 @@ class Contact:
     @cached_property
     def _weights(self) -> tuple[Real, Real]:
         with open_quietly(self.path) as file:
-            nodes, stored = file["nodes"], file["elements"]
-            elements = Elements(
-                vertices=stored["vertices"][...], sweep=stored["sweep"][...], region=stored["region"][...],
-                curve=stored["curve"][...], crack=stored["crack"][...].astype(bool), tip=stored["tip"][...],
-            )
-            return weigh_pairs(elements, nodes["position"][...], int(nodes.attrs["order"]), self.position)
+            nodes = file["nodes"]
+            return weigh_pairs(_read_elements(file), nodes["position"][...], int(nodes.attrs["order"]), self.position)
 
     @property
     def internal(self) -> Mapping[str, Real]:
         """The internal variables (k, m) that the law declares for itself, by their names."""
         known = ("position", "normal", "arc_length", "mode", "opening", "slip", "traction_n", "traction_s")
         return {name: values for name, values in self._arrays.items() if name not in known}
+
+
+@dataclass(frozen=True)
+class JoinedContact(Contact):
+    """A trace that crossings cut, or that was cut by hand: its pieces in their order along it, one after the other.
+
+    arc_length goes on from piece to piece, from the start of the first; law: what all pieces have in common. Otherwise
+    as of one crack; internal variables are those that all pieces have.
+    """
+
+    pieces: tuple[Contact, ...] = ()
+
+    @cached_property
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        parts = [dict(piece._arrays) for piece in self.pieces]
+        for part, start in zip(parts, self.starts, strict=True):
+            part["arc_length"] = part["arc_length"] + start
+        shared = [name for name in parts[0] if all(name in part for part in parts)]
+        axis = {name: 0 if name in ("position", "normal", "arc_length") else 1 for name in shared}
+        return {name: freeze(np.concatenate([part[name] for part in parts], axis=axis[name])) for name in shared}
+
+    @cached_property
+    def starts(self) -> list[float]:
+        """The arc length of the trace at the start of each piece; what lies between two pieces counts."""
+        with open_quietly(self.path) as file:
+            elements = _read_elements(file)
+            names = [str(name) for name in file["nodes/curve"].attrs["names"]]
+        starts, reached, last = [], 0.0, None
+        for piece in self.pieces:
+            own = elements.curve == names.index(piece.name)
+            own &= elements.region == elements.region[own][0]
+            # Of a crack the elements of the first face come first.
+            chosen = np.flatnonzero(own)
+            if piece.second is None:
+                chosen = chosen[: len(chosen) // 2]
+            begin, end = elements.vertices[chosen[0], 0], elements.vertices[chosen[-1], 1]
+            if last is not None:
+                # A region travels along some of its curves against their direction.
+                begin, end = (begin, end) if _measure(begin - last) <= _measure(end - last) else (end, begin)
+                reached += _measure(begin - last)
+            starts.append(reached)
+            reached, last = reached + float(elements.geometry.select(chosen).lengths.sum()), end
+        return starts
 
 
 @dataclass(frozen=True)
@@ -189,7 +229,11 @@ class AllPairs:
 
 
 class Interfaces(Mapping[str, Contact]):
-    """The interfaces by name; each is looked up in the file when it is first asked for."""
+    """The interfaces by name; each is looked up in the file when it is first asked for.
+
+    The name of a trace that was cut into pieces (`t12` of `t12.1`, `t12.2`, ...) gives all of them as one, as if it
+    were there; the names that are listed, counted and asked for with `in` are those of the pieces.
+    """
 
     def __init__(self, path: Path, names: tuple[str, ...], steps: int) -> None:
         self._path = path
@@ -198,18 +242,47 @@ class Interfaces(Mapping[str, Contact]):
         self._found: dict[str, Contact] = {}
 
     def __getitem__(self, name: str) -> Contact:
-        if name not in self._names:
-            raise KeyError(name)
         if name not in self._found:
-            with open_quietly(self._path) as file:
-                self._found[name] = _read_contact(self._path, file, name, self._steps)
+            self._found[name] = self._look_up(name) if name in self._names else self._join(name)
         return self._found[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names
+
+    def _look_up(self, name: str) -> Contact:
+        with open_quietly(self._path) as file:
+            return _read_contact(self._path, file, name, self._steps)
+
+    def _join(self, trace: str) -> JoinedContact:
+        names = sorted((name for name in self._names if is_piece(name, trace)), key=number_piece)
+        if not names:
+            raise KeyError(trace)
+        pieces = tuple(self[name] for name in names)
+        first = pieces[0]
+        law = {key: value for key, value in first.law.items()
+               if all(key in piece.law and np.array_equal(piece.law[key], value) for piece in pieces)}
+        return JoinedContact(
+            path=self._path, name=trace, first=first.first, second=first.second, law=law, steps=self._steps,
+            pairs=sum(piece.pairs for piece in pieces), pieces=pieces,
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 
     def __len__(self) -> int:
         return len(self._names)
+
+
+def _measure(offset: Real) -> float:
+    return float(np.hypot(*offset))
+
+
+def _read_elements(file: h5py.File) -> Elements:
+    stored = file["elements"]
+    return Elements(
+        vertices=stored["vertices"][...], sweep=stored["sweep"][...], region=stored["region"][...],
+        curve=stored["curve"][...], crack=stored["crack"][...].astype(bool), tip=stored["tip"][...],
+    )
 
 
 def _read_contact(path: Path, file: h5py.File, name: str, steps: int) -> Contact:

@@ -20,6 +20,16 @@ def name_trace(name: str) -> str:
     return found[1] if found else name
 
 
+def is_piece(name: str, trace: str) -> bool:
+    """Whether a name is that of a piece of a trace."""
+    return name != trace and name_trace(name) == trace
+
+
+def number_piece(name: str) -> int:
+    """The number of a piece along its trace."""
+    return int(name.rpartition(".")[2])
+
+
 def find_names(asked: Iterable[str], known: Sequence[str]) -> dict[str, list[str]]:
     """Of each name that is asked for the known ones that it stands for, in their order.
 

@@ -10,6 +10,8 @@ from matplotlib.collections import LineCollection
 
 from pbem.case.build import parse_model
 from pbem.results.animation import animate
+from pbem.results.curve_picture import find_curves
+from pbem.results.curve_profile import read_profile
 from pbem.results.page import Page
 from pbem.results.picture_limits import Limits
 from pbem.results.plots import BodyOptions, BodyPicture
@@ -63,6 +65,29 @@ def cut(tmp_path_factory: pytest.TempPathFactory) -> Results:
         for step in make_steps(model, mesh):
             writer.append(step)
     return open_results(path)
+
+
+def test_pieces_of_a_trace_are_joined_along_it(cut: Results) -> None:
+    names = [name for name in cut.contact if name_trace(name) == "long"]
+    pieces, whole = [cut.contact[name] for name in names], cut.contact["long"]
+    assert len(names) > 1 and "long" not in cut.contact and cut.contact.get("wide") is None
+    assert whole.pairs == sum(piece.pairs for piece in pieces) == whole.slip.shape[1]
+    # From the start of the crack at (-1, 0), along the x axis.
+    np.testing.assert_allclose(whole.arc_length, whole.position[:, 0] + 1.0, atol=1e-12)
+    assert (np.diff(whole.arc_length) > 0).all()
+    for quantity in ("opening", "slip", "traction_n"):
+        sums = sum(piece.integrate(quantity) for piece in pieces)
+        np.testing.assert_allclose(whole.integrate(quantity), sums, rtol=1e-12, atol=1e-15)
+    assert whole.law["friction"] == 0.1
+
+
+def test_a_trace_is_drawn_as_one_curve_from_tip_to_tip(cut: Results) -> None:
+    profile, pieces = read_profile(cut, "long", "slip"), find_names(["long"], list(cut.contact))["long"]
+    assert len(profile.place) == sum(len(read_profile(cut, name, "slip").place) for name in pieces)
+    assert (np.diff(profile.line_place) >= -1e-12).all()
+    assert find_curves(cut, ["long", "long.*"]) == ["long", *pieces]
+    with pytest.raises(ValueError, match="there is no interface, crack or curve 'lonk'"):
+        read_profile(cut, "lonk", "slip")
 
 
 def test_segments_are_as_long_as_the_curves(results: Results) -> None:

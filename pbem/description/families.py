@@ -40,11 +40,6 @@ def spread_conditions(
     return {**spread, **{name: table for name, table in conditions.items() if name not in families}}
 
 
-def spread_regions(values: Mapping[str, Condition], groups: Mapping[str, Sequence[str]]) -> dict[str, Condition]:
-    """What is said of generated inclusions by the name of their table, said of each; of a single one, that instead."""
-    return spread_conditions(values, {name: members for name, members in groups.items() if name in values})
-
-
 def spread_stage(stage: StageTable, families: Mapping[str, Sequence[str]]) -> StageTable:
     """The stage with what it says of families said of their members, and what it says of a single one instead."""
     if not families.keys() & {*stage.interfaces, *stage.boundary}:

@@ -11,6 +11,14 @@ from pydantic import ValidationError
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
 from pbem.description.families import find_families, spread_conditions, spread_laws, spread_stage
+from pbem.description.field_tables import (
+    EigenstrainTable,
+    GravityTable,
+    InSituTable,
+    PointLoadTable,
+    PointSupportTable,
+    RemoteTable,
+)
 from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
@@ -21,17 +29,11 @@ from pbem.description.schema import (
     ConditionTable,
     ContactTable,
     CurveTable,
-    EigenstrainTable,
     GenerateTable,
-    GravityTable,
-    InSituTable,
     LawTable,
     MaterialTable,
     OutputTable,
-    PointLoadTable,
-    PointSupportTable,
     RegionTable,
-    RemoteTable,
     SolverTable,
     StageTable,
     UnitsTable,
@@ -280,5 +282,5 @@ def _concerns_loads(path: KeyPath) -> bool:
     """Whether a fault here leaves open what holds and what loads the bodies."""
     if path and path[0] == "materials":
         return path[-1] == "density"
-    return bool(path) and (path[0] in ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads", "point_supports") or
-                           path[0] not in CaseFile.model_fields)
+    loads = ("boundary", "interfaces", "contacts", "stages", "gravity", "point_loads", "point_supports")
+    return bool(path) and (path[0] in loads or path[0] not in CaseFile.model_fields)

@@ -7,17 +7,10 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from pbem.description.effects import combine_laws
+from pbem.description.field_tables import EigenstrainTable
 from pbem.description.finding import Finding
 from pbem.description.placement import Area, Body, make_ground, place_bodies
-from pbem.description.schema import (
-    CaseFile,
-    CurveTable,
-    EigenstrainTable,
-    GenerateTable,
-    LawTable,
-    RegionTable,
-    StageTable,
-)
+from pbem.description.schema import CaseFile, CurveTable, GenerateTable, LawTable, RegionTable, StageTable
 from pbem.description.varying import ExpressionTable
 from pbem.wording import list_names, suggest
 
@@ -89,7 +82,7 @@ def expand(case: CaseFile) -> tuple[Expansion | None, list[Finding]]:
     groups = tuple(GeneratedGroup(table.name, table.kind, table.count, table.region) for table in case.generate)
     stages = tuple(_spread_groups(stage, groups) for stage in case.stages)
     inclusions = tuple(group for group in groups if group.kind == "inclusions")
-    temperature, eigenstrain = (_spread(values, inclusions) for values in (case.temperature, case.eigenstrain))
+    temperature, eigenstrain = _spread(case.temperature, inclusions), _spread(case.eigenstrain, inclusions)
     return Expansion(curves, regions, laws, stages, temperature, eigenstrain, groups, origin), []
 
 

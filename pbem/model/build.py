@@ -26,23 +26,23 @@ from pbem.model.crack import (
 from pbem.model.cutting import Cut, cut_cracks
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
+from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.interior import list_interior_points
 from pbem.model.law import check_along
 from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
-from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
-from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
-from pbem.model.point_supports import PointSupport, place_point_supports
-from pbem.model.support_motions import check_independent
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
+from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
+from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.resultants import describe_unbalance, find_unbalanced_force
 from pbem.model.rigid_body_modes import find_least_stiffness, find_plane_translations, find_rigid_body_modes
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
+from pbem.model.support_motions import check_independent
 from pbem.model.varying import Varying
 from pbem.wording import list_names
 
@@ -130,6 +130,7 @@ def _examine(case: Case, conditions_known: bool) -> tuple[Model | None, Case, li
 def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     case, roles, shapes = cut.case, cut.roles, cut.shapes
     split = split_at_junctions(shapes.curves, shapes.tolerance)
+    curves: Mapping[str, Curve]
     loaded = [complex(*table.at) for table in case.point_loads.values()]
     curves, places = split_at_points(split.curves, shapes.tolerance, loaded)
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
@@ -167,7 +168,9 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     curves = divide_for_tips(case, curves, tips)
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
-    return _Topology(curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults))
+    return _Topology(
+        curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults)
+    )
 
 
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology) -> tuple[Model, list[Fault]]:
@@ -248,7 +251,8 @@ def _note_loads(model: Model) -> list[str]:
     """A model whose answer is zero everywhere has probably lost its loads."""
     weights = any(region.material.density for region in model.regions)
     loads = [value for stage in model.stages for value in (
-        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair), *stage.pressure.values(), *stage.remote,
+        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
+        *stage.pressure.values(), *stage.remote, not stage.remote_growth.is_zero,
         *(stage.gravity if weights else ()))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
@@ -264,8 +268,8 @@ def _note_loads(model: Model) -> list[str]:
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
     curves = {side.curve for region in model.regions if region.name in names
               for loop in region.loops for side in loop.sides}
-    return any(not isinstance(stiffness, Varying) and 0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
-               for stiffness in condition.stiffness)
+    return any(not isinstance(stiffness, Varying) and 0 < stiffness <= soft
+               for name, condition in model.conditions.items() if name in curves for stiffness in condition.stiffness)
 
 
 def _leave_out_point_loads(model: Model) -> Model:

@@ -9,7 +9,8 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.description.case import Case
-from pbem.description.schema import EigenstrainTable, MaterialTable, StageTable
+from pbem.description.field_tables import EigenstrainTable
+from pbem.description.schema import MaterialTable, StageTable
 from pbem.description.varying import ExpressionTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.expression import ExpressionError

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pbem.exact import arc_crack_intensity
-from pbem.results.energy import EnergyBalance
 from pbem.results.describe import describe_results
+from pbem.results.energy import EnergyBalance
 from pbem.results.interface_tips import find_interface_tips
 from pbem.results.reader import open_results
 from pbem.results.tips import collect_tip_rules
@@ -27,7 +27,8 @@ def solve_inclusion(
     """An inclusion that many times as stiff as the plane about it, from whose side an arc has come off."""
     arc = {"center": [0.0, 0.0], "radius": RADIUS, "grading": "both"}
     return solve_case(
-        materials={name: {"young": 1e3 * by, "poisson": 0.2, "expansion": 1e-3} for name, by in (("rock", 1.0), ("grain", stiffness))},
+        materials={name: {"young": 1e3 * by, "poisson": 0.2, "expansion": 1e-3}
+                   for name, by in (("rock", 1.0), ("grain", stiffness))},
         curves={
             "seam": arc | {"angles": [-degrees, degrees], "elements": elements},
             "bond": arc | {"angles": [degrees, 360 - degrees], "elements": 3 * elements},

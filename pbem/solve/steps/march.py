@@ -19,8 +19,8 @@ from pbem.solve.steps.ceiling import SAFE, Ceiling
 from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, refuse_load
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
-from pbem.solve.steps.values import refuse_without_value
 from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing
+from pbem.solve.steps.values import refuse_without_value
 
 # After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
 TRIED_FROM_REST = 2

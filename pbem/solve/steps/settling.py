@@ -14,8 +14,8 @@ from pbem.arrays import Complex, Real
 from pbem.contact.loads import Load
 from pbem.mesh.interpolation import interpolate, locate_nodes
 from pbem.mesh.mesh import list_faces
-from pbem.model.support_motions import see_motions
 from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.model.support_motions import see_motions
 from pbem.solve.problem.problem import Problem
 
 

@@ -143,7 +143,7 @@ def _evaluate_pairs(
     model: Model, outer: OuterNodes, pairs: tuple[Mapping[str, tuple[Value, Value]], Mapping[str, tuple[Value, Value]]],
     stage: int, factor: float,
 ) -> Real:
-    """Of two values (k, 2) for each curve, at the end of the stage before and of this one, those at a fraction of it."""
+    """The values (k, 2) at a fraction of a stage, of pairs for each curve at the end of the one before and of this."""
     none: tuple[Value, Value] = (0.0, 0.0)
     values = np.zeros((len(outer.node), 2))
     moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)

@@ -11,6 +11,14 @@ from pydantic import ValidationError
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
 from pbem.description.families import find_families, list_named, spread_conditions, spread_laws, spread_stage
+from pbem.description.field_tables import (
+    EigenstrainTable,
+    GravityTable,
+    InSituTable,
+    PointLoadTable,
+    PointSupportTable,
+    RemoteTable,
+)
 from pbem.description.finding import Finding
 from pbem.description.generation import Expansion, GeneratedGroup, expand
 from pbem.description.plain import make_plain
@@ -22,17 +30,11 @@ from pbem.description.schema import (
     ConditionTable,
     ContactTable,
     CurveTable,
-    EigenstrainTable,
     GenerateTable,
-    GravityTable,
-    InSituTable,
     LawTable,
     MaterialTable,
     OutputTable,
-    PointLoadTable,
-    PointSupportTable,
     RegionTable,
-    RemoteTable,
     SolverTable,
     StageTable,
 )
@@ -188,11 +190,24 @@ class Case:
         family = next(families, None)
         return path if family is None else (*path[: len(path) - len(at)], at[0], family, *at[2:])
 
+    def _find_generated_region(self, path: KeyPath, swells: KeyPath) -> KeyPath:
+        """The path with the name of the table [[generate]] in place of a region that it made, if that was given."""
+        given: Any = self.given
+        for part in (*path[: len(path) - len(swells)], swells[0]):
+            given = given[part] if isinstance(part, int) else given.get(part, {})
+        name = self.generate[self.origin[str(swells[1])]].name
+        if swells[1] in given or name not in given:
+            return path
+        return (*path[: len(path) - len(swells)], swells[0], name, *swells[2:])
+
     def _find_given(self, path: KeyPath) -> KeyPath:
         if len(path) == 4 and path[0] == "regions" and isinstance(path[3], int):  # a name in a list
             names = getattr(self.regions.get(str(path[1])), str(path[2]), ())
             if path[3] < len(names) and names[path[3]] in self.origin:
                 return ("generate", self.origin[names[path[3]]])
+        swells = path[2:] if len(path) > 3 and path[0] == "stages" else path
+        if len(swells) > 1 and swells[0] in ("temperature", "eigenstrain") and swells[1] in self.origin:
+            return self._find_generated_region(path, swells)
         if len(path) < 2 or path[0] not in ("curves", "regions", "interfaces") or path[1] not in self.origin:
             return path
         if path[1] in self.given.get(str(path[0]), ()):
@@ -271,5 +286,4 @@ def _concerns_loads(path: KeyPath) -> bool:
     if path and path[0] == "materials":
         return path[-1] == "density"
     loads = ("boundary", "interfaces", "contacts", "tools", "stages", "gravity", "point_loads", "point_supports")
-    return bool(path) and (path[0] in loads or
-                           path[0] not in CaseFile.model_fields)
+    return bool(path) and (path[0] in loads or path[0] not in CaseFile.model_fields)

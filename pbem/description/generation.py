@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from pbem.description.effects import combine_laws
 from pbem.description.families import list_named, spread_named
+from pbem.description.field_tables import EigenstrainTable
 from pbem.description.finding import Finding
 from pbem.description.placement import Area, Body, make_ground, place_bodies
 from pbem.description.schema import CaseFile, CurveTable, GenerateTable, LawTable, RegionTable, StageTable
+from pbem.description.varying import ExpressionTable
 from pbem.wording import list_names, suggest
+
+Said = TypeVar("Said")
 
 # From so many on, sides make no difference to how much room there is.
 MANY = 1000
@@ -44,6 +49,8 @@ class Expansion:
     regions: Mapping[str, RegionTable]
     interfaces: Mapping[str, LawTable]
     stages: tuple[StageTable, ...]
+    temperature: Mapping[str, float | ExpressionTable]
+    eigenstrain: Mapping[str, EigenstrainTable]
     groups: tuple[GeneratedGroup, ...]
     origin: Mapping[str, int]
 
@@ -75,7 +82,9 @@ def expand(case: CaseFile) -> tuple[Expansion | None, list[Finding]]:
         laws[name] = combine_laws(laws[name], own) if name in laws else own
     groups = tuple(GeneratedGroup(table.name, table.kind, table.count, table.region) for table in case.generate)
     stages = tuple(_spread_groups(stage, groups) for stage in case.stages)
-    return Expansion(curves, regions, laws, stages, groups, origin), []
+    inclusions = tuple(group for group in groups if group.kind == "inclusions")
+    temperature, eigenstrain = _spread(case.temperature, inclusions), _spread(case.eigenstrain, inclusions)
+    return Expansion(curves, regions, laws, stages, temperature, eigenstrain, groups, origin), []
 
 
 def _check_names(case: CaseFile) -> list[Finding]:
@@ -163,11 +172,15 @@ def _spread_groups(stage: StageTable, groups: tuple[GeneratedGroup, ...]) -> Sta
     members = {group.name: group.members for group in groups}
     if members.keys() & set(list_named(stage)):
         stage = stage.model_copy(update=spread_named(stage, members))
-    told = {group.name: group for group in groups if group.name in stage.interfaces}
-    if not told:
-        return stage
-    spread = {
-        member: stage.interfaces[name] for name, group in told.items() for member in group.members
-    }
-    single = {name: table for name, table in stage.interfaces.items() if name not in told}
-    return stage.model_copy(update={"interfaces": {**spread, **single}})
+    inclusions = tuple(group for group in groups if group.kind == "inclusions")
+    return stage.model_copy(update={
+        "interfaces": _spread(stage.interfaces, groups), "temperature": _spread(stage.temperature, inclusions),
+        "eigenstrain": _spread(stage.eigenstrain, inclusions),
+    })
+
+
+def _spread(values: Mapping[str, Said], groups: Sequence[GeneratedGroup]) -> dict[str, Said]:
+    """What is said by the names of tables, of all that they made; what is said of a single one holds instead."""
+    told = {group.name: group for group in groups if group.name in values}
+    spread = {member: values[name] for name, group in told.items() for member in group.members}
+    return {**spread, **{name: value for name, value in values.items() if name not in told}}

@@ -12,6 +12,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from pbem.description.field_tables import (
+    EigenstrainTable,
+    GravityTable,
+    InSituTable,
+    PointForceTable,
+    PointLoadTable,
+    PointShiftTable,
+    PointSupportTable,
+    RemoteTable,
+)
 from pbem.description.rigid_tables import ForceTable, RigidTable, StageForceTable, StageRigidTable, ToolTable
 from pbem.description.table import Table, UnitsTable
 from pbem.description.values import (
@@ -106,7 +116,7 @@ class SpringTable(Table):
     """An elastic support, through all stages: stress per displacement, along the normal and along the curve."""
 
     kn: Strength = Field(
-        0.0, description="elastic support: adds -kn (un - end_n) to tn, through all stages; may vary with `x`, `y` and `s`"
+        0.0, description="elastic support: adds -kn (un - end_n) to tn, through all stages; without `t` if it varies"
     )
     ks: Strength = Field(0.0, description="the same along the curve: adds -ks (us - end_s) to ts")
 
@@ -137,7 +147,7 @@ class ConditionTable(StageConditionTable):
 
     rigid: RigidTable | None = Field(None, description="the curve stays rigid, under forces or with motions")
     force: ForceTable | None = Field(None, description="or a traction with this resultant")
-    spring: SpringTable | None = Field(None, description="an elastic support, beside tractions, in place of displacements")
+    spring: SpringTable | None = Field(None, description="an elastic support beside tractions")
 
 
 class LawTable(Table):
@@ -258,65 +268,6 @@ class GenerateTable(LawTable):
     seed: Annotated[int, Field(strict=True, ge=0, le=2**53)] = Field(
         1, description="of the random numbers: the same table gives the same model on every machine"
     )
-
-
-class RemoteTable(Table):
-    """Components of the stress at infinity."""
-
-    sxx: LinearValue = 0.0
-    syy: LinearValue = 0.0
-    sxy: LinearValue = 0.0
-
-
-class InSituTable(Table):
-    """Components of the stress at rest."""
-
-    sxx: LinearValue = 0.0
-    syy: LinearValue = 0.0
-    sxy: LinearValue = 0.0
-
-
-class EigenstrainTable(Table):
-    """Strain that a region would take without stress if nothing held it."""
-
-    exx: Number = 0.0
-    eyy: Number = 0.0
-    exy: Number = Field(0.0, description="shear component of the tensor, half the change of the right angle")
-    ezz: Number = Field(0.0, description="across the plane; without effect in plane stress")
-
-
-class PointForceTable(Table):
-    """Force and moment at a point, per thickness."""
-
-    fx: Number = Field(0.0, description="force along x")
-    fy: Number = Field(0.0, description="force along y")
-    moment: Number = Field(0.0, description="moment, counter-clockwise; inside regions only")
-
-
-class PointLoadTable(PointForceTable):
-    """A force at a point inside a region or on the boundary of one. NAME is of your choice."""
-
-    at: Point = Field(description="x, y of the point")
-
-
-class PointShiftTable(Table):
-    """Displacement of a point."""
-
-    ux: Number | None = Field(None, description="displacement along x")
-    uy: Number | None = Field(None, description="displacement along y")
-
-
-class PointSupportTable(PointShiftTable):
-    """A point of a boundary whose displacement is given. NAME is of your choice."""
-
-    at: Point = Field(description="x, y of the point")
-
-
-class GravityTable(Table):
-    """Acceleration; a region's weight per volume is its density times this."""
-
-    gx: Number = 0.0
-    gy: Number = 0.0
 
 
 class AnalysisTable(Table):

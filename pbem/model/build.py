@@ -152,6 +152,7 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
 def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     case, roles, shapes = cut.case, cut.roles, cut.shapes
     split = split_at_junctions(shapes.curves, shapes.tolerance)
+    curves: Mapping[str, Curve]
     loaded = [complex(*table.at) for table in case.point_loads.values()]
     curves, places = split_at_points(split.curves, shapes.tolerance, loaded)
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
@@ -193,7 +194,9 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
     return _Topology(
-        curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults), overlaps)
+        curves, split.breaks, opposite, loops, tips, shapes.size, points, supports, tuple(notes), tuple(faults),
+        overlaps,
+    )
 
 
 def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
@@ -294,8 +297,8 @@ def _note_loads(model: Model) -> list[str]:
     weights = any(region.material.density for region in model.regions)
     loads = [value for stage in model.stages for value in (
         *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
-        *stage.pressure.values(), *stage.remote, *(stage.gravity if weights else ()),
-        *(each for values in stage.rigid.values() for each in values))]
+        *stage.pressure.values(), *stage.remote, not stage.remote_growth.is_zero,
+        *(stage.gravity if weights else ()), *(each for values in stage.rigid.values() for each in values))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
@@ -311,8 +314,8 @@ def _note_loads(model: Model) -> list[str]:
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:
     curves = {side.curve for region in model.regions if region.name in names
               for loop in region.loops for side in loop.sides}
-    return any(not isinstance(stiffness, Varying) and 0 < stiffness <= soft for name, condition in model.conditions.items() if name in curves
-               for stiffness in condition.stiffness)
+    return any(not isinstance(stiffness, Varying) and 0 < stiffness <= soft
+               for name, condition in model.conditions.items() if name in curves for stiffness in condition.stiffness)
 
 
 def _leave_out_point_loads(model: Model) -> Model:

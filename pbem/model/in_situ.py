@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.arrays import Complex, Real
-from pbem.description.schema import InSituTable
+from pbem.description.field_tables import InSituTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.expression import ExpressionError
 from pbem.geometry.junction import format_point

@@ -152,12 +152,12 @@ class Stage:
 
     boundary: for every outer curve its two known values, in the frame of its Condition (complete: values that the
     file leaves out are carried over); pressure: fluid pressure of every interface. remote: stress sxx, syy, sxy at
-    infinity, for infinite regions, at the model's middle; remote_growth: how it grows from there; gravity: acceleration (gx, gy), times the materials' densities. duration: time,
-    shared by the steps; 0 where there is no time. swelling: strain without stress of the regions that have any.
-    point_forces: force along x and y and moment of every point load. support_values: displacement along x and y of every
-    point support. ends: of the curves whose springs' far ends move: by how much, along the normal and the curve.
-    rigid: of every rigid body its three forces or motions, rotations in degrees.
-    construction: which faces are held otherwise than by their law, and which regions are gone.
+    infinity, for infinite regions, at the model's middle; remote_growth: how it grows from there; gravity: acceleration
+    (gx, gy), times the materials' densities. duration: time, shared by the steps; 0 where there is no time. swelling:
+    strain without stress of the regions that have any. point_forces: force along x and y and moment of every point
+    load. support_values: displacement along x and y of every point support. ends: of the curves whose springs' far ends
+    move: by how much, along the normal and the curve. rigid: of every rigid body its three forces or motions, rotations
+    in degrees. construction: which faces are held otherwise than by their law, and which regions are gone.
     """
 
     name: str
@@ -233,7 +233,8 @@ class Model:
     groups: the curves that were generated together. ties: bits of interfaces and cracks in narrow wedges whose pairs
     follow the status of the pair next to them. law_texts: contents of the files of custom laws, by their paths, as they
     were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
-    point_loads: where forces act at single points. point_supports: where points of free bodies are. notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
+    point_loads: where forces act at single points. point_supports: where points of free bodies are.
+    notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
     """
 
     title: str

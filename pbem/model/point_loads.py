@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.description.case import Case
-from pbem.description.schema import PointForceTable
+from pbem.description.field_tables import PointForceTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.curve import Curve, Leg, turning_angle
 from pbem.geometry.intersection import measure_distances, meeting_points, project

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from pbem.description.case import Case
-from pbem.description.schema import GravityTable, InSituTable, RemoteTable
+from pbem.description.field_tables import GravityTable, InSituTable, RemoteTable
 from pbem.description.varying import ExpressionTable
 from pbem.errors import Fault, KeyPath
 from pbem.model.in_situ import AT_REST, BALANCED, COMPONENTS, LinearStress, check_rest, read_in_situ
@@ -36,7 +36,7 @@ def read_backgrounds(case: Case) -> Backgrounds:
     def read(loc: KeyPath, table: RemoteTable | None) -> LinearStress:
         """What is given so far, with the changes of a table."""
         given.update({key: getattr(table, key) for key in COMPONENTS if table and key in table.model_fields_set})
-        stress, wrong = read_in_situ(loc, InSituTable.model_construct(**given), find_corners(case))
+        stress, wrong = read_in_situ(loc, InSituTable.model_validate(given), find_corners(case))
         faults.extend(fault for fault in wrong if table and fault.path[-1] in table.model_fields_set)
         return stress
 
@@ -85,8 +85,8 @@ def _check_infinite(
             loc: KeyPath = ("stages", number, "remote" if stage.remote else "gravity")
         else:
             loc = ("remote",) if case.remote and not stress.is_uniform else ("gravity",)
-        found = (f"a stress that grows by ({held.real:.6g}, {held.imag:.6g}) per length in the infinite region '{name}' "
-                 f"against a weight of ({weight.real:.6g}, {weight.imag:.6g}) per volume")
+        found = (f"a stress that grows by ({held.real:.6g}, {held.imag:.6g}) per length in the infinite region "
+                 f"'{name}' against a weight of ({weight.real:.6g}, {weight.imag:.6g}) per volume")
         table_name = f"[initial_stress.{case.regions[name].material}]"
         expected = (f"a stress in [remote] or {table_name} that grows with x and y in balance with the weight: "
                     "d sxx/dx + d sxy/dy = -density gx, d sxy/dx + d syy/dy = -density gy; or density = 0 there")

@@ -28,7 +28,8 @@ def see_motions(supports: Sequence[PointSupport], motions: Sequence[RigidBodyMod
 
 def check_independent(supports: Sequence[PointSupport], motions: Sequence[RigidBodyMode]) -> Iterator[Fault]:
     """A fault for every condition at which the motions that the others leave free do not move."""
-    keys = [(support, key) for support in supports for key, held in zip(("ux", "uy"), support.held, strict=True) if held]
+    keys = [(support, key) for support in supports
+            for key, held in zip(("ux", "uy"), support.held, strict=True) if held]
     seen = see_motions(supports, motions)
     seen = seen / np.array([
         max((abs(shift + 1j * spin * support.place) for support in supports

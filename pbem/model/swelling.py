@@ -9,7 +9,8 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.description.case import Case
-from pbem.description.schema import EigenstrainTable, MaterialTable, StageTable
+from pbem.description.field_tables import EigenstrainTable
+from pbem.description.schema import MaterialTable, StageTable
 from pbem.description.varying import ExpressionTable
 from pbem.errors import Fault, KeyPath
 from pbem.geometry.expression import ExpressionError
@@ -134,7 +135,7 @@ def _check_region(case: Case, loc: KeyPath, name: str, heated: bool) -> Iterator
         yield Fault.at(loc, f"{what} of the infinite region '{name}'", expected)
     material = case.materials.get(region.material)
     if heated and material is not None and not material.expansion:
-        found = f"a temperature of region '{name}', whose material '{region.material}' does not expand"
+        found = f"a temperature of a region whose material '{region.material}' does not expand"
         yield Fault.at(loc, found, f"expansion in [materials.{region.material}]")
 
 

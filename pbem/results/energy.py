@@ -105,8 +105,7 @@ class _Reference:
     at_points: Real
 
     def conjugate(self, weight: Real, traction: Complex, displacement: Complex, point_forces: Real) -> Real:
-        """Betti's sum (c,) for the field with these tractions and displacements on all faces (f,), and point loads (l,).
-        """
+        """Betti's sum (c,) for the field with tractions and displacements on all faces (f,); point_forces (l,)."""
         w, t, u = weight[self.faces], traction[self.faces], displacement[self.faces]
         on_faces = (w * (t * np.conj(self.displacement) - np.conj(self.traction) * u)).real.sum(axis=1)
         return np.asarray(on_faces + self.at_points @ point_forces)

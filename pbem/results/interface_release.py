@@ -52,7 +52,12 @@ class InterfaceRelease:
         return self.rows is None and len(self.tips) > 0
 
     def evaluate(self, step: Step) -> Real:
-        """J (tips,), stress times length; NaN if there are too many, and where a region swells."""
+        """J (tips,), stress times length; NaN if there are too many.
+
+        The closed path in each region is that of its elastic field, without body force and swelling. What the regions
+        swell by, in whatever way, moves the faces against each other, but with them no singular stress: on the way to
+        the tip their work vanishes.
+        """
         J = np.full(len(self.tips), np.nan)
         if self.rows is None:
             return J
@@ -61,8 +66,6 @@ class InterfaceRelease:
         inside = self.rows.evaluate(moved, carried)
         materials = [region.material for region in self.model.regions]
         for number, tip in enumerate(self.tips):
-            if any(not backgrounds[region][0].swelling.is_zero for region, *_ in tip.sides):
-                continue  # the integral takes all strain for elastic
             J[number] = 0.0
             # The faces meet at the tip: displacements are those relative to it.
             tied = np.concatenate([chain[:1] for _, *both in tip.sides for chain in both])

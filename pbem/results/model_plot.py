@@ -53,6 +53,7 @@ def draw_model(model: Model, mesh: Mesh, levels: Integer | None = None) -> Figur
     _draw_elements(axes, model, mesh)
     for condition in model.conditions.values():
         _draw_condition(axes, model, mesh, condition, used[condition.curve])
+    _draw_points(axes, model)
     few = len(model.curves) <= MOST_NAMES
     for name, elements in used.items():
         if few and len(elements):
@@ -230,6 +231,30 @@ def _draw_arrows(axes: Axes, size: float, place: Complex, normal: Complex, vecto
     axes.update_datalim(to_columns(tips))
 
 
+def _draw_points(axes: Axes, model: Model) -> None:
+    """Arrows and dots of point loads, the last forces that are not zero; triangles of point supports."""
+    for name, load in model.point_loads.items():
+        forces = [stage.point_forces[name] for stage in model.stages if any(stage.point_forces[name])]
+        x, y, moment = forces[-1] if forces else (0.0, 0.0, 0.0)
+        force = complex(x, y)
+        if force:
+            arrow = 0.09 * model.size * force / abs(force)
+            # On a boundary a force that pulls begins at its point.
+            pulls = load.on_boundary and (force * load.inward.conjugate()).real < 0
+            tail = load.place if pulls else load.place - arrow
+            axes.quiver(tail.real, tail.imag, arrow.real, arrow.imag, color=FORCE, angles="xy", scale_units="xy",
+                        scale=1, width=0.005, headwidth=4.0, headlength=5.0, zorder=5)
+            axes.update_datalim(to_columns(np.array([tail, tail + arrow])))
+        axes.plot(load.place.real, load.place.imag, "o", color=FORCE, markersize=2.5, zorder=5)
+        text = escape(f"{name}, moment {moment:g}" if moment else name)
+        axes.annotate(text, (load.place.real, load.place.imag), (4, 4), textcoords="offset points", fontsize=7,
+                      color=FORCE, zorder=6)
+    for name, support in model.point_supports.items():
+        axes.plot(support.place.real, support.place.imag, "^", color=SUPPORT, markersize=5, zorder=5)
+        axes.annotate(escape(name), (support.place.real, support.place.imag), (4, -9), textcoords="offset points",
+                      fontsize=7, color=SUPPORT, zorder=6)
+
+
 def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: Integer) -> None:
     """The curve's name at its middle, with what is prescribed there; beside a steep curve the text runs upwards."""
     one_side = elements[mesh.region[elements] == mesh.region[elements[0]]]
@@ -295,6 +320,11 @@ def _list_handles(model: Model, few: bool) -> list[Line2D]:
                for name, condition in model.conditions.items() for i, known in enumerate(condition.known)):
             handles.append(Line2D([], [], color=color, marker=r"$\rightarrow$", markersize=8, linestyle="none",
                                   label=f"{quantity}s prescribed"))
+    if model.point_loads:
+        handles.append(Line2D([], [], color=FORCE, marker="o", markersize=2.5, linestyle="none", label="point loads"))
+    if model.point_supports:
+        handles.append(Line2D([], [], color=SUPPORT, marker="^", markersize=5, linestyle="none",
+                              label="point supports"))
     if not few:
         handles.append(Line2D([], [], linestyle="none", label=f"{len(model.curves)} curves, names left out"))
     return handles

@@ -58,9 +58,22 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
              "remote": dict(zip(("sxx", "syy", "sxy"), describe_remote(stage, model.origin), strict=True)),
              "gravity": dict(zip(("gx", "gy"), stage.gravity, strict=True)),
              "joints": dict(stage.construction.joints), "removed": [*stage.construction.removed],
-             "swelling": {name: each.describe(model.origin) for name, each in stage.swelling.items()}}
+             "swelling": {name: each.describe(model.origin) for name, each in stage.swelling.items()},
+             "point_loads": {name: dict(zip(("fx", "fy", "moment"), force, strict=True))
+                             for name, force in stage.point_forces.items()},
+             "point_supports": {name: dict(zip(("ux", "uy"), values, strict=True))
+                                for name, values in stage.support_values.items()},
+             "ends": {name: [*map(to_plain, values)] for name, values in stage.ends.items()}}
             for stage in model.stages
         ],
+        "point_loads": {
+            name: {"at": _to_pair(load.place + model.origin), "region": load.region, "on_boundary": load.on_boundary}
+            for name, load in model.point_loads.items()
+        },
+        "point_supports": {
+            name: {"at": _to_pair(support.place + model.origin), "curve": support.curve, "held": list(support.held)}
+            for name, support in model.point_supports.items()
+        },
         "initial_stress": {
             name: dict(zip(("sxx", "syy", "sxy"),
                            stress.value if stress.is_uniform else stress.describe(model.origin), strict=True))
@@ -75,6 +88,10 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
         "notes": [*model.notes, *mesh.notes],
         "doubts": list_doubts(model, mesh),
     }  # fmt: skip
+
+
+def _to_pair(point: complex) -> list[float]:
+    return [point.real, point.imag]
 
 
 def _list_region(region: Region) -> dict[str, Any]:

@@ -180,11 +180,16 @@ def _describe_loads(model: Model) -> list[str]:
         if stage.duration:
             parts.append(f"duration {stage.duration:g}")
         if any(stage.remote) or not stage.remote_growth.is_zero:
-            given = (f"{value:g}" if isinstance(value, float) else value for value in describe_remote(stage, model.origin))
+            remote = describe_remote(stage, model.origin)
+            given = (f"{value:g}" if isinstance(value, float) else value for value in remote)
             parts.append("remote stress sxx, syy, sxy = {}, {}, {}".format(*given))
         if any(stage.gravity):
             parts.append("gravity {:g}, {:g}".format(*stage.gravity))
         parts += describe_construction(model, number)
+        parts += shorten([
+            f"point load {name}: force {force[0]:g}, {force[1]:g}" + (f", moment {force[2]:g}" if force[2] else "")
+            for name, force in stage.point_forces.items() if any(force)
+        ], 4)
         pressure = {name: value for name, value in stage.pressure.items() if value}
         parts += shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
         lines.append(", ".join(parts))
@@ -214,7 +219,13 @@ def _describe_boundary(model: Model, stage: Stage) -> list[str]:
             f"{'u' if quantity == 'displacement' else 't'}{name} = {value:g}"
             for quantity, name, value in zip(condition.known, names, values, strict=True) if value
         ]
+        ends = zip("ns", stage.ends.get(curve, (0.0, 0.0)), strict=True)
+        given += [f"end_{name} = {value:g}" for name, value in ends if value]
         texts += [f"{curve}: {', '.join(given)}"] if given else []
+    for name, support in model.point_supports.items():
+        values = stage.support_values[name]
+        held = [f"u{axis} = {value:g}" for axis, value, said in zip("xy", values, support.held, strict=True) if said]
+        texts.append(f"{name}, at {format_point(support.place + model.origin)}: {', '.join(held)}")
     return texts
 
 

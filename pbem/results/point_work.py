@@ -13,7 +13,6 @@ import numpy as np
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.bem.point_field import PointField
-from pbem.contact.loads import balanced_background
 from pbem.mesh.interpolation import interpolate, locate_nodes
 from pbem.mesh.mesh import Faces, Mesh
 from pbem.model.model import Model

@@ -222,7 +222,8 @@ class ResultWriter:
         if self._model.conditions or self._model.point_supports:
             unknown = np.full(2, np.nan)
             supports = [step.support_reactions.get(name, unknown) for name in self._model.point_supports]
-            append_row(together["reactions"], np.concatenate([to_columns(reactions), np.array(supports).reshape(-1, 2)]))
+            rows = [to_columns(reactions), np.array(supports).reshape(-1, 2)]
+            append_row(together["reactions"], np.concatenate(rows))
         contact = {name: getattr(step.contact, name) for name in SHOWN} | dict(step.contact.internal)
         for quantity in list_pair_datasets(self._model) if len(self._pairs) else ():
             append_row(together["contact"][quantity], contact[quantity][self._pairs])
@@ -270,7 +271,8 @@ class ResultWriter:
         """At the nodes of all faces; regions of the same material are taken as one, as there can be thousands."""
         initial = [balanced for balanced, _ in evaluate_particular_solutions(self._model, step.stage, step.factor)]
         kinds: dict[Hashable, int] = {}
-        kind_of = [kinds.setdefault((each.material, each.initial, each.swelling, each.points), len(kinds)) for each in initial]
+        kind_of = [kinds.setdefault((each.material, each.initial, each.swelling, each.points), len(kinds))
+                   for each in initial]
         mesh = self._mesh
         if mesh.order > 0:  # else the stretch is told by neighbours of the same region
             mesh = replace(mesh, region=np.array(kind_of)[mesh.region])

@@ -56,3 +56,28 @@ def test_conditions_of_a_line_are_those_of_its_curves() -> None:
     )
     values = build_model(case).stages[0].boundary
     assert values["side.1"] == (0.0, 0.0) and values["side.2"] == (0.0, 0.5)
+
+
+def test_inclusions_of_one_table_are_heated_by_its_name() -> None:
+    def make_grains(**tables: Any) -> Case:
+        return Case(
+            materials={"rock": {"young": 100.0, "poisson": 0.2},
+                       "ice": {"young": 9.0, "poisson": 0.3, "expansion": 5e-5}},
+            regions={"plane": {"material": "rock", "infinite": True}},
+            generate=[{"kind": "inclusions", "name": "grain", "region": "plane", "material": "ice", "count": 3,
+                       "elements": 8, "radius": 1.0, "density": 0.01, "distance": 0.5}], **tables,
+        )  # fmt: skip
+
+    case = make_grains(temperature={"grain": 10.0, "grain_2": 4.0}, stages=[
+        {"steps": 1}, {"steps": 1, "temperature": {"grain": 20.0}, "eigenstrain": {"grain": {"exy": 1e-3}}}])
+    first, second = build_model(case).stages
+    warm = 1.3 * 5e-5
+    swollen = [first.swelling[f"grain_{k}"].strain[0] for k in (1, 2, 3)]
+    assert swollen == pytest.approx([10 * warm, 4 * warm, 10 * warm])
+    assert [second.swelling[f"grain_{k}"].strain[2] for k in (1, 2, 3)] == [1e-3] * 3
+    assert second.swelling["grain_2"].strain[0] == pytest.approx(20 * warm)
+    with pytest.raises(CaseError) as caught:
+        build_model(make_grains(temperature={"grain": {"expression": "x*x"}}))
+    assert [fault.path for fault in caught.value.faults] == [("temperature", "grain")]
+    with pytest.raises(CaseError, match=r"unknown region 'grains'"):
+        build_model(make_grains(temperature={"grains": 1.0}))

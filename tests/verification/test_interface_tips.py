@@ -10,6 +10,7 @@ import pytest
 
 from pbem.exact import arc_crack_intensity
 from pbem.results.describe import describe_results
+from pbem.results.energy import EnergyBalance
 from pbem.results.interface_tips import find_interface_tips
 from pbem.results.reader import open_results
 from pbem.results.tips import collect_tip_rules
@@ -21,12 +22,13 @@ RADIUS = 1.5
 
 def solve_inclusion(
     stiffness: float, degrees: float, pressure: float = 0.0, remote: float = 0.0, elements: int = 16,
-    in_situ: float = 0.0,
+    in_situ: float = 0.0, shrink: float = 0.0, growth: float = 0.0,
 ) -> Solved:
     """An inclusion that many times as stiff as the plane about it, from whose side an arc has come off."""
     arc = {"center": [0.0, 0.0], "radius": RADIUS, "grading": "both"}
     return solve_case(
-        materials={name: {"young": 1e3 * by, "poisson": 0.2} for name, by in (("rock", 1.0), ("grain", stiffness))},
+        materials={name: {"young": 1e3 * by, "poisson": 0.2, "expansion": 1e-3}
+                   for name, by in (("rock", 1.0), ("grain", stiffness))},
         curves={
             "seam": arc | {"angles": [-degrees, degrees], "elements": elements},
             "bond": arc | {"angles": [degrees, 360 - degrees], "elements": 3 * elements},
@@ -38,6 +40,8 @@ def solve_inclusion(
         interfaces={"seam": {"law": "open", "pressure": pressure}, "bond": {"law": "bonded"}},
         remote={"sxx": remote, "syy": remote},
         initial_stress={name: {"sxx": in_situ, "syy": in_situ} for name in ("rock", "grain")},
+        eigenstrain={"inside": {"exx": -shrink, "eyy": -shrink}} if shrink else {},
+        temperature={"inside": {"expression": f"{growth}*x"}} if growth else {},
         analysis={"steps": 1},
     )
 
@@ -68,6 +72,26 @@ def test_between_two_materials_it_is_the_energy_released() -> None:
     released = (energies[1] - energies[0]) / (2 * RADIUS * math.radians(1.0))
     J = evaluate_release(solve_inclusion(4.0, 60.0, pressure=1.0))
     np.testing.assert_allclose(J, released, rtol=5e-3)
+
+
+@pytest.mark.parametrize("degrees", [30.0, 60.0])
+def test_beside_a_region_that_shrinks(degrees: float) -> None:
+    """An inclusion of the plane's own material, that pulls on it by G e/(1 - nu) where it is bonded."""
+    pull = 1e3 / 2.4 * 2e-3 / 0.8
+    KI, KII = arc_crack_intensity(RADIUS, math.radians(degrees), pull)
+    J = evaluate_release(solve_inclusion(1.0, degrees, shrink=2e-3))
+    np.testing.assert_allclose(J, (KI**2 + KII**2) / (1e3 / (1 - 0.2**2)), rtol=1e-3)
+
+
+@pytest.mark.parametrize("swelling", [{"shrink": 2e-3}, {"growth": -1.0}])
+def test_between_two_materials_that_swell_it_is_the_energy_released(swelling: dict[str, float], tmp_path: Path) -> None:
+    """The strain without stress is given, so that what is released is what is stored less in a longer crack."""
+    energies = []
+    for degrees in (59.5, 60.5):
+        solved = solve_inclusion(4.0, degrees, **swelling)
+        energies.append(EnergyBalance(solved.model, solved.mesh).add(solved.last).elastic)
+    J = evaluate_release(solve_inclusion(4.0, 60.0, **swelling))
+    assert J.sum() == pytest.approx(-(energies[1] - energies[0]) / (RADIUS * math.radians(1.0)), rel=1e-2)
 
 
 @pytest.mark.parametrize("stiffness", [1.0, 3.0, 100.0])

@@ -23,6 +23,7 @@ from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_bal
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing
+from pbem.solve.steps.values import refuse_without_value
 
 # After so many tries from rest the least step is tried, where that tells what becomes of all small ones.
 TRIED_FROM_REST = 2
@@ -138,6 +139,7 @@ def _advance(
     tries, alike = 0, is_proportional_at_last(problem, memory, stage, reached)
     while True:
         reporter.start_step(stage, reached, target)
+        refuse_without_value(problem, stage, reached, target)
         # From rest nothing is gained by an early end.
         refuse = _never if proportional else partial(refuse_load, problem, memory, stage, target)
         try:

@@ -1,0 +1,68 @@
+"""Tables of what acts within regions: stress far away and at rest, weight, strain without stress, and single points."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pbem.description.table import Table
+from pbem.description.values import Number, Point
+from pbem.description.varying import LinearValue
+
+
+class RemoteTable(Table):
+    """Components of the stress at infinity."""
+
+    sxx: LinearValue = 0.0
+    syy: LinearValue = 0.0
+    sxy: LinearValue = 0.0
+
+
+class InSituTable(Table):
+    """Components of the stress at rest."""
+
+    sxx: LinearValue = 0.0
+    syy: LinearValue = 0.0
+    sxy: LinearValue = 0.0
+
+
+class EigenstrainTable(Table):
+    """Strain that a region would take without stress if nothing held it."""
+
+    exx: Number = 0.0
+    eyy: Number = 0.0
+    exy: Number = Field(0.0, description="shear component of the tensor, half the change of the right angle")
+    ezz: Number = Field(0.0, description="across the plane; without effect in plane stress")
+
+
+class PointForceTable(Table):
+    """Force and moment at a point, per thickness."""
+
+    fx: Number = Field(0.0, description="force along x")
+    fy: Number = Field(0.0, description="force along y")
+    moment: Number = Field(0.0, description="moment, counter-clockwise; inside regions only")
+
+
+class PointLoadTable(PointForceTable):
+    """A force at a point inside a region or on the boundary of one. NAME is of your choice."""
+
+    at: Point = Field(description="x, y of the point")
+
+
+class PointShiftTable(Table):
+    """Displacement of a point."""
+
+    ux: Number | None = Field(None, description="displacement along x")
+    uy: Number | None = Field(None, description="displacement along y")
+
+
+class PointSupportTable(PointShiftTable):
+    """A point of a boundary whose displacement is given. NAME is of your choice."""
+
+    at: Point = Field(description="x, y of the point")
+
+
+class GravityTable(Table):
+    """Acceleration; a region's weight per volume is its density times this."""
+
+    gx: Number = 0.0
+    gy: Number = 0.0

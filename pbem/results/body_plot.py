@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.results.outline import Outline, find_tips, trace_outlines
-from pbem.results.page import Box, Page, finish_plane
-from pbem.results.plot_style import MODES, TIP, choose_shades, escape
+from pbem.results.page import Box, Page, find_tools, finish_plane
+from pbem.results.plot_style import MODES, TIP, TOOL_WIDTH, choose_shades, escape
 from pbem.results.reader import Results
 
 MOST_MARKS = 300
@@ -34,17 +34,21 @@ def draw_body(
     displacement = none if step is None else results.displacement_at(step)
     outlines = trace_outlines(results.nodes, results.elements, displacement)
     gone = np.zeros(len(results.nodes.region_names), dtype=bool) if step is None else results.find_gone(step)
-    _fill_regions(axes, choose_shades(results.nodes.region_names, results.groups), outlines, magnify, gone)
+    tools = find_tools(results)
+    unfilled = tools | frozenset(np.flatnonzero(gone).tolist())
+    _fill_regions(axes, choose_shades(results.nodes.region_names, results.groups), outlines, magnify, unfilled)
     axes.add_collection(LineCollection([each.position for each in outlines], colors="0.7", linewidths=0.6, zorder=1))
     lines = [each.position + magnify * each.displacement for each in outlines]
-    axes.add_collection(LineCollection(lines, colors="0.15", linewidths=0.8, zorder=3))
+    widths = [TOOL_WIDTH if each.region in tools else 0.8 for each in outlines]
+    axes.add_collection(LineCollection(lines, colors="0.15", linewidths=widths, zorder=3))
     places = _displace_pairs(results, displacement, magnify)
     marks = _mark_modes(axes, results, step, places, box) if step is not None else []
     marks += _mark_tips(axes, results, outlines, magnify, box)
     write_names(axes, results, names, box, places)
     finish_plane(axes, results, frame, page)
     return [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
-            Line2D([], [], color="0.7", linewidth=0.6, label="as it was"), *marks]
+            Line2D([], [], color="0.7", linewidth=0.6, label="as it was"),
+            *([Line2D([], [], color="0.15", linewidth=TOOL_WIDTH, label="rigid tool")] if tools else []), *marks]
 
 
 def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: Box, places: Real) -> None:
@@ -72,17 +76,17 @@ def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: 
 
 
 def _fill_regions(
-    axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float, gone: Bool
+    axes: Axes, shade: Sequence[str], outlines: Sequence[Outline], magnify: float, unfilled: frozenset[int]
 ) -> None:
-    """Shade the regions but those that are gone; the holes stay free since inner loops run the other way round.
-    Cavities of infinite regions are left white in a shaded plane."""
+    """Shade the regions but tools and those that are gone; the holes stay free since inner loops run the other way
+    round. Cavities of infinite regions are left white in a shaded plane."""
     loops: list[list[Real]] = [[] for _ in shade]
     for each in outlines:
         if not each.crack:
             loops[each.region].append(each.position + magnify * each.displacement)
     bodies, shades, cavities = [], [], []
     for region, shapes in enumerate(loops):
-        if gone[region]:
+        if region in unfilled:
             continue
         if any(_area(shape) > 0 for shape in shapes):
             bodies.append(OutlinePath.make_compound_path(*(OutlinePath(shape, closed=True) for shape in shapes)))

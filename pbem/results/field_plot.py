@@ -23,6 +23,7 @@ from pbem.results.page import (
     Page,
     choose_box,
     describe_box,
+    find_tools,
     finish_plane,
     read_infinite,
     save,
@@ -134,7 +135,7 @@ class FieldPicture:
         spacing = float((box.size / (across, up)).max() if self._options.shape is None
                         else (box.size / (across, up)).min())
         view = View(box.low, box.high, spacing, spacing / CLOSER)
-        triangles = triangulate(results.elements, read_infinite(results), view)
+        triangles = triangulate(results.elements, read_infinite(results), view, find_tools(results))
         places = to_columns(triangles.position)[triangles.corners]
         return triangles.select(view.meets(places.min(axis=1), places.max(axis=1)))
 

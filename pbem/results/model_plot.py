@@ -22,7 +22,7 @@ from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Value, evaluate
 from pbem.results.model_text import describe_condition
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
-from pbem.results.plot_style import FORCE, MOTION, SUPPORT, choose_shades, escape, label, style
+from pbem.results.plot_style import FORCE, MOTION, SUPPORT, TOOL_WIDTH, choose_shades, escape, label, style
 from pbem.results.refinement_plot import draw_levels
 
 MOST_NAMES = 30
@@ -87,6 +87,13 @@ def _draw_regions(axes: Axes, model: Model, mesh: Mesh) -> None:
     for number, region in enumerate(model.regions):
         own = slice(ends[number], ends[number + 1])
         loops = [OutlinePath(to_columns(loop)) for loop in _list_loops(mesh, lines, own)]
+        if region.rigid:
+            points = to_columns(lines[own])
+            axes.add_collection(LineCollection(list(points), colors="0.15", linewidths=TOOL_WIDTH, zorder=2.5))
+            middle = points.reshape(-1, 2)[points.shape[0] * points.shape[1] // 2]
+            axes.annotate(escape(region.name), middle, xytext=(4, 4), textcoords="offset points", style="italic",
+                          color="0.3", zorder=6)
+            continue
         if region.infinite:
             axes.set_facecolor(shades[number])
             cavities += loops
@@ -100,7 +107,8 @@ def _draw_regions(axes: Axes, model: Model, mesh: Mesh) -> None:
                 place.real, place.imag, escape(region.name), ha="center", va="center", style="italic", color="0.3",
                 zorder=6,
             )
-    shown = [shade for shade, region in zip(shades, model.regions, strict=True) if not region.infinite]
+    shown = [shade for shade, region in zip(shades, model.regions, strict=True)
+             if not region.infinite and not region.rigid]
     axes.add_collection(PathCollection(cavities, facecolors="white", edgecolors="none", zorder=0))
     axes.add_collection(PathCollection(bodies, facecolors=shown, edgecolors="none", zorder=0.5))
 
@@ -154,6 +162,10 @@ def _draw_ticks(axes: Axes, model: Model, mesh: Mesh) -> None:
 
 def _draw_condition(axes: Axes, model: Model, mesh: Mesh, condition: Condition, elements: Integer) -> None:
     """Supports where displacements are held, arrows for displacements and tractions that are not zero."""
+    if any(condition.curve in body.curves for body in model.rigid.values()):
+        lines = [to_columns(line) for line in _trace_lines(mesh)[elements]]
+        axes.add_collection(LineCollection(lines, colors=SUPPORT, linewidths=TOOL_WIDTH, zorder=2.5))
+        return
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
     place, normal = _spread_points(mesh, elements)
     local = condition.value_frame == "local"
@@ -325,6 +337,8 @@ def _list_handles(model: Model, few: bool) -> list[Line2D]:
     if model.point_supports:
         handles.append(Line2D([], [], color=SUPPORT, marker="^", markersize=5, linestyle="none",
                               label="point supports"))
+    if model.rigid:
+        handles.append(Line2D([], [], color=SUPPORT, linewidth=TOOL_WIDTH, label="rigid"))
     if not few:
         handles.append(Line2D([], [], linestyle="none", label=f"{len(model.curves)} curves, names left out"))
     return handles

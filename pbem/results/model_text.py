@@ -122,7 +122,7 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     values = [stage.boundary.get(condition.curve, (0.0, 0.0)) for stage in model.stages]
     rigid = next((name for name, body in model.rigid.items() if condition.curve in body.curves), None)
     if rigid is not None:
-        return f"rigid body {rigid}", f"rigid body {rigid}"
+        return "rigid", f"body {rigid}"
     if condition.known == ("traction", "traction") and not any(map(any, [*values, condition.stiffness])):
         return "free", "free"
     texts = []

@@ -166,6 +166,11 @@ def read_infinite(results: Results) -> Bool:
     return np.array([region["infinite"] for region in json.loads(results.configuration)["regions"]], dtype=bool)
 
 
+def find_tools(results: Results) -> frozenset[int]:
+    """Numbers of the regions that are rigid tools, with nothing inside."""
+    return frozenset(results.nodes.region_names.index(name) for name, body in results.rigid.items() if body.tool)
+
+
 def finish_plane(axes: Axes, results: Results, box: Box, page: Page) -> None:
     """Labels, ticks and limits of a picture of the plane."""
     scale_plane(axes, results, 4 if page.is_narrow else 6)

@@ -59,6 +59,8 @@ def choose_shades(names: Sequence[str], groups: Sequence[GeneratedGroup]) -> lis
 SHADES = ("#DCE6EE", "#EFE6D5", "#DFEBDC", "#EADFEA", "#E4E4E4", "#F2DEDA")
 POWER, SUPERSCRIPT = r"\^(-?[0-9.]+)", r"$^{\1}$"
 TIP = "#A51C30"
+# Of the lines of rigid tools and curves, points.
+TOOL_WIDTH = 2.2
 TITLE_WIDTH = 90
 FORCE, MOTION, SUPPORT = "#D55E00", "#0072B2", "#444444"
 

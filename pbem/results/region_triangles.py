@@ -88,8 +88,11 @@ class _Edges:
         return _Edges(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
 
 
-def triangulate(elements: Elements, infinite: Bool, view: View) -> Triangles:
-    """Triangles of all regions that have a part in the view; infinite (r,): regions that go on beyond everything."""
+def triangulate(
+    elements: Elements, infinite: Bool, view: View, empty: frozenset[int] = frozenset()
+) -> Triangles:
+    """Triangles of all regions that have a part in the view; infinite (r,): regions that go on beyond everything;
+    empty: those without an inside."""
     parts = []
     low, high = elements.geometry.bounds()
     box = np.minimum(low.min(axis=0), view.low), np.maximum(high.max(axis=0), view.high)
@@ -97,7 +100,7 @@ def triangulate(elements: Elements, infinite: Bool, view: View) -> Triangles:
     ends = np.searchsorted(elements.region[order], np.arange(len(infinite) + 1))
     for region, endless in enumerate(infinite):
         own = order[ends[region] : ends[region + 1]]
-        if not len(own) and not endless:
+        if region in empty or (not len(own) and not endless):
             continue
         if not endless and not view.meets(low[own].min(axis=0)[None], high[own].max(axis=0)[None])[0]:
             continue

@@ -21,7 +21,7 @@ EXPECTED = {
 }
 PICTURES = [
     ("Mises stress of the fit and the torque", ["plot", "--field", "mises"]),
-    ("pressure and friction along the fit", ["plot", "--curve", "fit", "--field", "traction_n", "traction_s"]),
+    ("pressure and friction along the fit", ["plot", "--curve", "fit", "--field", "traction_n,traction_s"]),
 ]
 
 

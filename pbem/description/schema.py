@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from pbem.description.construction import ConstructionTable, FitTable
 from pbem.description.field_tables import (
     EigenstrainTable,
     GravityTable,
@@ -211,15 +212,11 @@ class LawTable(Table):
     parameters: Mapping[str, Number] = Field({}, description="numbers that the custom law is called with")
 
 
-class ContactTable(LawTable):
+class ContactTable(LawTable, FitTable):
     """Two different curves that may touch; their meshes need not match. The law is `"coulomb"` if none is given; the
     initial gap follows from the geometry. All keys of `[interfaces.CURVE]` are accepted as well."""
 
     between: tuple[Text, Text] = Field(description="the two curves, in any order; results lie on the first one")
-    overlap: NotNegative = Field(
-        0.0, description="length by which the bodies may lie in each other as they are drawn, at most, as for a press "
-        "fit; the first step drives them apart",
-    )
 
 
 class GenerateTable(LawTable):
@@ -297,7 +294,7 @@ class StageInterfaceTable(Table):
     pressure: Value = Field(description="fluid pressure at the end of the stage")
 
 
-class StageTable(Table):
+class StageTable(ConstructionTable):
     """A part of the load history: the values at its end; in between they are linear. Stages follow each other in the
     order of the file. What a stage leaves out keeps the value reached before. Without `[[stages]]` all loads grow in
     proportion."""
@@ -319,21 +316,6 @@ class StageTable(Table):
     eigenstrain: Mapping[str, EigenstrainTable] = Field({}, description="of a region at the end of the stage")
     point_loads: Mapping[str, PointForceTable] = Field({}, description="`fx`, `fy`, `moment` at the end of the stage")
     point_supports: Mapping[str, PointShiftTable] = Field({}, description="`ux`, `uy` at the end of the stage")
-    remove: tuple[Text, ...] = Field(
-        (), description="regions that are taken away; what they carried on their interfaces is released in proportion "
-        "over the steps of the stage",
-    )
-    open: tuple[Text, ...] = Field(
-        (), description="interfaces, cracks and contacts that never touch from this stage on; what they carried is "
-        "released in proportion over its steps",
-    )
-    close: tuple[Text, ...] = Field(
-        (), description="interfaces, cracks and contacts that are bonded from this stage on, as they lie at its "
-        "beginning",
-    )
-    release: tuple[Text, ...] = Field(
-        (), description="of what stages before have closed or opened: from this stage on it follows its law"
-    )
 
 
 class SolverTable(Table):

@@ -104,7 +104,7 @@ def _area(shape: Real) -> float:
 
 
 def _displace_pairs(results: Results, displacement: Real, magnify: float) -> Real:
-    """Where the first sides of all pairs are (m, 2)."""
+    """Where the first sides of all pairs are (m, 2), or the second ones where these are gone."""
     pairs = results.pairs
     if not pairs.names:
         return np.zeros((0, 2))
@@ -112,6 +112,9 @@ def _displace_pairs(results: Results, displacement: Real, magnify: float) -> Rea
     size = float(np.ptp(results.nodes.position, axis=0).max())
     tree = cKDTree(np.hstack([results.nodes.position, size * results.nodes.normal]))
     _, nodes = tree.query(np.hstack([pairs.position, size * pairs.normal]))
+    gone = np.flatnonzero(np.isnan(displacement[nodes]).any(axis=1))
+    if len(gone):
+        nodes[gone] = tree.query(np.hstack([pairs.position[gone], -size * pairs.normal[gone]]))[1]
     return np.asarray(results.nodes.position[nodes] + magnify * np.nan_to_num(displacement[nodes]))
 
 

@@ -159,7 +159,7 @@ def choose_interfaces(results: Results, steps: Iterable[int]) -> list[str]:
     moved = np.zeros(len(pairs.names))
     for at in steps:
         jump = np.abs(pairs.at("slip", at)) + np.abs(pairs.at("opening", at))
-        moved = np.maximum(moved, share * np.bincount(pairs.interface, jump, len(moved)))
+        moved = np.maximum(moved, share * np.bincount(pairs.interface, np.nan_to_num(jump), len(moved)))
     # What is moved by rounding alone does not move.
     moved = np.where(moved > 1e-9 * moved.max(initial=0.0), moved, 0.0)
     order = sorted(range(len(lengths)), key=lambda i: (pairs.laws[i] != "bonded", moved[i], lengths[i]), reverse=True)

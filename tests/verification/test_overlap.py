@@ -59,10 +59,10 @@ def test_torque_up_to_the_slip_limit(share: float, tmp_path: Path) -> None:
     most = 0.2 * find_pressure() * (FIT / OUTSIDE) ** 2
     stages = [{"name": "fit", "steps": 1}, {"name": "turn", "steps": 1, "boundary": {"outside": {"ts": share * most}}}]
     held = {"inside": {"us": 0.0}, "outside": {"ts": 0.0}}
-    case = make_press_fit(1.0, (40, 40), boundary=held, stages=stages)
+    case = make_press_fit(1.0, (24, 24), boundary=held, stages=stages)
     if share < 1:
         carried = pbem.run(case, tmp_path / "held.h5").contact["fit"].traction_s[-1]
-        np.testing.assert_allclose(np.abs(carried), share * 0.2 * find_pressure(), rtol=2e-3)
+        np.testing.assert_allclose(np.abs(carried), share * 0.2 * find_pressure(), rtol=1e-2)
         return
     with pytest.raises(pbem.ConvergenceError) as raised:
         pbem.run(case, tmp_path / "slipped.h5")

@@ -13,7 +13,6 @@ from pbem.model.model import Contact, Model
 from pbem.model.varying import Places, evaluate
 from pbem.results.law_text import find_trace, name_many
 
-
 # Elements on the zone in which bonds soften.
 ZONE_ELEMENTS = 3
 

@@ -23,6 +23,7 @@ from pbem.description.field_tables import (
     PointSupportTable,
     RemoteTable,
 )
+from pbem.description.law_keys import FractureEnergy, LawName, ShearFractureEnergy, Softening
 from pbem.description.rigid_tables import ForceTable, RigidTable, StageForceTable, StageRigidTable, ToolTable
 from pbem.description.table import Table, UnitsTable
 from pbem.description.values import (
@@ -155,20 +156,12 @@ class LawTable(Table):
     """What the two faces do: of a curve of two regions (an interface) or of a crack. Strengths and pressures are
     stresses."""
 
-    law: Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "custom"] | None = Field(
-        None,
-        description='without this key `"bonded"` for a curve of two regions and `"coulomb"` for a crack; `"open"`: the '
-        'faces never touch; `"rate_and_state"`: friction coefficient f0 + a ln(V/V0) + b ln(V0 theta/L) at the slip '
-        'rate V and the state theta, with d theta/dt = 1 - V theta/L; `"cohesive"`: bonds that soften with opening and '
-        'slip; `"custom"`: see `pbem help laws`',
-    )
+    law: LawName = None
     friction: Strength | None = Field(
         None, description="friction coefficient; 0 if its angle is not given either; f0 of `rate_and_state`"
     )
     friction_angle: FrictionAngle | None = Field(None, description="or its angle, degrees")
-    cohesion: Strength = Field(
-        0.0, description="friction bound without normal traction; of `cohesive` the shear strength"
-    )
+    cohesion: Strength = Field(0.0, description="friction bound without normal traction, or shear strength")
     tensile_strength: Strength = Field(0.0, description="normal tension carried before the faces part")
     cohesion_lost: Flag = Field(
         False, description="cohesion and tensile strength end with the first slip or parting (a brittle bond)"
@@ -185,15 +178,9 @@ class LawTable(Table):
     initial_state: Positive | None = Field(
         None, description="theta of `rate_and_state` at the start, time; `slip_distance/reference_rate` if not given"
     )
-    fracture_energy: Positive | None = Field(
-        None, description="of `cohesive`: energy per area that parting in tension takes, stress times length"
-    )
-    fracture_energy_shear: Positive | None = Field(
-        None, description="the same in shear; that in tension if not given (and the shear strength the tensile one)"
-    )
-    softening: Literal["linear", "exponential", "constant"] | None = Field(
-        None, description='how tractions fall; `"linear"` if not given; `"constant"`: not at all until the bond is lost'
-    )
+    fracture_energy: FractureEnergy = None
+    fracture_energy_shear: ShearFractureEnergy = None
+    softening: Softening = None
     normal_stiffness: Positive | None = Field(
         None, description="elastic joint in front of the law, stress per length; without this key rigid"
     )

@@ -10,12 +10,17 @@ from pbem.contact.laws import find_joint
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.mortar_pairs import FEWEST
 from pbem.model.model import Contact, Model
+from pbem.model.varying import Places, evaluate
 from pbem.results.law_text import find_trace, name_many
+
+# Elements on the zone in which bonds soften.
+ZONE_ELEMENTS = 3
 
 
 def list_doubts(model: Model, mesh: Mesh) -> list[str]:
-    """A sentence for each: friction that was forgotten, contact on fewer elements than resolve it."""
-    return [*find_smooth(model), *_find_sparse(model, mesh)]
+    """A sentence for each: friction that was forgotten, contact on fewer elements than resolve it, bonds that soften
+    over less than an element."""
+    return [*find_smooth(model), *_find_sparse(model, mesh), *_find_long(model, mesh)]
 
 
 def find_smooth(model: Model) -> list[str]:
@@ -48,6 +53,30 @@ def _find_sparse(model: Model, mesh: Mesh) -> list[str]:
         f"{name_many(names)}: contact on {count} element{'s' * (count != 1)}, which do not resolve its pressure; "
         f"{FEWEST} or more are needed." for count, names in sorted(found.items())
     ]
+
+
+def _find_long(model: Model, mesh: Mesh) -> list[str]:
+    """Cohesive faces whose elements are too long for the zone that softens, E' G/strength^2."""
+    length, told = np.abs(mesh.end - mesh.start)[mesh.pairs.slave // (mesh.order + 1)], []
+    for name, part in zip(mesh.interface_names, _split(mesh), strict=True):
+        law = find_joint(model, name).law
+        if law.softening is None or not len(part):
+            continue
+        sides = (mesh.pairs.first[part[0]], mesh.pairs.second[part[0]])
+        modulus = min(model.regions[mesh.node_region[side]].material.plane_modulus for side in sides)
+        places = Places(mesh.pairs.position[part] + model.origin, mesh.pairs.arc_length[part])
+        zone = np.full(len(part), np.inf)
+        for strength, energy in ((law.tensile_strength, "fracture_energy"), (law.cohesion, "fracture_energy_shear")):
+            value = evaluate(strength, places)
+            own = modulus * law.parameters[energy] / np.where(value > 0, value, 1.0) ** 2
+            zone = np.minimum(zone, np.where(value > 0, own, np.inf))
+        worst = np.argmax(length[part] / zone)
+        if length[part][worst] > zone[worst] / ZONE_ELEMENTS:
+            told.append(
+                f"{name}: elements of {length[part][worst]:.3g}, where the bonds soften over a zone of the length "
+                f"E' G/strength^2 = {zone[worst]:.3g}; with less than {ZONE_ELEMENTS} elements on it the strength that "
+                "is found depends on the mesh.")
+    return told
 
 
 def _split(mesh: Mesh) -> list[np.ndarray]:

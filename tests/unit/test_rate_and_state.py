@@ -232,7 +232,7 @@ def test_the_dissipated_energy_is_the_mean_traction_times_the_slip() -> None:
     def record(p_s: float, slip: float) -> PairRecord:
         memory = start_memory(laws)  # type: ignore[arg-type]
         return PairRecord(np.full(2, SLIP), none - 1, none + p_s, none, none + slip, none, none + slip, none,
-                          memory.internal)
+                          memory.internal, none)
 
     work = measure_work(laws, np.array([1.0, 2.0]), record(0.5, 0.0), record(0.7, 0.2))  # type: ignore[arg-type]
     assert work.dissipated == pytest.approx(3 * 0.6 * 0.2)

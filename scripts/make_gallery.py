@@ -245,7 +245,7 @@ def draw(case: GalleryCase, results: Results) -> list[str]:
         with Image.open(path) as picture:
             full = picture.convert("RGB")
         for colours in COLOURS:
-            full.quantize(colours, dither=Image.Dither.NONE).save(path, optimize=True)
+            full.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(path, optimize=True)
             if path.stat().st_size <= LARGEST:
                 break
         else:

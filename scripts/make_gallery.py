@@ -204,14 +204,14 @@ def read_measured(page: str) -> Measured | None:
 
 
 def settle(now: Measured, before: Measured | None) -> Measured:
-    """What the page shows: as before where only rounding, or the time by less than a factor of 2, has changed."""
+    """What the page shows: as before where only rounding, or the time by about a factor of 2, has changed."""
     if before is None:
         return now
     values = {}
     for name, text in now.values.items():
         old = before.values.get(name, text)
         values[name] = old if find_difference(float(text), float(old)) < 3 * 10.0 ** (1 - DIGITS) else text
-    keeps = 0.5 <= float(now.seconds) / float(before.seconds) <= 2
+    keeps = 1 / 3 < float(now.seconds) / float(before.seconds) < 3  # one step of 1, 2, 5, 10
     return Measured(values, now.unknowns, before.seconds if keeps else now.seconds)
 
 
@@ -245,7 +245,7 @@ def draw(case: GalleryCase, results: Results) -> list[str]:
         with Image.open(path) as picture:
             full = picture.convert("RGB")
         for colours in COLOURS:
-            full.quantize(colours, dither=Image.Dither.NONE).save(path, optimize=True)
+            full.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(path, optimize=True)
             if path.stat().st_size <= LARGEST:
                 break
         else:

@@ -17,8 +17,9 @@ EXPECTED = {"J at the tip, N/mm": (6 * 60**2 * (1 / (CARBON * 2**3) + 1 / (GLASS
 PICTURES = [
     ("displaced layers, and the stress along them",
      ["plot", "--field", "sxx", "--displaced", "--limits", "-100", "100"]),
-    ("opening along the crack and traction along the bond",
-     ["plot", "--curve", "crack", "bond", "--field", "opening,traction_n", "--x", "x", "--ylim", "-50", "50"]),
+    ("opening along the crack", ["plot", "--curve", "crack", "--field", "opening"]),
+    ("traction across the bond in front of it",
+     ["plot", "--curve", "bond", "--field", "traction_n", "--x", "x", "--ylim", "-20", "60"]),
 ]
 
 

@@ -13,7 +13,7 @@ SOURCE = """A. C. Kaya, F. Erdogan, On the solution of integral equations with s
 Applied Mathematics 45 (1987) 105-122 (infinite strip)."""
 EXPECTED = {"KI/(s sqrt(pi a))": (2.8246, 1e-3)}
 PICTURES = [
-    ("stress along the strip, on its displaced outline", ["plot", "--field", "syy", "--displaced"]),
+    ("stress along the strip, on its displaced outline", ["plot", "--field", "syy", "--displaced", "--width", "11"]),
     ("opening of the crack", ["plot", "--curve", "crack", "--field", "opening"]),
 ]
 

@@ -19,8 +19,8 @@ EXPECTED = {
 }
 PICTURES = [
     ("stress across the fracture", ["plot", "--field", "syy", "--box", "-15", "-8", "15", "8"]),
-    ("opening of wet and dry parts",
-     ["plot", "--curve", "dry_left", "wet", "dry_right", "--field", "opening", "--x", "x"]),
+    ("opening of the wet part and of the dry one on the right",
+     ["plot", "--curve", "wet", "dry_right", "--field", "opening", "--x", "x"]),
 ]
 
 

@@ -22,7 +22,7 @@ EXPECTED = {
     "settlement of the head, mm": (1e3 * (10 * 2 * (1 - 0.25**2) / 20e3 + JOINT), 1e-6),
 }
 PICTURES = [
-    ("vertical displacement: the joint adds a jump", ["plot", "--field", "uy"]),
+    ("vertical displacement: the joint adds a jump", ["plot", "--field", "uy", "--width", "11"]),
 ]
 
 

@@ -18,7 +18,7 @@ EXPECTED = {
     "force through the joint, MN/m": (1.0, 1e-3),
 }
 PICTURES = [
-    ("the pier, with displacements magnified", ["plot", "--field", "syy", "--displaced"]),
+    ("the pier, with displacements magnified", ["plot", "--field", "syy", "--displaced", "--width", "11"]),
     ("opening and pressure along the joint", ["plot", "--curve", "joint", "--field", "opening,traction_n"]),
 ]
 

@@ -18,7 +18,8 @@ EXPECTED = {
 }
 PICTURES = [
     ("the stone rocks on its edge", ["plot"]),
-    ("vertical stress: the thrust runs to the edge", ["plot", "--field", "syy", "--limits", "-400", "0"]),
+    ("vertical stress: the thrust runs to the edge",
+     ["plot", "--field", "syy", "--limits", "-400", "0", "--width", "11"]),
 ]
 
 

@@ -121,6 +121,8 @@ def test_pages_are_installed_with_the_package(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "setup.py", "-q", *commands], cwd=ROOT, capture_output=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert {path.stem for path in (installed / "pbem" / "pages").glob("*.md")} == set(TOPICS)
+    bundled = {path.stem for path in (installed / "pbem" / "cases" / "gallery").glob("*.toml")}
+    assert bundled == {path.stem for path in (ROOT / "cases" / "gallery").glob("*.toml")} and len(bundled) > 20
     code = "import pbem, sys; from pbem.pages import read_page; print(pbem.__file__, read_page(sys.argv[1])[:7])"
     done = subprocess.run([sys.executable, "-c", code, "theory"], cwd=installed, capture_output=True, timeout=60)
     assert done.stdout.decode().split() == [str(installed / "pbem" / "__init__.py"), "#", "Theor"], done.stderr

@@ -9,6 +9,7 @@ import pytest
 
 import pbem
 from pbem.bundled import find_case
+from pbem.cli import main
 from scripts import make_gallery as gallery
 from scripts.make_gallery import FOLDER, GalleryCase, Measured
 
@@ -41,7 +42,9 @@ def test_the_case_has_its_numbers_and_its_page(
 
 
 @each_case
-def test_the_case_is_complete(case: GalleryCase) -> None:
+def test_the_case_is_complete(case: GalleryCase, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", f"gallery/{case.name}"]) == 0
+    assert "Probably not meant" not in capsys.readouterr().out
     assert find_case(case.name) == find_case(f"gallery/{case.name}") == case.case
     assert case.case.read_text(encoding="utf-8").startswith("# ")
     assert len(case.source.splitlines()) <= 60

@@ -181,23 +181,23 @@ class _Interrupt(SilentReporter):
 
 def test_a_construction_is_gone_on_with(tmp_path: Path) -> None:
     """Stopped within the excavation, after it, and after the joint was welded."""
-    stages = [CUT, {"steps": 1, "close": ["joint"], "boundary": {"wall": {"pressure": 4.0}}},
+    stages = [{**CUT, "steps": 3}, {"steps": 1, "close": ["joint"], "boundary": {"wall": {"pressure": 4.0}}},
               {"steps": 1, "boundary": {"wall": {"pressure": 0.0}}}]
     case = make_tunnel(stages, joint=True, elements=12)
     whole = pbem.run(case, tmp_path / "whole.h5")
     scale, joint = np.nanmax(np.abs(whole.displacement[-1])), whole.contact["joint"]
-    for steps in (1, 3):
+    for steps in (1, 4):
         reporter: Reporter = _Interrupt(steps)
         with pytest.raises(KeyboardInterrupt):
             pbem.run(case, tmp_path / "part.h5", reporter=reporter, force=True)
         results = pbem.run(case, tmp_path / "part.h5", resume=True)
-        assert len(results.steps) == len(whole.steps) == 4
-        np.testing.assert_allclose(results.displacement[-1], whole.displacement[-1], atol=1e-11 * scale)
+        assert len(results.steps) == len(whole.steps) == 5
+        np.testing.assert_allclose(results.displacement, whole.displacement, atol=1e-11 * scale)
         for name in ("external", "elastic", "dissipated", "removed"):
             one, other = getattr(results.energy, name), getattr(whole.energy, name)
             np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
-    np.testing.assert_array_equal(joint.slip[-1], joint.slip[1])
-    assert np.abs(joint.slip[1]).max() > 1e-4
+    np.testing.assert_array_equal(joint.slip[-1], joint.slip[2])
+    assert np.abs(joint.slip[2]).max() > 1e-4
 
 
 def test_a_body_that_floats_goes_on_floating(tmp_path: Path) -> None:
@@ -211,6 +211,20 @@ def test_a_body_that_floats_goes_on_floating(tmp_path: Path) -> None:
     own = find_own(results, "upper")
     at = [np.lexsort(each.T.round(9)) for each in (results.nodes.position[own], single.nodes.position)]
     np.testing.assert_allclose(results.displacement[-1, own][at[0]], single.displacement[-1][at[1]], atol=1e-12)
+
+
+def test_a_hanging_block_is_taken_away(tmp_path: Path) -> None:
+    """What is left hangs by its own weight, and what the other had stored is gone with it."""
+    cut = {"name": "cut", "steps": 2, "remove": ["lower"]}
+    case = make_seam([REST, cut], {}, boundary={"b": {"ux": 0.0, "uy": 0.0}}, gravity={"gy": -1.0})
+    case["materials"]["m"]["density"] = 1.0
+    results = pbem.run(case, tmp_path / "hanging.h5")
+    np.testing.assert_allclose(results.reactions["b"][:, 1], [4.0, 3.0, 2.0], rtol=1e-3)
+    assert lacks(results).max() < 1e-3
+    energy = results.energy
+    # The weight of the lower block did work on it, and half of that was stored by it and above it.
+    assert 0 < energy.removed[1] < energy.removed[2] and energy.removed[2] > 0.2 * energy.external[0]
+    assert results.balance.whole_relative.max() < 1e-3
 
 
 def test_a_block_that_loses_its_hold_is_refused(tmp_path: Path) -> None:

@@ -267,6 +267,8 @@ def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
         soft = max(find_least_stiffness(model, regions[name]) for name in motion.regions)
         springs = f"springs stiffer than {soft:.2g}" if _has_soft_springs(model, motion.regions, soft) else "springs"
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
+        if regions[motion.regions[0]].rigid:
+            expected = "a motion in place of the force (ux, uy, rotation), or a contact that stops it"
         free = motion.regions[0]
         loc: KeyPath = ("tools" if regions[free].rigid else "regions", free)
         faults.append(Fault.at(loc, f"{found}: {unbalance}", expected))

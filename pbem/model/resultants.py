@@ -41,6 +41,7 @@ def describe_unbalance(model: Model, motion: RigidBodyMode, moving: Sequence[Reg
                 continue
             about = format_point(model.origin)
             loads = "tractions and weight" if any(stage.gravity) else "tractions"
+            loads = "forces" if any(region.rigid for region in moving) else loads
             return (
                 f"the {loads} of stage '{stage.name}' drive it, with resultant "
                 f"{format_point(force)} and moment {moment:.6g} about {about}"

@@ -6,7 +6,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.mesh.mesh import Mesh
-from pbem.model.approach import find_drive, find_rates, move_until_closed
+from pbem.model.approach import find_drive, find_rates, move_until_closed, resists_slip
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import find_rigid_body_modes
 
@@ -27,7 +27,9 @@ def approach_pairs(model: Model, mesh: Mesh, gap: Real) -> Real:
         at = np.flatnonzero(own & (sides == (first, second)).all(axis=1))
         names = mesh.region_names[first], mesh.region_names[second]
         rates[at] = find_rates(motions, *names, pairs.position[at], pairs.normal[at])
-    moved = move_until_closed(np.maximum(gap, 0.0)[own], rates[own], power, model.size)
+    contacts = [model.contacts.get(name) for name in mesh.interface_names]
+    rough = np.array([each is not None and resists_slip(each.law) for each in contacts], dtype=bool)[pairs.interface]
+    moved = move_until_closed(np.maximum(gap, 0.0)[own], rates[own], power, model.size, rough[own])
     result = gap.copy()
     if moved is not None:
         result[own] = np.maximum(moved, 0.0)

@@ -204,7 +204,8 @@ def _link_to_ground(
     for rigid in outer.rigid:
         members = np.unique(parts.first[mesh.node_element[rigid.nodes]])
         about = mesh.position[rigid.nodes[0]] - rigid.motions[0, 2] / 1j
-        yield int(members[0]), GROUND, constrain_motions(~rigid.forced, about, center, scale)
+        if not rigid.forced.all():
+            yield int(members[0]), GROUND, constrain_motions(~rigid.forced, about, center, scale)
         for other in members[1:]:
             yield int(members[0]), int(other), np.eye(3)
 

@@ -62,7 +62,10 @@ def _place(model: Model, mesh: Mesh, number: int, body: RigidBody) -> RigidNodes
     forced = np.array([kind == "force" for kind in body.known])
     sums = np.stack([split_components(mesh.weight[nodes] * motions[:, k]) for k in range(3)])
     # The tractions that tell the resultants best apart.
-    pivots = qr((sums / np.array([[1.0], [1.0], [size]]))[forced], mode="r", pivoting=True)[1][: forced.sum()]
+    pivots = np.zeros(0, dtype=np.int64)
+    if forced.any():
+        own = (sums / np.array([[1.0], [1.0], [size]]))[forced]
+        pivots = qr(own, mode="r", pivoting=True)[1][: len(own)].astype(np.int64)
     return RigidNodes(number, nodes, motions, mesh.weight[nodes], forced, size, pivots)
 
 

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linprog
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.loop import side_legs
 from pbem.geometry.sampling import sample_side
-from pbem.model.model import Model
+from pbem.model.model import Law, Model
 from pbem.model.resultants import measure_power
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
 from pbem.model.sight import Surroundings
@@ -24,6 +24,8 @@ from pbem.model.varying import Places, Varying, evaluate
 FARTHEST = 10.0
 # Openings below this part of the largest that there was are closed.
 CLOSED = 1e-6
+# Where friction has to stop a body it moves so many times the least opening.
+BEYOND = 2.0
 
 
 def find_closing(model: Model) -> frozenset[str]:
@@ -37,7 +39,7 @@ def find_closing(model: Model) -> frozenset[str]:
         return frozenset()
     sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
     bounded = find_bounded(model)
-    names, openings, rates = [], [], []
+    names, openings, rates, rough = [], [], [], []
     for name, contact in apart.items():
         for curve, other in ((contact.first, contact.second), (contact.second, contact.first)):
             points, normals = sample_side(model.curves, sides[curve])
@@ -49,16 +51,22 @@ def find_closing(model: Model) -> frozenset[str]:
             gap = evaluate(contact.law.gap, Places(points + model.origin, np.zeros(len(points)))) if not (
                 isinstance(contact.law.gap, Varying)) else np.zeros(len(points))
             names += [name] * len(points)
+            rough += [resists_slip(contact.law)] * len(points)
             openings.append(np.maximum(distance + gap, 0.0))
             rates.append(find_rates(motions, bounded[curve], bounded[other], points, normals))
     if not openings:
         return frozenset()
     opening, rate = np.concatenate(openings), np.concatenate(rates)
-    moved = move_until_closed(opening, rate, power, model.size)
+    moved = move_until_closed(opening, rate, power, model.size, np.array(rough))
     if moved is None:
         return frozenset()
     closed = moved <= CLOSED * max(float(opening.max()), CLOSED * model.size)
     return frozenset(name for name, touches in zip(names, closed.tolist(), strict=True) if touches)
+
+
+def resists_slip(law: Law) -> bool:
+    """Whether friction may hold what presses on it."""
+    return bool(law.friction or law.cohesion or law.kind != "coulomb")
 
 
 def find_drive(model: Model, motions: Sequence[RigidBodyMode]) -> Real | None:
@@ -82,11 +90,21 @@ def find_rates(
     return result
 
 
-def move_until_closed(opening: Real, rates: Real, power: Real, size: float) -> Real | None:
-    """Openings (k,) after the motion that the loads take; None if nothing stops it."""
-    most = FARTHEST * size
-    found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening, bounds=[(-most, most)] * len(power))
-    if found.status != 0 or -found.fun > 0.1 * most:
+def move_until_closed(opening: Real, rates: Real, power: Real, size: float, rough: Bool) -> Real | None:
+    """Openings (k,) after the motion that the loads take; None if nothing stops it. rough (k,): places with friction,
+    which may stop what would slide on along them."""
+    moved = _move(opening, rates, power, FARTHEST * size)
+    if moved is None and rough.any():
+        # Not much further than it takes to get there.
+        moved = _move(opening, rates, power, BEYOND * float(opening[rough].min()), stopped=False)
+        if moved is not None and not (moved[rough] <= CLOSED * float(opening.max())).any():
+            return None
+    return moved
+
+
+def _move(opening: Real, rates: Real, power: Real, most: float, stopped: bool = True) -> Real | None:
+    bounds = [(-most, most)] * len(power)
+    found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening, bounds=bounds)
+    if found.status != 0 or (stopped and -found.fun > 0.1 * most):
         return None
     return np.asarray(opening + rates @ found.x)
-

@@ -346,6 +346,8 @@ def _check_hold(
         expected = f"displacement conditions, {springs}, or bonded or touching neighbours, that prevent it"
         if later:
             found = f"from stage '{model.stages[stages[0]].name}' on {found}"
+        if regions[motion.regions[0]].rigid:
+            expected = "a motion in place of the force (ux, uy, rotation), or a contact that stops it"
         free = motion.regions[0]
         loc: KeyPath = ("tools" if regions[free].rigid else "regions", free)
         faults.append(Fault.at(loc, f"{found}: {unbalance}", expected))

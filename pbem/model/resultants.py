@@ -44,7 +44,8 @@ def describe_unbalance(
             if abs(power) <= least * scale:
                 continue
             about = format_point(model.origin)
-            kinds = ["tractions", *(["weight"] if any(stage.gravity) else []),
+            kinds = ["forces" if any(region.rigid for region in moving) else "tractions",
+                     *(["weight"] if any(stage.gravity) else []),
                      *(["point loads"] if any(map(any, stage.point_forces.values())) else [])]
             loads = list_names(kinds)
             return (

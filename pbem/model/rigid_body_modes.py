@@ -169,7 +169,8 @@ def _link_rigid(model: Model, names: list[str], center: complex, scale: float) -
         owners = list(dict.fromkeys(numbers[bounded[name]] for name in body.curves))
         held = np.array([kind == "motion" for kind in body.known])
         about = find_reference(body, model.curves, model.origin)
-        yield owners[0], GROUND, constrain_motions(held, about, center, scale)
+        if held.any():
+            yield owners[0], GROUND, constrain_motions(held, about, center, scale)
         for other in owners[1:]:
             yield owners[0], other, np.eye(3)
 

@@ -16,6 +16,8 @@ from pbem.results.lazy import freeze, read_names
 
 # Unknown moments and rotations of a single point are told apart from nothing below this part.
 SINGULAR = 1e-12
+# Coordinates below this part of the model are rounding.
+NOTHING = 1e-12
 COMPONENTS = (*FORCES, *MOTIONS)
 
 
@@ -65,7 +67,9 @@ def create_rigid(file: h5py.File, model: Model) -> None:
     for name, body in model.rigid.items():
         own = group.create_group(name)
         about = find_reference(body, model.curves, model.origin) + model.origin
-        own.attrs["about"] = np.array([about.real, about.imag])
+        # The middle of a circle about 0 is that but for rounding.
+        parts = [0.0 if abs(part) < NOTHING * model.size else part for part in (about.real, about.imag)]
+        own.attrs["about"] = np.array(parts)
         own.attrs["curves"], own.attrs["known"] = _text(body.curves), _text(body.known)
         own.attrs["tool"] = body.tool
         for kind, parts in (("force", FORCES), ("motion", MOTIONS)):
@@ -104,7 +108,7 @@ def list_rigid_rows(bodies: Mapping[str, RigidMotion], form: str = ".6g") -> lis
     """Name, point, forces and motions at the last step."""
     return [
         [each.name + (" (tool)" if each.tool else ""), f"({each.about[0]:.6g}, {each.about[1]:.6g})",
-         *(f"{value:{form}}" for value in (*each.force[-1], *each.motion[-1]))]
+         *(f"{value + 0.0:{form}}" for value in (*each.force[-1], *each.motion[-1]))]
         for each in bodies.values()
     ]
 

@@ -183,7 +183,9 @@ class ResultWriter:
         else:
             self._pending = step
         self._commit(f"step {step.number}")
-        notes = [] if self._balance.runaway is None else [describe_runaway(step, self._balance.runaway)]
+        # What has to move before it touches is noted with the model.
+        runaway = None if self._model.closing and step.number == 1 else self._balance.runaway
+        notes = [] if runaway is None else [describe_runaway(step, runaway)]
         if step.last_of_stage and step.stage == len(self._model.stages) - 1:
             notes += describe_sparse_contacts(self._model, self._mesh, step.contact.mode)
         return tuple(notes)

@@ -33,13 +33,14 @@ class Bonds:
 
 
 def list_bonds(laws: PairLaws, memory: Memory) -> Iterator[Bonds]:
-    """The pairs whose bonds are not lost, law by law."""
+    """The pairs whose bonds are not lost, law by law, but for those that a construction holds open or closed."""
     for group in laws.strengths:
         if not group.law.bonds:
             continue
         assert isinstance(group.law, Cohesive)
         start = {name: values[group.pairs] for name, values in memory.internal.items()}
-        live = np.flatnonzero(group.law.find_live(start, group.parameters))
+        held = (laws.parted | laws.bonded)[group.pairs]
+        live = np.flatnonzero(group.law.find_live(start, group.parameters) & ~held)
         if len(live):
             yield Bonds(
                 group.law, group.pairs[live], {name: values[live] for name, values in group.parameters.items()},

@@ -1,0 +1,85 @@
+"""Capabilities that meet in one model: construction with softening bonds, tools with point loads, sweeps over them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+
+Tables = dict[str, Any]
+
+
+def make_tunnel(law: Tables) -> Tables:
+    """A round tunnel in rock under stress, taken away in two steps."""
+    return {
+        "materials": {"rock": {"young": 20e3, "poisson": 0.25}},
+        "curves": {"wall": {"center": [1e5, -3e5], "radius": 3.0, "elements": 16}},
+        "regions": {
+            "core": {"material": "rock", "boundary": ["wall"]},
+            "rock": {"material": "rock", "infinite": True, "boundary": ["wall"]},
+        },
+        "interfaces": {"wall": law},
+        "initial_stress": {"rock": {"sxx": -5.0, "syy": -10.0}},
+        "stages": [{"name": "excavate", "steps": 2, "remove": ["core"]}],
+    }
+
+
+def make_block(**tables: Any) -> Tables:
+    """A block of 2 by 1 on the ground, on which a rigid flat punch lies."""
+    corners = [[0, 0], [2, 0], [2, 1], [0, 1]]
+    names = ("bottom", "right", "top", "left")
+    curves: Tables = {
+        name: {"points": [corners[k], corners[(k + 1) % 4]], "elements": 6} for k, name in enumerate(names)
+    }
+    return {
+        "materials": {"steel": {"young": 2.1e5, "poisson": 0.3}},
+        "curves": curves | {"punch": {"points": [[0.6, 1.0], [1.4, 1.0]], "elements": 10}},
+        "regions": {"block": {"material": "steel", "boundary": list(names)}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}},
+        "tools": {"punch": {"fy": -10.0, "ux": 0.0, "rotation": 0.0}},
+        "contacts": {"seat": {"between": ["punch", "top"], "friction": 0.3}},
+        "analysis": {"steps": 1},
+    } | tables
+
+
+def test_a_bond_that_softens_is_released_like_one_that_does_not(tmp_path: Path) -> None:
+    """Far below its strength; what is taken away has no bond any more."""
+    cohesive = {"law": "cohesive", "tensile_strength": 1e3, "cohesion": 1e3, "fracture_energy": 1.0}
+    one, other = (
+        pbem.run(make_tunnel(law), tmp_path / f"{law['law']}.h5") for law in ({"law": "bonded"}, cohesive)
+    )
+    for name in ("displacement", "traction"):
+        bonded, softening = (getattr(each, name)[-1] for each in (one, other))
+    np.testing.assert_allclose(softening, bonded, atol=1e-9 * np.nanmax(np.abs(bonded)))
+
+
+def test_tools_and_point_loads_are_borne_together(tmp_path: Path) -> None:
+    loads = {"hook": {"at": [2.0, 0.5], "fx": 1.0, "fy": -3.0}}
+    case = make_block(point_loads=loads, tools={"punch": {"fy": -10.0, "fx": 0.5, "rotation": 0.0}})
+    results = pbem.run(case, tmp_path / "case.h5")
+    np.testing.assert_allclose(results.reactions["bottom"][-1], [-1.5, 13.0], atol=2e-3)
+    np.testing.assert_allclose(results.rigid["punch"].force[-1][:2], [0.5, -10.0], rtol=1e-6)
+
+
+def test_a_bottom_that_is_rigid_and_held_is_a_bottom_that_is_held(tmp_path: Path) -> None:
+    one = pbem.run(make_block(), tmp_path / "one.h5")
+    still = {"bottom": {"rigid": {"ux": 0.0, "uy": 0.0, "rotation": 0.0}}}
+    other = pbem.run(make_block(boundary=still), tmp_path / "other.h5")
+    scale = np.abs(one.traction).max()
+    np.testing.assert_allclose(other.traction, one.traction, atol=1e-9 * scale)
+
+
+def test_a_sweep_over_places_of_loads_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What sweeps keep of the curves depends on where loads act on them."""
+    monkeypatch.chdir(tmp_path)
+    case = pbem.Case(**make_block(point_loads={"hook": {"at": [2.0, 0.5], "fx": 0.0, "fy": -3.0}}))
+    places = [[2.0, 0.5], [0.0, 0.25]]
+    table = pbem.sweep(case, {"point_loads.hook.at": places}, quantities=["rigid.punch.uy"])
+    singles = [pbem.run(case.replace({"point_loads.hook.at": at}), f"{at[0]}.h5") for at in places]
+    motions = [float(each.rigid["punch"].motion[-1][1]) for each in singles]
+    assert abs(motions[0] - motions[1]) > 1e-4 * abs(motions[0])
+    np.testing.assert_allclose(table["rigid.punch.uy"], motions, rtol=1e-9)

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from pbem.bem.operator_choice import HierarchicalChoice, choose_operator
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.declaration import BROKEN, list_variables
 from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, start_memory
@@ -36,18 +37,24 @@ class SecondSolution:
     ) -> None:
         """Begins at rest, or with the memory of a step of the run, carried over; with what earlier ones have kept.
 
-        Raises ConvergenceError where the operator cannot be assembled well enough.
+        Its operator is not there before the first step: of a run of one step it takes the place of the run's own.
         """
         self.beside = beside
-        model, mesh = beside.model, beside.mesh
-        self.problem: Problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
-        self.tangent: TangentOperator = kept.take_tangent(self.problem) if kept else self.problem.make_tangent()
-        self._kept = kept is not None
-        self.memory: Memory = start_memory(self.problem.laws)
+        self._comm, self._kept, self._start = comm, kept, start
+        self._costly = choose_operator(beside.model, beside.mesh) is HierarchicalChoice
         self._watch = Watch(comm, SilentReporter(), StopSignals())
+        self._ready = False
+
+    def _prepare(self) -> None:
+        """Raises ConvergenceError where the operator cannot be assembled well enough."""
+        kept, model, mesh = self._kept, self.beside.model, self.beside.mesh
+        self.problem: Problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, self._comm)
+        self.tangent: TangentOperator = kept.take_tangent(self.problem) if kept else self.problem.make_tangent()
+        self.memory: Memory = start_memory(self.problem.laws)
         self._watch.look_after(self.problem.laws)
-        if start is not None:
-            self._take_over(start.contact)
+        if self._start is not None:
+            self._take_over(self._start.contact)
+        self._ready = True
 
     def follow(self, step: Step) -> Step:
         """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
@@ -55,6 +62,8 @@ class SecondSolution:
         Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
         custom law fails with what it is asked here; there is no further step then.
         """
+        if not self._ready:
+            self._prepare()
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)
@@ -69,7 +78,8 @@ class SecondSolution:
     def _solve(self, step: Step, load: Load) -> Solution:
         begun = replace(self.memory, modes=self._guess_modes(step.contact), duration=step.duration)
         try:
-            return solve_step(self.problem, self.tangent, begun, load, self._watch)
+            # It begins with what is nearly the solution; or this mesh wants another one that takes long to find.
+            return solve_step(self.problem, self.tangent, begun, load, self._watch, once=self._costly)
         except ConvergenceError:
             self._watch.check()
             return self._solve_held(step, load)
@@ -127,5 +137,5 @@ class SecondSolution:
 
     def destroy(self) -> None:
         """Free the storage; after an exception of one rank it is not called."""
-        if not self._kept:
+        if self._ready and not self._kept:
             self.tangent.destroy()

@@ -63,10 +63,11 @@ def march(
     that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
     always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
     the steps before it were yielded. kept: a tangent operator that is used and not destroyed. guess: the modes
-    with which the search for those of a step begins.
+    with which the search for those of a step begins. Unless the tangent operator is kept, its storage is free by
+    the time of the last step, after which nothing is solved for any more.
     """
     begin = start or start_from_rest(problem)
-    tangent = kept or problem.make_tangent()
+    tangent, freed = kept or problem.make_tangent(), kept is not None
     number, memory, noted, told, depth = begin.number, begin.memory, 0.0, 0.0, 0.0
     try:
         for stage in range(begin.stage, len(problem.model.stages)):
@@ -85,13 +86,16 @@ def march(
                 told = note_nonlinearity(problem, step, told, reporter)
                 depth = note_passing(problem, step, depth, reporter)
                 reporter.accept(step)
+                if not freed and reached >= 1.0 and stage == len(problem.model.stages) - 1:
+                    tangent.destroy()
+                    freed = True
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.
-        if kept is None:
+        if not freed:
             tangent.destroy()
         raise
-    if kept is None:
+    if not freed:
         tangent.destroy()
 
 

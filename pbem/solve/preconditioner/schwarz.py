@@ -40,8 +40,8 @@ class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
 
     inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
-    eliminated within a node, of some of the own unknowns, on turned equations, in single precision; None where there is
-    none.
+    eliminated within a node, of some of the own unknowns, on turned equations, in single precision unless the group is
+    the whole model; None where there is none.
     formed: whether it has been tried.
     """
 
@@ -51,7 +51,7 @@ class LocalInverse:
     inside: Integer
     seen: Integer
     solved: Integer
-    matrix: Single | None = None
+    matrix: Real | Single | None = None
     formed: bool = False
 
 
@@ -125,7 +125,8 @@ class SchwarzPreconditioner:
         for inverse in self.inverses:
             if inverse.matrix is not None:
                 result[inverse.own] = eliminated[inverse.own]
-                result[inverse.own[inverse.solved]] += size * (inverse.matrix @ single[inverse.seen])
+                seen = (single if inverse.matrix.dtype == np.float32 else turned / size)[inverse.seen]
+                result[inverse.own[inverse.solved]] += size * (inverse.matrix @ seen)
             else:
                 # A group that nothing holds without the rest of the model: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
@@ -189,9 +190,11 @@ class SchwarzPreconditioner:
         inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
         if not zero_pivot:
             matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
-            # What preconditions needs no more digits, and half the memory is that of all groups together.
+            # Of a part of the model the inverse is not that of the whole, and needs no more digits than these: all
+            # groups together are much of what is stored.
+            whole_model = len(around) == 2 * self._mesh.nodes
             with np.errstate(over="ignore"):
-                stored = np.ascontiguousarray(matrix, dtype=np.float32)
+                stored = np.ascontiguousarray(matrix, dtype=np.float64 if whole_model else np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None
         self.singular += inverse.matrix is None
 

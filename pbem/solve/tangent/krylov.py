@@ -41,7 +41,7 @@ SAFETY = 0.1
 MOST_SETTLED_BY_GMRES = 12
 # What a loose solution leaves of the forces at most, however far off it began: with more, thin blocks between open
 # cracks are anywhere, and thousands of pairs change by chance.
-LOOSEST = 1e-3
+LOOSEST = 1e-4
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
 

@@ -128,13 +128,16 @@ def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
 
 @dataclass(frozen=True)
 class HierarchicalOperator:
-    """The rows of B of some nodes (k,), in their order; sources and targets are the same trees."""
+    """The rows of B of some nodes (k,), in their order; sources and targets are the same trees.
+
+    leaves: emptied where no product is asked for any more, as they are most of the storage.
+    """
 
     parts: Sorted
     nodes: Integer
     sources: SourceTree
     targets: TargetTree
-    leaves: tuple[LeafRows, ...]
+    leaves: list[LeafRows]
     free: sparse.csr_matrix
     needed: Bool
     anchorings: tuple[Anchoring, ...] = ()
@@ -211,7 +214,7 @@ def assemble_hierarchical(
         motions for motions in find_rigid_motions(mesh, finite, needed)
         if motions.interpolated or len(motions.columns) > 2 * SMALL_REGION * (mesh.order + 1)
     )
-    return HierarchicalOperator(parts, nodes, sources, targets, tuple(leaves), free, needed, rigid=rigid)
+    return HierarchicalOperator(parts, nodes, sources, targets, leaves, free, needed, rigid=rigid)
 
 
 def _evaluate_leaf(

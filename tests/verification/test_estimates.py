@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -308,13 +308,29 @@ def test_a_law_that_fails_in_the_second_solution_alone_is_said(tmp_path: Path) -
     assert_same(results.displacement, sound.displacement)
 
 
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_the_second_solution_of_a_large_model_searches_once(
+    operator: Literal["dense", "hierarchical"], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, solve = [], second_solution.solve_step
+
+    def watch(*arguments: Any, **options: Any) -> Any:
+        asked.append(options["once"])
+        return solve(*arguments, **options)
+
+    monkeypatch.setattr(second_solution, "solve_step", watch)
+    (tmp_path / "blocks.toml").write_text(BLOCKS)
+    pbem.run(tmp_path / "blocks.toml", tmp_path / "blocks.h5", operator=operator)
+    assert asked and set(asked) == {operator == "hierarchical"}
+
+
 def test_statuses_that_do_not_settle_on_the_coarser_mesh_are_those_of_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "blocks.toml").write_text(BLOCKS.replace("elements = 4", "elements = 12"))
     settled = pbem.run(tmp_path / "blocks.toml", tmp_path / "settled.h5").errors
 
-    def refuse(*_: Any) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
         raise ConvergenceError("unsound mesh", "pairs part when they are pressed")
 
     monkeypatch.setattr(second_solution, "solve_step", refuse)

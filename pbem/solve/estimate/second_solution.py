@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from pbem.bem.operator_choice import HierarchicalChoice, choose_operator
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.declaration import BROKEN, list_variables
 from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, start_memory
@@ -37,18 +38,23 @@ class SecondSolution:
     ) -> None:
         """Begins at rest, or with the memory of a step of the run, carried over; with what earlier ones have kept.
 
+        Its operator is not there before the first step: of a run of one step it takes the place of the run's own.
         signals: those by which the run is stopped; then StopError leaves `follow`.
-
-        Raises ConvergenceError where the operator cannot be assembled well enough.
         """
         self.beside = beside
-        model, mesh = beside.model, beside.mesh
-        self.problem: Problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
-        self._whole = self.problem
+        self._comm, self._kept, self._start = comm, kept, start
+        self._costly = choose_operator(beside.model, beside.mesh) is HierarchicalChoice
+        self._watch = Watch(comm, SilentReporter(), signals or StopSignals())
+        self._ready = False
+
+    def _prepare(self) -> None:
+        """Raises ConvergenceError where the operator cannot be assembled well enough."""
+        kept, model, mesh = self._kept, self.beside.model, self.beside.mesh
+        self.problem: Problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, self._comm)
+        self._whole, start = self.problem, self._start
         self._arranged = Arranged(self.problem, kept.take_tangent(self.problem) if kept else None)
         self.memory: Memory = start_memory(self.problem.laws)
         self._contact, self._stage = describe_rest(self.problem), -1
-        self._watch = Watch(comm, SilentReporter(), signals or StopSignals())
         self._watch.look_after(self.problem.laws)
         if start is not None:
             self._take_over(start.contact)
@@ -56,6 +62,7 @@ class SecondSolution:
                 self._enter(start.stage, start.factor)
             else:
                 self._stage = start.stage
+        self._ready = True
 
     def follow(self, step: Step) -> Step:
         """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
@@ -66,6 +73,8 @@ class SecondSolution:
         if step.stage != self._stage:
             self.memory = begin_stage(self._whole, step.stage, self.memory, self._contact)
             self._enter(step.stage, 0.0)
+        if not self._ready:
+            self._prepare()
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)
@@ -86,7 +95,8 @@ class SecondSolution:
     def _solve(self, step: Step, load: Load) -> Solution:
         begun = replace(self.memory, modes=self._guess_modes(step.contact), duration=step.duration)
         try:
-            return solve_step(self.problem, self.tangent, begun, load, self._watch)
+            # It begins with what is nearly the solution; or this mesh wants another one that takes long to find.
+            return solve_step(self.problem, self.tangent, begun, load, self._watch, once=self._costly)
         except ConvergenceError:
             self._watch.check()
             return self._solve_held(step, load)
@@ -148,4 +158,5 @@ class SecondSolution:
 
     def destroy(self) -> None:
         """Free the storage; after an exception of one rank it is not called."""
-        self._arranged.leave()
+        if self._ready:
+            self._arranged.leave()

@@ -68,6 +68,7 @@ PATIENCE = 8
 def solve_step(
     problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Reporter,
     refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None, hurried: bool = False,
+    once: bool = False,
 ) -> Solution:
     """Converge one load step from the memory of the last.
 
@@ -77,7 +78,7 @@ def solve_step(
     first, only when the modes of all other pairs have settled. Where groups of a crack network that settle by
     themselves lead to modes that do not, the search begins anew without that. All decisions are taken by the first
     rank. Linear systems are solved loosely while modes change (pbem.solve.nonlinear.forcing); a search that fails so
-    begins anew with every system solved in full.
+    begins anew with every system solved in full. once: the first search alone, whose end is the step's.
     Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
     "singular tangent", "linear solver"; and what `refuse` answers, asked now and then with the memory as it is by then:
     "limit load" in a march, where nothing can balance the loads with the bonds that are left.
@@ -93,12 +94,12 @@ def solve_step(
                     return _search_modes(
                         problem, tangent, memory, load, reporter, refuse, hurried, search, iterations, forcing)
                 except ConvergenceError:
-                    if not (search.swept or (search.varying and search.unsettled)):
+                    if once or not (search.swept or (search.varying and search.unsettled)):
                         raise
             return _search_modes(
                 problem, tangent, memory, load, reporter, refuse, hurried, last, iterations, forcing)
         except ConvergenceError:
-            if not forcing.used:
+            if once or not forcing.used:
                 raise
     raise AssertionError("a search without forcing ends with a solution or an error")
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import lapack
 
@@ -28,6 +29,8 @@ from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 
+Single = NDArray[np.float32]
+
 # Unknowns that are left in the matrix of a group and the nearest elements around it, at most, of cracks and of bodies;
 # or so many times those of the group alone.
 MOST_LEFT, MOST_LEFT_OF_BODIES, MOST_TIMES = 900, 1700, 2.0
@@ -38,7 +41,8 @@ class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
 
     inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
-    eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
+    eliminated within a node, of some of the own unknowns, on turned equations, in single precision unless the group is
+    the whole model; None where there is none.
     formed: whether it has been tried; drift: by how much the constraint map has changed in what it sees since then.
     """
 
@@ -48,7 +52,7 @@ class LocalInverse:
     inside: Integer
     seen: Integer
     solved: Integer
-    matrix: Real | None = None
+    matrix: Real | Single | None = None
     formed: bool = False
     drift: float = 0.0
 
@@ -77,6 +81,12 @@ class SchwarzPreconditioner:
         self.singular = 0  # groups without an inverse, of those formed last
         self.most_drift = 0.0  # inverses serve until the constraint map has changed by more than this part
         self.inverses = [self._place(group) for group in groups]
+
+    def drop_inverses(self) -> None:
+        """Drop all inverses; `update` would form them anew."""
+        self._formed = None
+        for inverse in self.inverses:
+            inverse.matrix, inverse.formed = None, False
 
     def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
         """Take other surroundings of the same groups, so many times as many; `update` then forms all inverses."""
@@ -115,11 +125,15 @@ class SchwarzPreconditioner:
         less, nodes = self._less, self._nodes
         assert less is not None
         turned = less.apply(residual)
+        # Single precision has few powers of ten, which lengths in small units would fall out of.
+        size = float(np.abs(turned).max(initial=0.0)) or 1.0
+        single = (turned / size).astype(np.float32)
         eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], turned.reshape(-1, 2)[nodes]).ravel()
         for inverse in self.inverses:
             if inverse.matrix is not None:
                 result[inverse.own] = eliminated[inverse.own]
-                result[inverse.own[inverse.solved]] += inverse.matrix @ turned[inverse.seen]
+                seen = (single if inverse.matrix.dtype == np.float32 else turned / size)[inverse.seen]
+                result[inverse.own[inverse.solved]] += size * (inverse.matrix @ seen)
             else:
                 # A group that nothing holds without the rest of the model: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
@@ -161,7 +175,7 @@ class SchwarzPreconditioner:
         local, first = less.local.ravel()[around], less.first.ravel()[around]
         inverse.seen, inverse.matrix, inverse.formed = around[~first], None, True
         if local.all():
-            inverse.matrix, inverse.solved = np.zeros((0, 0)), np.zeros(0, dtype=np.int64)
+            inverse.matrix, inverse.solved = np.zeros((0, 0), dtype=np.float32), np.zeros(0, dtype=np.int64)
             return
         # In large groups the eliminated follow their own residual alone: what the others do to them GMRES sees in its
         # next iteration, and no other equation contains them.
@@ -183,7 +197,12 @@ class SchwarzPreconditioner:
         inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
         if not zero_pivot:
             matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
-            inverse.matrix = np.ascontiguousarray(matrix) if np.isfinite(matrix).all() else None
+            # Of a part of the model the inverse is not that of the whole, and needs no more digits than these: all
+            # groups together are much of what is stored.
+            whole_model = len(around) == 2 * self._mesh.nodes
+            with np.errstate(over="ignore"):
+                stored = np.ascontiguousarray(matrix, dtype=np.float64 if whole_model else np.float32)
+            inverse.matrix = stored if np.isfinite(stored).all() else None
         self.singular += inverse.matrix is None
 
     def respond(

@@ -77,6 +77,9 @@ class System(Protocol):
     def apply(self, v: Real) -> Real:
         """This rank's rows (2 k,) of B v, lengths, for v (4 nodes,)."""
 
+    def free_products(self) -> None:
+        """Free what `apply` alone needs, where that is much; it is not called any more."""
+
     def recover(self, v: Real) -> Real:
         """This rank's part of the mean displacement of both faces at the crack nodes, by components.
 

@@ -88,7 +88,8 @@ def march(
     that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
     always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
     the steps before it were yielded. kept: a tangent operator that is used and not destroyed. guess: the modes
-    with which the search for those of a step begins. recover: see `describe_step`.
+    with which the search for those of a step begins. recover: see `describe_step`. Unless the tangent operator is kept,
+    its storage is free by the time of the last step, after which nothing is solved for any more.
     """
     begin = start or start_from_rest(problem)
     arranged, whole = Arranged(problem, kept), problem
@@ -116,6 +117,8 @@ def march(
                 contact = step.contact
                 with note_place(stage, reached, solution.modes):
                     reporter.accept(step)
+                if reached >= 1.0 and stage == len(whole.model.stages) - 1:
+                    arranged.leave()
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.

@@ -109,6 +109,9 @@ class DenseSystem:
         with clock.piece("product", self.stored):
             return self.operator.apply(v)
 
+    def free_products(self) -> None:
+        """See System: the tangent operator may have used the matrices' storage."""
+
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""
         part = np.zeros(sum(len(block.rows) for block in self.crack_rows))

@@ -114,6 +114,10 @@ class HierarchicalSystem:
         """See System."""
         return self._count.products
 
+    def free_products(self) -> None:
+        """See System: the rows; what interior points and cracks need of the operator stays."""
+        self.operator.leaves.clear()
+
     def recover(self, v: Real) -> Real:
         """See System (theory, 13)."""
         return np.zeros(0) if self.crack_points is None else split_components(self.crack_points.displacement(v))

@@ -89,7 +89,7 @@ class SchwarzPreconditioner:
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
         matrix = constraints.matrix
-        changed = _find_changes(self._formed, matrix)
+        changed = find_changes(self._formed, matrix)
         self._formed = matrix
         changed |= self._find_anchored(constraints)
         by_column = matrix.tocsc()
@@ -340,7 +340,7 @@ def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
     return place, known[place] == numbers
 
 
-def _find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
+def find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
     """Columns (unknowns,) in which two constraint maps differ."""
     changed = np.zeros(matrix.shape[1], dtype=bool)
     if before is None:

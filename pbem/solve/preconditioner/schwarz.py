@@ -201,7 +201,7 @@ class SchwarzPreconditioner:
             # groups together are much of what is stored.
             whole_model = len(around) == 2 * self._mesh.nodes
             with np.errstate(over="ignore"):
-                stored = np.ascontiguousarray(matrix, dtype=np.float64 if whole_model else np.float32)
+                stored: Real | Single = np.ascontiguousarray(matrix, dtype=np.float64 if whole_model else np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None
         self.singular += inverse.matrix is None
 
@@ -375,6 +375,11 @@ def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
     """Where numbers are in a sorted list, and whether they are."""
     place = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
     return place, known[place] == numbers
+
+
+def find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
+    """Columns (unknowns,) in which two constraint maps differ."""
+    return np.asarray(_measure_changes(before, matrix) > 0)
 
 
 def _measure_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Real:

@@ -24,6 +24,7 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.nearby import MOST_ASKED, MOST_NEARBY, answers_nearby, respond_nearby
+from pbem.solve.tangent.recycled import RecycledSpace
 from pbem.solve.tangent.sweeps import Sweeps
 
 # Most iterations of GMRES for one linear system, without restart.
@@ -93,6 +94,7 @@ class KrylovTangent(TangentOperator):
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
         self._space = MinimalResidual(problem.comm, _Rows(self), MOST_ITERATIONS)
+        self.recycled = RecycledSpace(problem.comm)
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
@@ -115,10 +117,9 @@ class KrylovTangent(TangentOperator):
                 f"PETSc's preconditioner {kind!r} needs a stored matrix, which the hierarchical operator has not; "
                 'leave pc_type out, or ask for operator = "dense"',
             )
-        self._solver = solver
         # The user's ksp_rtol and ksp_atol, if they are given.
         self._tolerance, self._least = (float(each) for each in solver.getTolerances()[:2])
-        self._now = _Iterate(None, np.zeros(0), np.zeros(0), 0.0)
+        self._solver, self._now = solver, _Iterate(None, np.zeros(0), np.zeros(0), 0.0)
 
     @property
     def settling(self) -> Settling:
@@ -132,9 +133,8 @@ class KrylovTangent(TangentOperator):
 
         Raises ConvergenceError: "linear solver".
         """
-        self.preconditioner.update(constraints)
+        self.recycled.move_on(self._space, self.preconditioner, constraints, self.problem.system.nodes)
         self.constraints, self._space.residual = constraints, np.zeros(0)
-        self._space.forget()
         begin = self._carry_over(law)
         self.law = law
         loosely = forcing > 0 and self._keeps_directions
@@ -179,7 +179,7 @@ class KrylovTangent(TangentOperator):
     def _complete(self, constraints: ConstraintMap, load: Load) -> Solved:
         """The solution to the tolerance, from the iterate on."""
         problem, tolerance, now = self.problem, self.problem.model.solver.newton_tolerance, self._now
-        residual, count = np.inf, 0
+        residual, count, anew = np.inf, 0, False
         for _ in range(MOST_ATTEMPTS):
             before = residual
             now = self._improve(now, self._tolerance * now.scale)
@@ -199,10 +199,13 @@ class KrylovTangent(TangentOperator):
             if solved:
                 self.solution, self._now = unknowns, now
                 return Solved(unknowns, v, residual, linear_iterations=count)
-            # Of slender bodies GMRES' own residual is off by rounding: it goes on from the true one while that helps.
-            if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or not residual < 0.1 * before):
+            # Of slender bodies GMRES' own residual is off by rounding: on from the true one, once without directions.
+            helps = residual < 0.1 * before
+            if not widened and (self.iterations[-1] >= self._solver.getTolerances()[3] or (anew and not helps)):
                 break
-            self._space.forget()
+            if not helps:
+                anew = True
+                self._space.forget()
             if widened:
                 self.preconditioner.update(constraints)
                 self._solver.getPC().setUp()
@@ -330,9 +333,10 @@ class KrylovTangent(TangentOperator):
 
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
-        self.problem = problem
+        self.problem, self.expected, self._sweeps = problem, None, None
         self.preconditioner.most_drift = MOST_DRIFT
-        self.expected = self._sweeps = None
+        self._space.forget()
+        self.recycled.drop()
 
     def destroy(self) -> None:
         """See TangentOperator."""
@@ -373,9 +377,9 @@ class _Rows:
         return self._tangent.multiply(self._tangent.gather(part))
 
     def precondition(self, part: Real) -> Real:
-        result = np.zeros(len(part))
-        self._tangent.preconditioner.apply(self._tangent.gather(part), result)
-        return result
+        (known, left), result = self._tangent.recycled.split(part, self), np.zeros(len(part))
+        self._tangent.preconditioner.apply(self._tangent.gather(left), result)
+        return known + result
 
     def turn(self, part: Real) -> Real:
         return self._tangent.preconditioner.turn(part)

@@ -18,7 +18,6 @@ from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.model.support_motions import see_motions
 from pbem.solve.problem.problem import Problem
 
-
 # A body is moved aside by so many times its size's part rather than turned.
 TURNS = 1e-4
 

@@ -16,7 +16,6 @@ from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.rigid_body import find_reference
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
 from pbem.model.varying import Places, Value, Varying, evaluate, negate
-from pbem.wording import list_names
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
 BALANCED = 1e-9
@@ -47,7 +46,7 @@ def describe_unbalance(
             kinds = ["forces" if any(region.rigid for region in moving) else "tractions",
                      *(["weight"] if any(stage.gravity) else []),
                      *(["point loads"] if any(map(any, stage.point_forces.values())) else [])]
-            loads = list_names(kinds)
+            loads = " and ".join([", ".join(kinds[:-1]), kinds[-1]] if len(kinds) > 1 else kinds)
             return (
                 f"the {loads} of stage '{stage.name}' drive it, with resultant "
                 f"{format_point(force)} and moment {moment:.6g} about {about}"

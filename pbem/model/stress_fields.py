@@ -90,6 +90,10 @@ def _check_infinite(
         table_name = f"[initial_stress.{case.regions[name].material}]"
         expected = (f"a stress in [remote] or {table_name} that grows with x and y in balance with the weight: "
                     "d sxx/dx + d sxy/dy = -density gx, d sxy/dx + d syy/dy = -density gy; or density = 0 there")
+        if not held:
+            found = f"the weight of an infinite region ('{name}', density {density:g}), which no stress carries"
+            expected = (f"density = 0 there; its stress at rest goes into {table_name}, where it may grow with x and y "
+                        "in balance with the weight")
         yield Fault.at(loc, found, expected)
         return
 

@@ -129,7 +129,7 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
     for i, quantity in enumerate(condition.known):
         given = [f"{value[i]:g}" for value in values]
         given = given[:1] if len(set(given)) == 1 else shorten(given, 6)
-        spring = f", spring k{'ns'[i]} = {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
+        spring = f", spring {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
         texts.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}{spring}")
     return texts[0], texts[1]
 

@@ -73,7 +73,9 @@ def test_load_on_a_spring_over_the_stages() -> None:
     assert model.conditions["top"].stiffness == (30.0, 0.0)
     fault = find_only_fault(with_stages(text, "[stages.boundary.top]\nun = 2"))
     assert fault.startswith("stages[1].boundary.top.un") and "'un' where 'spring' was given before" in fault
-    fault = find_only_fault(with_stages(text, "[stages.boundary.top]\nty = 2"))
+    turned = build(with_stages(text, "[stages.boundary.top]\nty = 2")).conditions["top"]
+    assert (turned.frame, turned.value_frame) == ("local", "global")
+    fault = find_only_fault(with_stages(text, "[stages.boundary.top]\ntn = 1", "[stages.boundary.top]\nty = 2"))
     assert "'ty', a global component; expected local components as before" in fault
 
 

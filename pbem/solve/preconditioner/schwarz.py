@@ -201,7 +201,9 @@ class SchwarzPreconditioner:
             # groups together are much of what is stored.
             whole_model = len(around) == 2 * self._mesh.nodes
             with np.errstate(over="ignore"):
-                stored: Real | Single = np.ascontiguousarray(matrix, dtype=np.float64 if whole_model else np.float32)
+                stored: Real | Single = np.ascontiguousarray(matrix)
+                if not whole_model:
+                    stored = stored.astype(np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None
         self.singular += inverse.matrix is None
 

@@ -14,10 +14,11 @@ from scipy.optimize import linprog
 from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.loop import side_legs
 from pbem.geometry.sampling import sample_side
-from pbem.model.model import Law, Model
+from pbem.model.model import Contact, Law, Model
 from pbem.model.resultants import measure_power
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
-from pbem.model.sight import Surroundings
+from pbem.model.sight import OVERLAP, Surroundings
+from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Varying, evaluate
 
 # Nobody moves further than so many sizes of the model: what does is stopped by nothing.
@@ -37,31 +38,45 @@ def find_closing(model: Model) -> frozenset[str]:
     power = find_drive(model, motions)
     if power is None:
         return frozenset()
-    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
-    bounded = find_bounded(model)
-    names, openings, rates, rough = [], [], [], []
+    names, openings, rates = [], [], []
     for name, contact in apart.items():
-        for curve, other in ((contact.first, contact.second), (contact.second, contact.first)):
-            points, normals = sample_side(model.curves, sides[curve])
-            seen = Surroundings(side_legs(model.curves, sides[other])).look_along(points, normals, -model.size)
-            faced = (seen.leg >= 0) & (seen.product < 0) & (np.abs(seen.distance) < model.size)
-            if not faced.any():
-                continue
-            points, normals, distance = points[faced], normals[faced], np.maximum(seen.distance[faced], 0.0)
-            gap = evaluate(contact.law.gap, Places(points + model.origin, np.zeros(len(points)))) if not (
-                isinstance(contact.law.gap, Varying)) else np.zeros(len(points))
-            names += [name] * len(points)
-            rough += [resists_slip(contact.law)] * len(points)
-            openings.append(np.maximum(distance + gap, 0.0))
-            rates.append(find_rates(motions, bounded[curve], bounded[other], points, normals))
-    if not openings:
-        return frozenset()
+        for one, other in ((contact.first, contact.second), (contact.second, contact.first)):
+            opening, rate = _sample_openings(model, contact, one, other, motions)
+            names += [name] * len(opening)
+            openings.append(opening)
+            rates.append(rate)
     opening, rate = np.concatenate(openings), np.concatenate(rates)
-    moved = move_until_closed(opening, rate, power, model.size, np.array(rough))
+    if not len(opening):
+        return frozenset()
+    rough = np.array([resists_slip(apart[name].law) for name in names])
+    moved = move_until_closed(opening, rate, power, model.size, rough)
     if moved is None:
         return frozenset()
     closed = moved <= CLOSED * max(float(opening.max()), CLOSED * model.size)
     return frozenset(name for name, touches in zip(names, closed.tolist(), strict=True) if touches)
+
+
+def _sample_openings(
+    model: Model, contact: Contact, curve: str, other: str, motions: Sequence[RigidBodyMode]
+) -> tuple[Real, Real]:
+    """Openings (k,) at points of a curve that face the other one, and what motions add to them (k, c)."""
+    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
+    points, normals = sample_side(model.curves, sides[curve])
+    shorter = min(model.curves[curve].length, model.curves[other].length)
+    around = Surroundings(side_legs(model.curves, sides[other]))
+    seen = around.look_along(points, normals, -OVERLAP * shorter)
+    faced = (seen.leg >= 0) & (seen.product < 0)
+    points, normals, distance = points[faced], normals[faced], seen.distance[faced]
+    gap = contact.law.gap
+    if isinstance(gap, Varying):  # along the first curve
+        feet = [find_foot(model.curves[contact.first], complex(point)) for point in points]
+        places = Places(np.array([foot for foot, _ in feet], dtype=complex) + model.origin,
+                        np.array([along for _, along in feet]))
+        distance = distance + evaluate(gap, places)
+    else:
+        distance = distance + gap
+    bounded = find_bounded(model)
+    return np.maximum(distance, 0.0), find_rates(motions, bounded[curve], bounded[other], points, normals)
 
 
 def resists_slip(law: Law) -> bool:

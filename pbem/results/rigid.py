@@ -68,8 +68,8 @@ def create_rigid(file: h5py.File, model: Model) -> None:
         own = group.create_group(name)
         about = find_reference(body, model.curves, model.origin) + model.origin
         # The middle of a circle about 0 is that but for rounding.
-        parts = [0.0 if abs(part) < NOTHING * model.size else part for part in (about.real, about.imag)]
-        own.attrs["about"] = np.array(parts)
+        place = [0.0 if abs(part) < NOTHING * model.size else part for part in (about.real, about.imag)]
+        own.attrs["about"] = np.array(place)
         own.attrs["curves"], own.attrs["known"] = _text(body.curves), _text(body.known)
         own.attrs["tool"] = body.tool
         for kind, parts in (("force", FORCES), ("motion", MOTIONS)):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.geometry.curve import Leg
-from pbem.geometry.intersection import enclosed_angle, enclosed_area, meeting_points, project
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import enclosed_angle, enclosed_area, meeting_points, project, winding_number
 from pbem.geometry.loop import loop_legs
-from pbem.geometry.shape import share
+from pbem.geometry.shape import Division, draw_circle, share
 from pbem.model.model import Model, Region
 from tests.unit.case_sample import BLOCKS, MATERIAL, SQUARE, add_curves, build, change, find_faults, find_only_fault
 
@@ -410,3 +410,12 @@ def test_projection_to_legs() -> None:
     assert project(arc, 1.5 - 1.5j) == pytest.approx((0.5, 1.5 * 2**0.5 - 1))
     assert project(arc, 1 + 1j) == pytest.approx((0.0, 1.0))
     assert project(arc, -1 - 1j) == pytest.approx((1.0, 1.0))
+
+
+def test_points_on_the_chords_of_a_circle_lie_inside() -> None:
+    """How a point on the chord of an arc is rounded makes it none outside."""
+    circle = draw_circle("hole", 0j, 1.0001, Division(64))
+    assert isinstance(circle, Curve)
+    chords = [(leg.start + t * (leg.end - leg.start)) for leg in circle.legs for t in np.linspace(1e-4, 0.9999, 23)]
+    points = np.array([*chords, -1 - 0.0001j, *(-1 - 1e-4j * (1 + k * 1e-16) for k in range(-3, 4))])
+    assert (winding_number(list(circle.legs), points) == 1).all()

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from pbem.contact.approach import approach_pairs
+from pbem.contact.laws import collect_laws
 from pbem.mesh.mesh import list_faces
 from pbem.model.model import Model
 from pbem.results.rigid import measure_rigid
@@ -149,6 +151,9 @@ def test_pin_pressed_into_its_clearance(clearance: float, operator: str) -> None
     solved = solve_model(model)
     at = solved.pairs("seat")
     angle = np.angle(solved.mesh.pairs.position[at] * np.exp(-1j * math.radians(direction)))
+    # The search begins where the force presses, but for the distance of pairs.
+    opening = approach_pairs(model, solved.mesh, collect_laws(model, solved.mesh).gap)[at]
+    np.testing.assert_allclose(opening, clearance * (1 - np.cos(angle)), atol=0.1 * clearance)
     pressure, exact = -solved.last.contact.traction_n[at], force * evaluate_persson(angle, width)
     inner = np.abs(angle) < 0.9 * width
     assert np.abs(pressure - exact)[inner].max() < 1e-2 * exact.max()

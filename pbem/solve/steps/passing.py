@@ -69,7 +69,8 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
         frozenset((a, b)) for contact in model.contacts.values()
         for a in curves.get(contact.first, ()) for b in curves.get(contact.second, ())
     }
-    finite = [numbers[each.name] for each in model.regions if not each.infinite and len(regions[numbers[each.name]])]
+    finite = [numbers[each.name] for each in model.regions
+              if not each.infinite and not each.removed and len(regions[numbers[each.name]])]
     corners = [
         (complex(moved[own].real.min(), moved[own].imag.min()), complex(moved[own].real.max(), moved[own].imag.max()))
         for own in (regions[number] for number in finite)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, find_creeping, resists_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, find_creeping, resists_slip
 from pbem.contact.loads import Load, OuterNodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.construction import list_opened
@@ -45,6 +45,11 @@ class Arrangement:
             laws, bonded=(laws.bonded & ~self.opened) | self.closed, parted=(laws.parted & ~self.closed) | self.opened,
             brittle=laws.brittle & free, rest=np.where(self.closed, rest, laws.rest),
         )
+
+    def blank(self, state: PairState) -> PairState:
+        """The state of the pairs without jumps where a side is gone."""
+        jumps = (np.where(self.bared, 0.0, each) for each in (state.g_n, state.g_s))
+        return PairState(state.p_n, state.p_s, *jumps)
 
     def adapt(self, load: Load, mesh: Mesh, outer: OuterNodes, carried: Real) -> Load:
         """The load without what acts on regions that are gone; carried (m, 2): what opened pairs still bear."""

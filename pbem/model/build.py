@@ -170,8 +170,9 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     notes = [*cut.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
-        overlaps, wrong = check_contacts(case, curves, loops, roles, shapes.tolerance)
+        overlaps, pressed, wrong = check_contacts(case, curves, loops, roles, shapes.tolerance)
         faults += wrong
+        notes += pressed
         faults += check_inside(case, curves, cracks, loops)
         faults += check_near_misses(curves, cracks)
         loops = {**loops, **orient_tools(case, curves, loops, roles)}

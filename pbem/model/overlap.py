@@ -127,10 +127,10 @@ def _overlap(
 
 def check_contacts(
     case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: Tolerance
-) -> tuple[dict[str, float], list[Fault]]:
-    """By name the overlap that is allowed of contacts whose bodies lie in each other as they are drawn; a fault for
-    every one in which they do by more, with the deepest place found."""
-    faults, overlaps = [], {}
+) -> tuple[dict[str, float], list[str], list[Fault]]:
+    """By name the overlap that is allowed of contacts whose bodies lie in each other as they are drawn, with a sentence
+    for each; a fault for every one in which they do by more, with the deepest place found."""
+    faults, overlaps, notes = [], {}, {}
     for name, (first, second) in roles.contacts.items():
         for curve, other in ((first, second), (second, first)):
             region = roles.outer[other]
@@ -148,7 +148,9 @@ def check_contacts(
                 break
             if depth > tolerance.of(curve):
                 overlaps[name] = allowed
-    return overlaps, faults
+                notes[name] = (f"The bodies of contact '{name}' are drawn {depth:.4g} deep into each other, at "
+                               f"{format_point(point)}; the first step drives them apart.")
+    return overlaps, [*notes.values()], faults
 
 
 # Depths are known to this part of them.

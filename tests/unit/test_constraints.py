@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.operator import assemble_rows
 from pbem.case.build import parse_model
-from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.constraints import build_constraints, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.contact.loads import collect_outer_nodes, evaluate_load, find_needed_columns
 from pbem.mesh.generate import generate_mesh
@@ -197,3 +199,30 @@ def test_loads_grow_in_proportion_within_a_stage() -> None:
     assert not none.values.any() and not none.pressure.any()
     on_joint = mesh.pairs.interface == mesh.interface_names.index("joint")
     np.testing.assert_array_equal(whole.pressure, np.where(on_joint, PRESSURE, 0.0))
+
+
+@pytest.mark.parametrize("side", ["first", "second"])
+def test_nodes_of_a_region_that_is_gone_disturb_no_other(problem: Problem, side: str) -> None:
+    """They do not move, their tractions are their own unknowns, and the faces opposite bear what is given."""
+    mesh, pairs = problem.mesh, problem.mesh.pairs
+    joint = pairs.interface == mesh.interface_names.index("joint")
+    gone = (pairs.first if side == "first" else pairs.second)[joint]
+    left = (pairs.second if side == "first" else pairs.first)[joint]
+    modes = ModeState(np.full(pairs.count, OPEN), np.ones(pairs.count))
+    random = np.random.default_rng(7)
+    carried = np.where(joint[:, None], random.normal(size=(pairs.count, 2)), 0.0)
+    load = replace(problem.evaluate_load(0, 1.0), carried=carried)
+    law = linearise_pairs(problem, modes, factor=1.0)
+    made = build_constraints(mesh, problem.outer, problem.laws.gap, law, load, problem.traction_scale, gone)
+    x = random.normal(size=problem.unknowns)
+    u, t = split(mesh, made.evaluate(x))
+    own = x.reshape(-1, 2)[gone] @ [1, 1j]
+    np.testing.assert_array_equal(u[gone], 0.0)
+    np.testing.assert_allclose(t[gone], problem.traction_scale * own, rtol=1e-14)
+    n = pairs.normal[joint]
+    borne = (carried[joint, 0] - PRESSURE) * n + carried[joint, 1] * 1j * n
+    np.testing.assert_allclose(t[left], borne * (-1.0 if side == "first" else 1.0), atol=1e-13)
+    x.reshape(-1, 2)[gone] = 0.0
+    others = np.setdiff1d(np.arange(mesh.nodes), gone)
+    for before, after in zip((u, t), split(mesh, made.evaluate(x)), strict=True):
+        np.testing.assert_array_equal(before[others], after[others])

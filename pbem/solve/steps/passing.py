@@ -70,7 +70,7 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
         for a in curves.get(contact.first, ()) for b in curves.get(contact.second, ())
     }
     finite = [numbers[each.name] for each in model.regions
-              if not each.infinite and not each.rigid and len(regions[numbers[each.name]])]
+              if not (each.infinite or each.rigid or each.removed) and len(regions[numbers[each.name]])]
     corners = [
         (complex(moved[own].real.min(), moved[own].imag.min()), complex(moved[own].real.max(), moved[own].imag.max()))
         for own in (regions[number] for number in finite)

@@ -34,7 +34,7 @@ def describe_step(
     opposite = np.zeros(mesh.nodes, dtype=complex)
     opposite[cracks] = mean - jump / 2
     order = problem.second_faces
-    pairs = solution.pairs
+    pairs = solution.pairs if problem.arrangement is None else problem.arrangement.blank(solution.pairs)
     everywhere = np.concatenate([displacement, opposite[order]])
     free = problem.find_free_motions(stick_bonded(problem.laws, memory, solution.modes))
     slip, reactions = pairs.g_s, {}

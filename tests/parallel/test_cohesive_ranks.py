@@ -54,4 +54,5 @@ def test_two_ranks_and_a_resumed_run_give_the_same(tmp_path: Path) -> None:
         one = np.nan_to_num(expected[f"all/contact/{name}"])
         other_one = np.nan_to_num(found[f"all/contact/{name}"])
         np.testing.assert_allclose(other_one, one, rtol=0, atol=1e-6 * np.abs(one).max(), err_msg=name)
+    np.testing.assert_array_equal(found["steps/iterations"], expected["steps/iterations"])
     np.testing.assert_allclose(found["energy/dissipated"], expected["energy/dissipated"], rtol=1e-6)

@@ -22,9 +22,9 @@ EXPECTED = {
     "opening of the slit at 150 MPa, mm": (8e3 * YIELD * HALF / (math.pi * YOUNG) * math.acosh(SECANT), 1e-2),
 }
 PICTURES = [
-    ("part of the fracture energy that is spent along the strip, at the end", ["plot", "--curve", "right", "--field",
-                                                                              "damage"]),
-    ("stress around the slit", ["plot", "--field", "syy"]),
+    ("traction and opening along a strip at 150 MPa", ["plot", "--curve", "right", "--field", "traction_n,opening",
+                                                      "--step", "2"]),
+    ("stress around the slit and its strips at 150 MPa", ["plot", "--field", "syy", "--step", "2"]),
 ]
 
 

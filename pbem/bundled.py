@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os.path
 from pathlib import Path
 
 from pbem.errors import CaseError, Fault
@@ -13,7 +14,7 @@ def find_case(name: str) -> Path:
 
     Raises CaseError if there is neither, with the names of those that there are.
     """
-    if Path(name).is_file():
+    if os.path.isfile(name):  # also of names that no file can have
         return Path(name)
     bundled = list_bundled_cases()
     stem = name.removesuffix(".toml")

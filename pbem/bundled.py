@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os.path
 from pathlib import Path
 
 from pbem.errors import CaseError, Fault
@@ -16,7 +17,7 @@ def find_case(name: str) -> Path:
     Cases of the gallery go by `gallery/NAME` and by NAME. Raises CaseError if there is neither, with the names of those
     that there are.
     """
-    if Path(name).is_file():
+    if os.path.isfile(name):  # also of names that no file can have
         return Path(name)
     bundled = list_bundled_cases()
     stem = name.removesuffix(".toml")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 import contextlib
 import difflib
+import errno
 import io
 import os
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 from pbem.bundled import find_case
@@ -36,6 +36,8 @@ from pbem.wording import suggest
 # numpy, h5py, matplotlib, mpi4py are imported where they are used: help and faults come at once, and the number of
 # threads has to be set before.
 
+# What no file can be called: names too long, and links that lead to themselves.
+NO_NAME = (errno.ENAMETOOLONG, errno.ELOOP)
 COMMANDS = ("make", "import", "check", "run", "sweep", "info", "plot", "export", "help")
 
 DESCRIPTION = """\
@@ -91,12 +93,21 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
     except PbemError as error:
         say(f"pbem: {error}", rank)
         return WRONG_INPUT
+    except OSError as error:
+        if error.errno not in NO_NAME:
+            return _report_unexpected(rank)
+        say(f"pbem: {printable(str(error.filename))}: is no name of a file ({error.strerror})", rank)
+        return WRONG_INPUT
     except Exception:
-        if rank > 0:
-            # If the first rank has failed in the same way, it has ended this one before the pause is over.
-            time.sleep(1.0)
-        say(traceback.format_exc().rstrip(), 0)
-        return UNEXPECTED
+        return _report_unexpected(rank)
+
+
+def _report_unexpected(rank: int) -> int:
+    if rank > 0:
+        # If the first rank has failed in the same way, it has ended this one before the pause is over.
+        time.sleep(1.0)
+    say(traceback.format_exc().rstrip(), 0)
+    return UNEXPECTED
 
 
 def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
@@ -125,7 +136,7 @@ def _names_a_case(argument: str) -> bool:
     """Whether the first argument is a case, not a command, nor one with a slip of the pen."""
     if argument.startswith("-") or argument in COMMANDS:
         return False
-    return Path(argument).exists() or not difflib.get_close_matches(argument, COMMANDS, cutoff=0.7)
+    return os.path.exists(argument) or not difflib.get_close_matches(argument, COMMANDS, cutoff=0.7)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -10,10 +10,11 @@ stamp=$venv/pbem-setup-stamp
 # The MPI, PETSc and HDF5 of the distribution fit each other, with mpi4py, petsc4py and h5py built against them.
 system_packages=(
     gcc libc6-dev python3-dev python3-venv python3-pip python3-setuptools python3-wheel
-    python3-numpy python3-scipy python3-matplotlib python3-pandas python3-pytest python3-pytest-xdist
+    python3-numpy python3-scipy python3-matplotlib python3-pytest python3-pytest-xdist
     python3-mpi4py python3-petsc4py libpetsc-real-dev python3-h5py python3-h5py-mpi openmpi-bin libopenblas0-pthread
-    python3-meshio python3-ezdxf
 )
+# Single commands need these; a distribution may lack them.
+optional_packages=(python3-meshio python3-ezdxf python3-pandas)
 # Of these the ones of the distribution stay, whatever else is installed into .venv: wheels bring another MPI and HDF5.
 kept_packages=(numpy h5py mpi4py petsc4py)
 # What the distributions lack or have too old.
@@ -24,6 +25,17 @@ fail() {
     say "$@"
     exit 1
 }
+
+# What a package is for, where it is left out.
+name_use() {
+    case $1 in
+        python3-meshio) echo "pbem import of binary .msh files" ;;
+        python3-ezdxf) echo "pbem import of .dxf files" ;;
+        *) echo "to_dataframe, and some tests" ;;
+    esac
+}
+
+is_offered() { [ -n "$(apt-cache show --no-all-versions "$1" 2>/dev/null)" ]; }
 
 is_installed() { [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]; }
 
@@ -37,14 +49,27 @@ install_system_packages() {
     for package in "${system_packages[@]}"; do
         is_installed "$package" || missing+=("$package")
     done
-    [ ${#missing[@]} -eq 0 ] && return
-    if [ "$(id -u)" -ne 0 ]; then
-        command -v sudo >/dev/null || fail "as root, first run: apt-get install ${missing[*]}"
-        as_root=(sudo)
+    if [ "$(id -u)" -ne 0 ] && command -v sudo >/dev/null; then as_root=(sudo); fi
+    if [ ${#missing[@]} -gt 0 ]; then
+        [ "$(id -u)" -eq 0 ] || [ ${#as_root[@]} -gt 0 ] || fail "as root, first run: apt-get install ${missing[*]}"
+        say "installing ${missing[*]}"
+        "${as_root[@]}" apt-get update -q
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"
     fi
-    say "installing ${missing[*]}"
-    "${as_root[@]}" apt-get update -q
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"
+    for package in "${optional_packages[@]}"; do
+        is_installed "$package" || install_optional_package "$package" "${as_root[@]}"
+    done
+}
+
+# Without it the rest works: it is never a reason to fail, and nothing is downloaded to find out whether it exists.
+install_optional_package() {
+    local package=$1 reason="this distribution has none"
+    shift
+    if is_offered "$package"; then
+        "$@" env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "$package" && return
+        reason="apt-get could not install it"
+    fi
+    say "$package is left out, $reason; needed for $(name_use "$package"): .venv/bin/pip install ${package#python3-}"
 }
 
 # Everything that decides how the environment and the kernels are built; the processor too, as they are built for it.

@@ -31,6 +31,7 @@ ABSENT_LISTS = (("stages",), ("generate",))
 MOST_PARTS = 12
 
 _PART = re.compile(r"""\s*(?:"((?:[^"\\]|\\.)*)"|'([^']*)'|([^\s."'=]+))\s*""")
+_ENTRY = re.compile(r"\[(\d+)\](?=\.|\Z)")
 WRITTEN = "names joined by dots, such as interfaces.seat.friction; a name with dots in quotes"
 
 
@@ -102,13 +103,24 @@ def set_keys(
             continue
         before = len(search.faults)
         found = list(search.find(parts))
-        faults += [Fault(key, each.found, each.expected, each.path) for each in search.faults[before:]]
+        hint = _explain_numbers(key)
+        faults += [Fault(key, each.found, hint or each.expected, each.path) for each in search.faults[before:]]
         for target in found:
             told.append((target, copy.deepcopy(plain.get("value"))))
             origins[target.path] = key
     for target, value in told:
         search.put(target, value, origins)
     return Replaced(search.tables, tuple(faults), origins)
+
+
+def _explain_numbers(key: str) -> str:
+    """What to say of an entry of a list that is written as in messages, which count entries from 1; else nothing."""
+    match = _ENTRY.search(key)
+    if match is None or int(match[1]) == 0:
+        return ""
+    told, meant = match[0], f".{int(match[1]) - 1}"
+    return (f"entries of lists by their numbers from 0, after a dot: {key[:match.start()]}{meant}{key[match.end():]} "
+            f"(messages count them from 1: {told})")
 
 
 @dataclass(frozen=True)

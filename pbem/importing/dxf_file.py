@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import io
 import itertools
 import math
 import warnings
@@ -15,7 +16,13 @@ from pbem.errors import PbemError
 from pbem.geometry.curve import Leg
 from pbem.importing.reading import Reading, Trace, fail
 
+Tags = list[tuple[str, str]]
+
 KINDS = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE")
+# Codes of what polylines have and other entities have not, as they begin: counts, flags, widths, heights and points.
+OF_POLYLINES = ("90", "70", "43", "38", "39", "10")
+# The last version without marks of classes.
+OLD = "AC1009"
 # Parts of a circle.
 QUARTERS = 4
 
@@ -66,7 +73,7 @@ def _open(path: Path, reading: Reading) -> Any:
     except ImportError as error:
         raise PbemError(
             f"{path}: DXF files are read by ezdxf, which is missing ({error}): install python3-ezdxf, or run "
-            "scripts/setup.sh"
+            "pip install ezdxf"
         ) from None
     try:
         with warnings.catch_warnings():
@@ -74,6 +81,9 @@ def _open(path: Path, reading: Reading) -> Any:
             try:
                 return ezdxf.readfile(str(path))  # type: ignore[attr-defined]
             except (ezdxf.DXFStructureError, UnicodeDecodeError):  # type: ignore[attr-defined]
+                marked = _mark_polylines(path)
+                if marked is not None:
+                    return ezdxf.read(io.StringIO(marked))  # type: ignore[attr-defined]
                 drawing, auditor = recover.readfile(str(path))
     except Exception as error:  # whatever a library says of a file that is none of its own
         found = f"what ezdxf cannot read ({type(error).__name__}: {error})"
@@ -82,6 +92,52 @@ def _open(path: Path, reading: Reading) -> Any:
     reading.notes.append(f"The drawing is damaged; ezdxf has mended {len(auditor.fixes)} places and not "
                          f"{len(auditor.errors)}.")
     return drawing
+
+
+def _mark_polylines(path: Path) -> str | None:
+    """The text with its polylines (LWPOLYLINE) that lack the marks of their class, without which ezdxf reads none, as
+    it reads them; None if none lacks them, or the file is no text.
+
+    In drawings of old versions, which have no such marks at all, they become polylines of that time (POLYLINE).
+    """
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError:
+        return None
+    tags = [(code.strip(), value.strip()) for code, value in zip(lines[::2], lines[1::2], strict=False)]
+    at = next((number for number, tag in enumerate(tags) if tag == ("9", "$ACADVER")), None)
+    old = at is None or tags[at + 1][1] <= OLD
+    starts = [number for number, (code, _) in enumerate(tags) if code == "0"]
+    result, changed = tags[: starts[0]] if starts else tags, False
+    for start, end in itertools.pairwise([*starts, len(tags)]):
+        entity = tags[start:end]
+        if entity[0][1] == "LWPOLYLINE" and all(code != "100" for code, _ in entity):
+            entity = _age(entity) if old else _mark(entity)
+            changed = True
+        result += entity
+    return "".join(f"{code}\n{value}\n" for code, value in result) if changed else None
+
+
+def _mark(entity: Tags) -> Tags:
+    """A polyline with the marks of its class."""
+    own = next((at for at, (code, _) in enumerate(entity) if code in OF_POLYLINES), len(entity))
+    return [entity[0], ("100", "AcDbEntity"), *entity[1:own], ("100", "AcDbPolyline"), *entity[own:]]
+
+
+def _age(entity: Tags) -> Tags:
+    """A polyline as old versions have it: with its vertices after it."""
+    head = [("0", "POLYLINE"), ("66", "1")]
+    vertices: Tags = []
+    for code, value in entity[1:]:
+        if code == "10":
+            vertices += [("0", "VERTEX"), ("8", "0"), (code, value)]
+        elif code in ("20", "42") and vertices:
+            vertices.append((code, value))
+        elif code == "38":
+            head += [("10", "0"), ("20", "0"), ("30", value)]
+        elif code in ("8", "70", "210", "220", "230"):
+            head.append((code, str(int(value) & 1) if code == "70" else value))
+    return [*head, *vertices, ("0", "SEQEND")]
 
 
 def _read_entity(entity: Any, kind: str) -> tuple[list[Leg] | None, bool]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from pbem.case.reader import add_lines, parse_draft
@@ -25,8 +26,8 @@ def import_file(path: Path, options: Options, command: str) -> Imported:
     kind = path.suffix.lower()
     if kind not in KINDS:
         raise PbemError(f"{path}: found a file name that ends in '{path.suffix}'; expected {list_names(KINDS)}")
-    if not path.is_file():
-        what = "a folder" if path.is_dir() else "no such file"
+    if not os.path.isfile(path):
+        what = "a folder" if os.path.isdir(path) else "no such file"
         raise PbemError(f"{path}: found {what}; expected a file of traces or a mesh")
     if kind == ".msh":
         imported = make_mesh_case(path, read_mesh(path), options, command)

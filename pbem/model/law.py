@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
@@ -239,7 +240,7 @@ def _find_file(case: Case, loc: KeyPath, table: LawTable) -> tuple[str | None, l
     if table.file is None:
         return None, [Fault.at(loc, 'law = "custom" without a file', 'file = "...", a Python file with the law')]
     path = Path(case.source).parent / table.file
-    if path.is_file():
+    if os.path.isfile(path):
         return str(path), []
     found = f"no such file ('{path}')"
     return None, [Fault.at((*loc, "file"), found, "the path of a Python file, beside the case file or absolute")]

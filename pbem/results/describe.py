@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 
 from pbem.contact.laws import OPEN, SLIP, STICK
@@ -22,6 +24,8 @@ from pbem.wording import count as _count
 
 MOST_TIPS = 10
 MOST_ERRORS = 10
+# Works below this part of those of strains as large as the displacements are rounding.
+NO_WORK = 1e-13
 
 
 def describe_results(results: Results, traces: int = 10) -> str:
@@ -164,8 +168,18 @@ def _describe_energy(results: Results) -> list[str]:
     lacks = (external - elastic - dissipated - released - removed) / scale if scale else 0.0
     free = f" + released {_number(released)}" if released else ""
     free += f" + removed {_number(removed)}" if removed else ""
+    # Of what is rounding itself no part is worth telling.
+    known = scale > NO_WORK * _measure_stiffness(results)
+    exact = f"to {abs(lacks):.1e} of the largest" if known else "all of them rounding"
     return [f"external work {_number(external)} = elastic {_number(elastic)} + dissipated {_number(dissipated)}{free}, "
-            f"to {abs(lacks):.1e} of the largest", *_shorten(_describe_runaways(results), 6)]
+            f"{exact}", *_shorten(_describe_runaways(results), 6)]
+
+
+def _measure_stiffness(results: Results) -> float:
+    """The work of strains of the size of the displacements: the largest modulus times the largest of them, squared."""
+    stored = json.loads(results.configuration) if results.configuration else {}
+    modulus = max((region["material"]["young"] for region in stored.get("regions", ())), default=0.0)
+    return float(modulus * np.abs(results.displacement_at(-1)).max(initial=0.0) ** 2)
 
 
 def _describe_runaways(results: Results) -> list[str]:

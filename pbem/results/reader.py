@@ -225,7 +225,7 @@ def open_results(path: str | os.PathLike[str]) -> Results:
     Raises ResultFileError if there is no such file, it is not a result file of pbem, or it is damaged.
     """
     source = Path(path)
-    if not source.is_file():
+    if not os.path.isfile(source):  # also of names that no file can have
         raise ResultFileError(str(path), "no such file")
     for attempt in range(ATTEMPTS):
         try:

@@ -80,7 +80,7 @@ class Table:
         try:
             import pandas  # type: ignore[import-untyped,unused-ignore]
         except ImportError as error:
-            raise ImportError("to_dataframe needs pandas: pip install pandas") from error
+            raise ImportError("to_dataframe needs the package pandas: pip install pandas, or python3-pandas") from error
         return pandas.DataFrame({column: list(self[column]) for column in self.columns}, columns=list(self.columns))
 
     def __repr__(self) -> str:

@@ -313,3 +313,15 @@ def test_further_ranks_do_not_repeat_what_is_wrong_with_the_command_line(folder:
 def test_the_package_can_be_run_as_a_module(folder: Path) -> None:
     done = subprocess.run([sys.executable, "-m", "pbem", "info", "none.h5"], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (2, "", "pbem: none.h5: no such file\n")
+
+
+@pytest.mark.parametrize("command", ["check", "run", "info", "plot", "export", "import"])
+def test_a_name_that_no_file_can_have_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    more = ["-o", "made.toml"] if command == "import" else []
+    assert main([command, "a" * 3000 + ".csv", *more]) == 2
+    said = capsys.readouterr().err
+    assert ("Traceback" not in said and "no such file" in said) or "which is no file" in said
+    assert not list(tmp_path.iterdir())

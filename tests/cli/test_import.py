@@ -298,6 +298,18 @@ def test_a_case_that_is_there_is_kept(capsys: Capture) -> None:
     assert main(["import", "map.geojson", "-o", "nowhere/made.toml"]) == 2
 
 
+@pytest.mark.parametrize("version", ["", "AC1009", "AC1015"])
+def test_polylines_need_no_marks_of_their_class(capsys: Capture, version: str) -> None:
+    closed = (0, "LWPOLYLINE", 8, "faults", 90, 3, 70, 1, 10, 0, 20, 0, 10, 2, 20, 0, 42, 0, 10, 2, 20, 1)
+    lifted = (0, "LWPOLYLINE", 8, 0, 90, 2, 38, 1, 10, 9, 20, 0, 10, 9, 20, 4)
+    header = f"0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\n{version}\n0\nENDSEC\n" if version else ""
+    Path("map.dxf").write_text(header + write_dxf(closed, lifted))
+    assert main(["import", "map.dxf", "-o", "made.toml"]) == 0
+    curves = tomllib.loads(Path("made.toml").read_text())["curves"]
+    assert [curve["points"] for curve in curves.values()] == [[[0, 0], [2, 0], [2, 1], [0, 0]], [[9, 0], [9, 4]]]
+    assert "Heights" in capsys.readouterr().out
+
+
 def test_a_missing_library_is_named(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ezdxf", None)
     Path("map.dxf").write_text(write_dxf())

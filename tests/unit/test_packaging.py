@@ -43,3 +43,33 @@ def test_the_container_takes_files_that_are_there() -> None:
 def test_scripts_of_packages_are_in_order() -> None:
     for script in PACKAGING.glob("*.sh"):
         subprocess.run(["bash", "-n", str(script)], check=True, timeout=20)
+
+
+def set_up(stubs: str) -> subprocess.CompletedProcess[str]:
+    """What setup does about packages of the system, with other commands in place of the system's."""
+    script = (ROOT / "scripts" / "setup.sh").read_text()
+    assert script.endswith("\nmain\n")
+    text = script.removesuffix("main\n").replace('$(dirname "${BASH_SOURCE[0]}")/..', str(ROOT))
+    return subprocess.run(["bash", "-c", f"{text}{stubs}\ninstall_system_packages"], capture_output=True, text=True,
+                          timeout=20)
+
+
+OFFERS = {"nothing": "apt-cache() { :; }", "all": "apt-cache() { echo Package: $3; }"}
+INSTALLED = 'dpkg-query() { case ${!#} in *meshio|*ezdxf) echo not-installed;; *) echo installed;; esac; }\n'
+STUBS = 'id() { echo 0; }\napt-get() { echo "apt-get $*"; }\nenv() { shift; "$@"; }\n' + INSTALLED
+
+
+def test_libraries_that_a_distribution_lacks_are_no_reason_to_fail() -> None:
+    done = set_up(STUBS + OFFERS["nothing"])
+    assert done.returncode == 0 and "apt-get" not in done.stdout
+    assert "python3-meshio is left out, this distribution has none; needed for pbem import of" in done.stderr
+    assert ".venv/bin/pip install ezdxf" in done.stderr and "pandas" not in done.stderr
+    done = set_up(STUBS + OFFERS["all"])
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.count("apt-get install") == 2
+    done = set_up(STUBS + OFFERS["all"] + '\napt-get() { return 100; }')
+    assert done.returncode == 0 and "apt-get could not install it" in done.stderr
+
+
+def test_what_runs_need_is_a_reason_to_fail() -> None:
+    stubs = STUBS + OFFERS["all"] + '\ndpkg-query() { return 1; }\nsudo() { :; }\napt-get() { [ $1 = update ]; }'
+    assert set_up(stubs).returncode != 0

@@ -11,7 +11,7 @@ import pytest
 import pbem
 from pbem.case.build import make_checked_model
 from pbem.case.overrides import read_options, read_overrides, read_value, write_overrides
-from pbem.description.replacement import split_key
+from pbem.description.replacement import set_keys, split_key
 from pbem.errors import CaseError
 from tests.cases.bundled import CASES
 from tests.cli.cli_sample import BLOCKS
@@ -196,3 +196,14 @@ def test_a_value_can_mend_a_file(tmp_path: Path) -> None:
         make_checked_model(path)
     model = make_checked_model(path, {"interfaces.joint.friction": 0.2})
     assert model.overrides == "interfaces.joint.friction = 0.2" and "-0.2" in model.source
+
+
+@pytest.mark.parametrize(("key", "meant"), [
+    ("stages[1].steps", "stages.0.steps "), ("curves.top.points[12]", "curves.top.points.11 "),
+])
+def test_entries_numbered_as_in_messages_are_told_how_to_write_them(key: str, meant: str) -> None:
+    tables = {"stages": [{"steps": 1}], "curves": {"top": {"points": [[0, 0], [1, 0]]}}}
+    found = set_keys(tables, {key: 2}, lambda: ["top"])
+    assert [meant in fault.expected and "count them from 1" in fault.expected for fault in found.faults] == [True]
+    # A pattern that stands for names stays one.
+    assert not set_keys({"curves": {"c1": {"elements": 2}}}, {"curves.c[1].elements": 3}, lambda: ["c1"]).faults

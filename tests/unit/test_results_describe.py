@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+import pbem
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.model.in_situ import LinearStress
 from pbem.model.model import Condition
@@ -114,3 +116,18 @@ def test_tips_are_listed_and_of_many_the_largest(tmp_path: Path) -> None:
     tips = open_results(tmp_path / "b.h5").tips
     largest = max(tips, key=lambda name: np.hypot(tips[name].KI[-1], tips[name].KII[-1]).max())
     assert find_row(text, "stress-intensity factors at the last step", largest).split()[0] == largest
+
+
+def test_works_that_are_rounding_are_not_measured_by_each_other(tmp_path: Path) -> None:
+    sides = {"bottom": [[0, 0], [1, 0]], "right": [[1, 0], [1, 1]], "top": [[1, 1], [0, 1]], "left": [[0, 1], [0, 0]]}
+    case: dict[str, Any] = {
+        "materials": {"rock": {"young": 1e3, "poisson": 0.2}},
+        "curves": {name: {"points": points, "elements": 2} for name, points in sides.items()},
+        "regions": {"body": {"material": "rock", "boundary": list(sides)}},
+        "boundary": {"bottom": {"ux": 0.3, "uy": 0.2}}, "analysis": {"steps": 1},
+    }
+    moved = describe_results(pbem.run(case, tmp_path / "moved.h5"))
+    assert "all of them rounding" in moved and "of the largest" not in moved.split("external work")[1].splitlines()[0]
+    case["boundary"] = {**case["boundary"], "top": {"ty": 1.0}}
+    pulled = describe_results(pbem.run(case, tmp_path / "pulled.h5"))
+    assert "of the largest" in pulled.split("external work")[1].splitlines()[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -188,3 +189,20 @@ def test_files_without_configuration_are_refused(griffith: Results, tmp_path: Pa
         del file.attrs["configuration"]
     with pytest.raises(pbem.ResultFileError, match="older version"):
         open_results(old).evaluate([[0, 2.0]])
+
+
+def test_stress_at_a_tip_is_unknown_in_the_file_as_after_the_run(tmp_path: Path) -> None:
+    tip, beside = [1.0, 0.2], [1.0, 0.3]
+    case: dict[str, Any] = {
+        "materials": {"rock": {"young": 1e3, "poisson": 0.2}},
+        "curves": {"crack": {"points": [[-1, 0], tip], "elements": 4}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}},
+        "interfaces": {"crack": {"friction": 0.3}}, "remote": {"syy": 1.0}, "analysis": {"steps": 1},
+        "output": {"points": [tip, beside, [0.0, 0.3]]},
+    }
+    results = pbem.run(case, tmp_path / "tip.h5")
+    assert results.interior is not None
+    stored, after = results.interior, results.evaluate([tip, beside, [0.0, 0.3]])
+    assert np.isnan(stored.stress[-1, 0]).all() and np.isfinite(stored.stress[-1, 1]).all()
+    np.testing.assert_array_equal(np.isnan(stored.stress[-1]), np.isnan(after.stress[-1]))
+    np.testing.assert_allclose(stored.displacement[-1], after.displacement[-1], rtol=2e-3)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from mpi4py import MPI
 
-from pbem.arrays import Complex
+from pbem.arrays import Bool, Complex
 from pbem.bem.hoop import evaluate_hoop_stress, sample_points
 from pbem.bem.interior import Values, evaluate_limits
 from pbem.bem.location import Location, locate_points
@@ -22,6 +22,9 @@ from pbem.solve.problem.step import Interior, Step
 from pbem.solve.system.dense import place_directly
 
 PlaceInterior = Callable[[Model, Mesh, Complex, Location], InteriorRows]
+
+# A point lies on a tip within this part of its element.
+NEAR_TIP = 1e-6
 
 
 class InteriorField:
@@ -41,6 +44,7 @@ class InteriorField:
         parts = [self._location.region, self._location.element, self._location.s]
         region, element, s = (gather_parts(comm, np.asarray(part, dtype=float)) for part in parts)
         self.location = Location(region.astype(np.int64), element.astype(np.int64), s)
+        self._at_tip = _find_tips(model, mesh, points, self.location)
 
     def prepare(self, system: System) -> None:
         """Evaluate in the way of a system of equations; else by every element of a point's region."""
@@ -98,4 +102,21 @@ class InteriorField:
         flat = np.column_stack([part.displacement.real, part.displacement.imag, part.stress])
         whole = gather_parts(self._comm, flat.ravel()).reshape(-1, 5)
         whole[self.location.region < 0] = np.nan  # both parts of a complex number, which sums may lose
+        whole[self._at_tip, 2:] = np.nan  # infinite, whatever the elements beside the tip make of it
         return Interior(whole[:, :2].copy().view(np.complex128)[:, 0], whole[:, 2:])
+
+
+def _find_tips(model: Model, mesh: Mesh, points: Complex, location: Location) -> Bool:
+    """Which points (q,) lie on a tip of a crack."""
+    tips = np.array([
+        end for name, at in model.crack_tips.items()
+        for end, is_tip in zip((model.curves[name].legs[0].start, model.curves[name].legs[-1].end), at, strict=True)
+        if is_tip
+    ], dtype=complex)
+    found = np.zeros(len(points), dtype=bool)
+    on = np.flatnonzero((location.element >= 0) & (np.abs(location.s) == 1))
+    if len(on) and len(tips):
+        element = location.element[on]
+        length = np.abs(mesh.end[element] - mesh.start[element])
+        found[on] = np.abs(points[on, None] - tips).min(axis=1) <= NEAR_TIP * length
+    return found

@@ -1,0 +1,125 @@
+"""What users' scripts rely on: each command and call of the doors by its documented words, on one small case."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import pbem
+from pbem.cli import main
+from pbem.pages import TOPICS
+from tests.cli.cli_sample import BLOCKS
+
+Capture = pytest.CaptureFixture[str]
+SET = "interfaces.joint.friction"
+TOPICS_OF_ALL = ("keys", "results", "signs", "theory", "convergence", "large-models", "clusters")
+TRACES = {
+    "map.csv": "0,0,2,1\n0,1,2,0\n", "points.csv": "id,x,y\n1,0,0\n1,2,1\n2,0,1\n2,2,0\n",
+    "map.geojson": json.dumps({"type": "LineString", "coordinates": [[0, 0], [2, 1]]}),
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a case, and its results with another friction."""
+    folder = tmp_path_factory.mktemp("contract")
+    (folder / "blocks.toml").write_text(BLOCKS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["run", "blocks.toml", "--quiet", "--set", f"{SET}=0.35", "--profile", "pieces.json"]) == 0
+    return folder
+
+
+@pytest.fixture
+def folder(finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory with these files."""
+    for path in finished.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_run_keeps_what_was_set_and_is_not_replaced_unasked(folder: Path, capsys: Capture) -> None:
+    assert pbem.open_results("blocks.h5").overrides == f"{SET} = 0.35"
+    profile = json.loads((folder / "pieces.json").read_text())
+    assert sum(profile["pieces"].values()) == pytest.approx(profile["seconds"])
+    assert main(["run", "blocks.toml", "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert "--resume" in said and "--force" in said
+    assert main(["run", "blocks.toml", "--quiet", "--resume"]) == 0
+    assert pbem.open_results("blocks.h5").overrides == f"{SET} = 0.35"
+
+
+def test_commands_write_what_they_are_asked_for(folder: Path, capsys: Capture) -> None:
+    assert main(["export", "blocks.h5"]) == 0 and (folder / "blocks.vtkhdf").exists()
+    for what in ("contact.joint", "reactions", "steps"):
+        assert main(["export", "blocks.h5", "-o", "table.csv", "--what", what]) == 0
+        rows = list(csv.reader((folder / "table.csv").read_text().splitlines()))
+        assert len(rows) > 1 and "step" in rows[0]
+    assert main(["plot", "blocks.h5", "--field", "mises", "--box", "0", "0", "2", "2", "--shape", "8", "8", "-o",
+                 "map.png"]) == 0 and (folder / "map.png").exists()
+    capsys.readouterr()
+    for command in (["info", "blocks.h5", "--json"], ["check", "blocks.toml", "--json", "--set", f"{SET}=0.2"]):
+        assert main(command) == 0
+        assert isinstance(json.loads(capsys.readouterr().out), dict)
+    assert set(TOPICS_OF_ALL) <= set(TOPICS)
+    for topic in TOPICS_OF_ALL:
+        assert main(["help", topic]) == 0 and len(capsys.readouterr().out) > 500
+
+
+def test_a_sweep_has_a_row_for_each_combination(folder: Path) -> None:
+    command = ["sweep", "blocks.toml", "--quiet", "--set", f"{SET}=0.1:0.3:2", "--set", "analysis.order=1,2", "-o",
+               "table.csv", "--quantity", "reactions.top.x", "--keep", "files"]
+    assert main(command) == 0
+    rows = list(csv.DictReader((folder / "table.csv").read_text().splitlines()))
+    assert [(row[SET], row["analysis.order"]) for row in rows] == [
+        (friction, order) for friction in ("0.1", "0.3") for order in ("1", "2")]
+    assert {row["status"] for row in rows} == {"finished"} and len(list((folder / "files").glob("*.h5"))) == 4
+    assert all(float(row["seconds"]) > 0 and int(row["iterations"]) > 0 and row["reactions.top.x"] for row in rows)
+
+
+@pytest.mark.parametrize("name", TRACES)
+def test_maps_become_cases_that_check_accepts(folder: Path, capsys: Capture, name: str) -> None:
+    (folder / name).write_text(TRACES[name])
+    options = {"size": 0.4, "snap": 0.01, "friction": 0.5, "young": 2e3, "poisson": 0.3, "sxx": -1, "syy": -2,
+               "sxy": 0.1, "simplify": 0.01}
+    assert main(["import", name, "-o", "made.toml", *(f"--{key}={value}" for key, value in options.items())]) == 0
+    assert main(["check", "made.toml"]) == 0
+    case = pbem.Case.read("made.toml")
+    assert case.remote is not None and case.remote.sxy == 0.1
+    assert {each.friction for each in case.interfaces.values()} == {0.5}
+
+
+def test_calls(folder: Path) -> None:
+    case = pbem.Case.read("blocks.toml").replace({SET: 0.35, "curves.*.elements": 3})
+    case.write("other.toml")
+    assert pbem.Case.read("other.toml") == case and len(repr(case).splitlines()) > 2
+    results = pbem.run(case, "other.h5")
+    assert len(repr(results).splitlines()) > 2
+    field = results.evaluate([[0.5, 0.5], [0.2, 0.7]], steps=[0, -1])
+    assert field.displacement.shape == (2, 2, 2) and field.stress.shape == (2, 2, 3) and len(field.region) == 2
+    joint = results.contact["joint"]
+    assert all(joint.integrate(name).shape == (len(results.steps),)
+               for name in ("slip", "opening", "traction_n", "traction_s"))
+    figure = results.plot(curve="joint", field="slip", step=-1, x="arc_length", xlim=(0, 1), ylim=(-1, 1))
+    assert isinstance(figure, Figure)
+    axes = Figure().add_subplot()
+    results.plot(curve="joint", field="slip", x="x", ax=axes)
+    assert axes.has_data()
+    with pytest.raises(pbem.CaseError, match="did you mean"):
+        case.replace({"interfaces.joint.frictoin": 0.3})
+
+
+def test_tables_of_pandas(folder: Path) -> None:
+    pytest.importorskip("pandas")
+    results = pbem.open_results("blocks.h5")
+    joint = results.to_dataframe("joint")
+    contact = results.contact["joint"]
+    assert len(joint) == contact.slip.size
+    np.testing.assert_array_equal(np.sort(joint["slip"].to_numpy()), np.sort(contact.slip.ravel()))
+    assert len(results.to_dataframe("steps")) == len(results.steps) < len(results.to_dataframe("reactions"))

@@ -210,7 +210,7 @@ def settle(now: Measured, before: Measured | None) -> Measured:
     values = {}
     for name, text in now.values.items():
         old = before.values.get(name, text)
-        values[name] = old if find_difference(float(text), float(old)) < 3 * 10.0 ** (1 - DIGITS) else text
+        values[name] = old if find_difference(float(text), float(old)) < 10.0 ** (1 - DIGITS) else text
     keeps = 1 / 3 < float(now.seconds) / float(before.seconds) < 3  # one step of 1, 2, 5, 10
     return Measured(values, now.unknowns, before.seconds if keeps else now.seconds)
 

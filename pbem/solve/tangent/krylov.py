@@ -125,10 +125,7 @@ class KrylovTangent(TangentOperator):
     def solve(
         self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None, forcing: float = 0.0
     ) -> Solved:
-        """See TangentOperator.
-
-        Raises ConvergenceError: "linear solver".
-        """
+        """See TangentOperator. Raises ConvergenceError: "linear solver"."""
         self.preconditioner.update(constraints)
         self.constraints, self._space.residual = constraints, np.zeros(0)
         self._space.forget()

@@ -49,9 +49,8 @@ from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
-from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
-from pbem.solve.steps.march import go_on, march, note_place, resume_modes, start_from
+from pbem.solve.steps.march import free_at_last, go_on, march, note_place, resume_modes, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
@@ -272,8 +271,7 @@ def _fill(
     tangent = kept.take_tangent(problem) if kept else None
     try:
         steps = clock.each("steps", march(problem, watch, start, tangent, go_on(unfinished)))
-        if kept is None:
-            steps = _free_at_last(problem, steps)
+        steps = steps if kept else free_at_last(problem, steps)
         store_steps(steps, model.output_every, interior, writer, watch, estimator, comm)
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
@@ -282,14 +280,6 @@ def _fill(
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
     return _conclude(writer, model, mesh, estimator, watch, one)
-
-
-def _free_at_last(problem: Problem, steps: Iterator[Step]) -> Iterator[Step]:
-    """The steps; with the last one what products need is freed, before the second solution takes as much."""
-    for step in steps:
-        if step.stage == len(problem.model.stages) - 1 and step.factor >= 1.0:
-            problem.system.free_products()
-        yield step
 
 
 def _conclude(

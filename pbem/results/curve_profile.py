@@ -143,9 +143,9 @@ def find_crack_ends(results: Results, contact: Contact) -> list[tuple[bool, Real
     elements, names = results.elements, results.nodes.curve_names
     if isinstance(contact, JoinedContact):
         # Those of the trace: the start of its first piece, and the end of the last one.
-        at_start = [end for end in find_crack_ends(results, contact.pieces[0]) if end[0]]
-        at_end = [end for end in find_crack_ends(results, contact.pieces[-1]) if not end[0]]
-        return at_start + [(False, point, arc + contact.starts[-1], rooted) for _, point, arc, rooted in at_end]
+        begin, last = (find_crack_ends(results, contact.pieces[at]) for at in (0, -1))
+        return [each for each in begin if each[0]] + [
+            (False, point, arc + contact.starts[-1], rooted) for is_first, point, arc, rooted in last if not is_first]
     if contact.name not in names or not len(contact.arc_length):
         return []
     own = first_faces(elements, names.index(contact.name))

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from pbem.case.build import parse_model
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
-from pbem.driver import _free_at_last
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import complete_states
 from pbem.solve.problem.step import SilentReporter
-from pbem.solve.steps.march import march
+from pbem.solve.steps.march import free_at_last, march
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.tangent import krylov
 from pbem.solve.tangent.krylov import KrylovTangent
@@ -158,7 +157,7 @@ def test_loose_solutions_leave_little_of_the_forces(many_groups: None, monkeypat
 def test_products_are_freed_with_the_last_step(many_groups: None) -> None:
     problem = assemble()
     assert problem.system.stored > 0
-    steps = [step.number for step in _free_at_last(problem, march(problem, SilentReporter()))]
+    steps = [step.number for step in free_at_last(problem, march(problem, SilentReporter()))]
     assert steps == [1] and problem.system.stored == 0
 
 

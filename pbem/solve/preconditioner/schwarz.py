@@ -199,10 +199,9 @@ class SchwarzPreconditioner:
             matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
             # Of a part of the model the inverse is not that of the whole, and needs no more digits than these: all
             # groups together are much of what is stored.
-            whole_model = len(around) == 2 * self._mesh.nodes
-            with np.errstate(over="ignore"):
-                stored: Real | Single = np.ascontiguousarray(matrix)
-                if not whole_model:
+            stored: Real | Single = np.ascontiguousarray(matrix)
+            if len(around) < 2 * self._mesh.nodes:
+                with np.errstate(over="ignore"):
                     stored = stored.astype(np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None
         self.singular += inverse.matrix is None

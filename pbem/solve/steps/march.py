@@ -127,6 +127,14 @@ def march(
     arranged.leave()
 
 
+def free_at_last(problem: Problem, steps: Iterator[Step]) -> Iterator[Step]:
+    """The steps of a march; with the last one what products need is freed, as a second solution takes as much."""
+    for step in steps:
+        if step.stage == len(problem.model.stages) - 1 and step.factor >= 1.0:
+            problem.system.free_products()
+        yield step
+
+
 def _advance(
     problem: Problem, tangent: TangentOperator, memory: Memory, stage: int, reached: float, planned: float,
     ceiling: Ceiling, reporter: Reporter, guess: Guess | None,

@@ -129,10 +129,7 @@ class KrylovTangent(TangentOperator):
     def solve(
         self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None, forcing: float = 0.0
     ) -> Solved:
-        """See TangentOperator.
-
-        Raises ConvergenceError: "linear solver".
-        """
+        """See TangentOperator. Raises ConvergenceError: "linear solver"."""
         self.recycled.move_on(self._space, self.preconditioner, constraints, self.problem.system.nodes)
         self.constraints, self._space.residual = constraints, np.zeros(0)
         begin = self._carry_over(law)

@@ -20,7 +20,7 @@ EXPECTED = {
     "sxy 3.5 m ahead, MPa": (-M / (2 * math.pi * 3.5**2), 1e-3),
     "ux from 7 m to 3.5 m, mm": (1e3 * 2 * K * F * math.log(2) / (4 * math.pi * G * (1 + K)), 1e-3),
 }
-PICTURES = [("larger compression, ahead of the force and beside", ["plot", "--field", "s2", "--box", "-4", "-4", "4", "4"])]
+PICTURES = [("larger compression: ahead of the force", ["plot", "--field", "s2", "--box", "-4", "-4", "4", "4"])]
 
 
 def compute(results: Results) -> dict[str, float]:

@@ -47,13 +47,13 @@ def to_pairs(points: Any) -> list[list[float]]:
     return [[float(point.real), float(point.imag)] for point in np.asarray(points)]
 
 
-@pytest.mark.parametrize(("center", "turn"), PLACES)
-@pytest.mark.parametrize(("scheme", "operator"), [
-    ("SST", "dense"), ("DBEM", "dense"), ("HST", "dense"), ("THST", "dense"), ("SST", "hierarchical"),
+@pytest.mark.parametrize(("place", "scheme", "operator"), [
+    (0, "SST", "dense"), (1, "DBEM", "dense"), (0, "HST", "hierarchical"), (1, "THST", "hierarchical"),
 ])
-def test_kelvin_in_a_plane(center: complex, turn: complex, scheme: str, operator: str, tmp_path: Path) -> None:
+def test_kelvin_in_a_plane(place: int, scheme: str, operator: str, tmp_path: Path) -> None:
     """A force and a moment within a circle that two regions of one material share: nothing is seen of the circle."""
-    place, other = center + (0.1 - 0.4j) * turn, center + (1.7 + 0.3j) * turn
+    center, turn = PLACES[place]
+    at, other = center + (0.1 - 0.4j) * turn, center + (1.7 + 0.3j) * turn
     force = (2 + 1j) * turn
     size = abs(turn)
     points = center + np.array([0.3 + 0.2j, -0.5 - 0.1j, 0.11 - 0.4j, 2.5 + 0.5j, 3j]) * turn
@@ -63,7 +63,7 @@ def test_kelvin_in_a_plane(center: complex, turn: complex, scheme: str, operator
         "regions": {"plane": {"material": "m", "infinite": True, "boundary": ["circle"]},
                     "core": {"material": "m", "boundary": ["circle"]}},
         "point_loads": {
-            "inside": {"at": to_pairs([place])[0], "fx": force.real, "fy": force.imag, "moment": 0.3 * size**2},
+            "inside": {"at": to_pairs([at])[0], "fx": force.real, "fy": force.imag, "moment": 0.3 * size**2},
             "outside": {"at": to_pairs([other])[0], "fx": -force.real, "fy": -force.imag},
         },
         "interfaces": {"circle": {"cohesion": 1e3, "tensile_strength": 1e3, "friction": 0.3, "law": "coulomb"}},
@@ -71,7 +71,7 @@ def test_kelvin_in_a_plane(center: complex, turn: complex, scheme: str, operator
         "solver": {"operator": operator},
     }  # fmt: skip
     results = pbem.run(case, tmp_path / "kelvin.h5")
-    exact = kelvin(force, 0.3 * size**2, points - place) + kelvin(-force, 0.0, points - other)
+    exact = kelvin(force, 0.3 * size**2, points - at) + kelvin(-force, 0.0, points - other)
     accuracy = 1e-3 * np.abs(exact).max(axis=1, keepdims=True)
     assert (np.abs(results.interior.stress[-1] - exact) < accuracy).all()
     np.testing.assert_allclose(results.evaluate(to_pairs(points)).stress[-1], exact, atol=1e-3 * np.abs(exact[3]).max())
@@ -103,10 +103,10 @@ def make_half_disc(center: complex, turn: complex, load: complex, along: complex
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("center", "turn"), PLACES)
-@pytest.mark.parametrize("along", [0j, 0.3 + 0j])
-def test_flamant_on_a_half_disc(center: complex, turn: complex, along: complex, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("place", "along"), [(0, 0j), (1, 0.3 + 0j)])
+def test_flamant_on_a_half_disc(place: int, along: complex, tmp_path: Path) -> None:
     """A force at a smooth point of a boundary: exact stress, however near to the load."""
+    center, turn = PLACES[place]
     load = (0.4 - 1j) * turn
     away = np.array([1e-6 - 2e-6j, 0.02 - 0.03j, 0.1 - 0.5j, -0.3 - 0.1j]) * turn
     at = center + along * turn

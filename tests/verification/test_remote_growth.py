@@ -58,11 +58,12 @@ def expand_around_hole(at_rest: Any, radius: float, center: complex) -> Any:
     return stress
 
 
-@pytest.mark.parametrize(("origin", "radius"), [(0j, 1.0), (1e6 - 4e5j, 30.0)])
-@pytest.mark.parametrize("given", ["initial_stress", "remote"])
-@pytest.mark.parametrize(("scheme", "operator"), [("SST", "dense"), ("THST", "dense"), ("HST", "hierarchical")])
+@pytest.mark.parametrize(("given", "origin", "radius", "scheme", "operator"), [
+    ("initial_stress", 0j, 1.0, "SST", "dense"), ("initial_stress", 1e6 - 4e5j, 30.0, "THST", "hierarchical"),
+    ("remote", 0j, 1.0, "HST", "hierarchical"), ("remote", 1e6 - 4e5j, 30.0, "DBEM", "dense"),
+])
 def test_tunnel_in_ground_at_rest(
-    origin: complex, radius: float, given: str, scheme: str, operator: str, tmp_path: Path
+    given: str, origin: complex, radius: float, scheme: str, operator: str, tmp_path: Path
 ) -> None:
     """No free surface: weight and K0 stress; the hole leaves the ground with a net force upward, which is told."""
     center = origin + (2 - 5j) * radius
@@ -116,7 +117,7 @@ def test_ground_that_is_not_dug(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("gravity", "remote", "words"), [
-    (-10.0, {"syy": -1.0}, "against a weight of (0, -20)"),
+    (-10.0, {"syy": -1.0}, "which no stress carries"),
     (0.0, {"syy": {"expression": "20*y"}}, "grows by (0, 20) per length"),
     (-10.0, {"syy": {"expression": "20*y*y"}}, "not linear"),
     (-10.0, {"syy": {"expression": "20*z"}}, "z"),

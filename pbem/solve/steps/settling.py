@@ -18,6 +18,9 @@ from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.model.support_motions import see_motions
 from pbem.solve.problem.problem import Problem
 
+# A body is moved aside by so many times its size's part rather than turned.
+TURNS = 1e-4
+
 
 @dataclass(frozen=True)
 class Settled:
@@ -49,9 +52,9 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     parts = np.linalg.lstsq(seen, wanted, rcond=None)[0] if len(seen) else np.zeros(len(motions))
     free = _find_null_space(seen, len(motions))
     if free.shape[1]:
-        mean = functional @ moves
-        left = -functional @ _split(load.of_points) - mean @ parts
-        parts = parts + free @ np.linalg.lstsq(mean @ free, left, rcond=None)[0]
+        resting = np.linalg.lstsq(functional @ moves, -functional @ _split(load.of_points), rcond=None)[0]
+        rows = _weigh_turns(problem, motions)
+        parts = parts + free @ np.linalg.lstsq(rows @ free, rows @ (resting - parts), rcond=None)[0]
     moved = sum((part * _move(problem, motion) for part, motion in zip(parts, motions, strict=True)),
                 np.zeros(len(displacement), dtype=complex))
     reactions = none
@@ -100,6 +103,19 @@ def _find_null_space(rows: Real, count: int) -> Real:
     if not len(rows):
         return np.eye(count)
     return np.linalg.svd(rows)[2][len(rows) :].T
+
+
+def _weigh_turns(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> Real:
+    """What motions do to every region: rather than to turn it is moved aside where supports ask for some of either."""
+    mesh, rows = problem.mesh, []
+    for number, name in enumerate(mesh.region_names):
+        own = mesh.node_region == number
+        if any(name in motion.velocities for motion in motions) and own.any():
+            middle = complex(mesh.position[own].mean())
+            moved = [motion.velocities.get(name, (0j, 0.0)) for motion in motions]
+            shift = np.array([a + 1j * spin * middle for a, spin in moved])
+            rows += [shift.real, shift.imag, np.array([spin for _, spin in moved]) * problem.model.size / TURNS]
+    return np.array(rows)
 
 
 def _move(problem: Problem, motion: RigidBodyMode) -> Complex:

@@ -1,0 +1,101 @@
+"""Points of boundaries choose the rigid motion of bodies that nothing holds, and carry nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+
+YOUNG, POISSON = 3e3, 0.2
+PULL = 100.0
+STRAIN = PULL * (1 - POISSON**2) / YOUNG, -PULL * POISSON * (1 + POISSON) / YOUNG
+
+
+def make_plate(shift: complex = 0j, turn: complex = 1 + 0j, **more: Any) -> dict[str, Any]:
+    """A plate of 2 by 1, pulled at both ends."""
+    corners = shift + np.array([0, 2, 2 + 1j, 1j, 0]) * turn
+    points = [[float(each.real), float(each.imag)] for each in corners]
+    names = ("bottom", "right", "top", "left")
+    return {
+        "materials": {"m": {"young": YOUNG, "poisson": POISSON}},
+        "curves": {name: {"points": points[k : k + 2], "elements": 3} for k, name in enumerate(names)},
+        "regions": {"plate": {"material": "m", "boundary": list(names)}},
+        "boundary": {"left": {"tn": PULL}, "right": {"tn": PULL}}, "analysis": {"steps": 2}, **more,
+    }  # fmt: skip
+
+
+def at(point: complex) -> list[float]:
+    return [float(point.real), float(point.imag)]
+
+
+@pytest.mark.parametrize(("shift", "turn"), [(0j, 1 + 0j), (1e6 - 3e5j, 20 * np.exp(0.6j))])
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_three_conditions(shift: complex, turn: complex, operator: str, tmp_path: Path) -> None:
+    """A corner at rest and a point of the bottom that stays on its line; in a second stage the corner is moved."""
+    case = make_plate(shift, turn, solver={"operator": operator}, output={"points": [at(shift + (2 + 1j) * turn)]})
+    # The far point is held where it comes to if nothing turns.
+    slope = (2 * STRAIN[0] * turn).imag
+    case["point_supports"] = {"corner": {"at": at(shift), "ux": 0.0, "uy": 0.0},
+                              "far": {"at": at(shift + 2 * turn), "uy": float(slope)}}
+    case["stages"] = [{"steps": 2}, {"steps": 1, "point_supports": {"corner": {"ux": 0.5}}}]
+    results = pbem.run(case, tmp_path / "plate.h5")
+    exact = (2 * STRAIN[0] + 1j * STRAIN[1]) * turn
+    np.testing.assert_allclose(results.interior.displacement[1][0], at(exact), atol=1e-7 * abs(exact))
+    np.testing.assert_allclose(results.interior.displacement[0][0], at(0.5 * exact), atol=1e-7 * abs(exact))
+    np.testing.assert_allclose(results.evaluate([at(shift)]).displacement[2][0], [0.5, 0.0], atol=1e-7)
+    assert np.abs(results.reactions["corner"]).max() < 1e-6 * PULL * abs(turn)
+
+
+def test_fewer_conditions_than_motions_leave_the_mean_of_the_others(tmp_path: Path) -> None:
+    one = pbem.run(make_plate(point_supports={"corner": {"at": [0, 0], "ux": 0.0}}), tmp_path / "one.h5")
+    none = pbem.run(make_plate(), tmp_path / "none.h5")
+    np.testing.assert_allclose(one.displacement[-1][:, 1], none.displacement[-1][:, 1], atol=1e-9)
+    assert abs(one.evaluate([[0, 0]]).displacement[-1][0, 0]) < 1e-9
+    np.testing.assert_allclose(one.traction, none.traction, atol=1e-9 * PULL)
+
+
+def test_a_block_that_slides_on_another(tmp_path: Path) -> None:
+    """Frictionless faces hold a block along the normal; its support moves it along, which the slip shows."""
+    names = ("bottom", "right", "seam", "left")
+    corners = [[0, 0], [2, 0], [2, 1], [0, 1], [0, 0]]
+    upper = {"up_right": [[2, 1], [2, 2]], "top": [[2, 2], [0, 2]], "up_left": [[0, 2], [0, 1]]}
+    curves = {name: {"points": corners[k : k + 2], "elements": 4} for k, name in enumerate(names)}
+    case = {
+        "materials": {"m": {"young": YOUNG, "poisson": 0.0}},
+        "curves": curves | {name: {"points": points, "elements": 4} for name, points in upper.items()},
+        "regions": {"lower": {"material": "m", "boundary": list(names)},
+                    "upper": {"material": "m", "boundary": [*upper, "seam"]}},
+        "interfaces": {"seam": {"law": "frictionless"}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"pressure": 3.0}},
+        "point_supports": {"peg": {"at": [0, 2], "ux": 0.25}}, "analysis": {"steps": 2},
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "slide.h5")
+    slip = results.contact["seam"].slip
+    np.testing.assert_allclose(np.abs(slip), [[0.125] * slip.shape[1], [0.25] * slip.shape[1]], rtol=1e-6)
+    np.testing.assert_allclose(results.contact["seam"].traction_n[-1], -3.0, rtol=1e-6)
+    case["point_supports"]["peg"]["uy"] = 0.0
+    with pytest.raises(pbem.CaseError, match=r"point_supports.peg.uy.*no free rigid motion is left"):
+        pbem.run(case, tmp_path / "refused.h5")
+
+
+@pytest.mark.parametrize(("support", "words"), [
+    ({"at": [0.3, 0.3], "ux": 0.0}, "from the nearest curve"), ({"at": [0, 0]}, "without ux and uy"),
+    ({"at": [0, 0], "uz": 0.0}, "uz"),
+])
+def test_supports_that_say_nothing(support: dict[str, Any], words: str) -> None:
+    with pytest.raises(pbem.CaseError) as caught:
+        pbem.run(make_plate(point_supports={"p": support}), "none.h5")
+    assert words in str(caught.value)
+    with pytest.raises(pbem.CaseError, match="which is that of a curve"):
+        pbem.run(make_plate(point_supports={"top": {"at": [0, 0], "ux": 0.0}}), "none.h5")
+
+
+def test_loads_that_do_not_balance_are_refused_all_the_same() -> None:
+    case = make_plate(point_supports={"corner": {"at": [0, 0], "ux": 0.0, "uy": 0.0}})
+    case["boundary"]["right"] = {"tn": 2 * PULL}
+    with pytest.raises(pbem.CaseError, match="drive it"):
+        pbem.run(case, "none.h5")

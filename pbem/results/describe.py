@@ -7,6 +7,7 @@ import numpy as np
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.results.balance import describe_balance
 from pbem.results.contents import Tips
+from pbem.results.facts import count_outer_curves
 from pbem.results.linearity import describe_linearity
 from pbem.results.reader import Results
 from pbem.results.text_tables import count as _count
@@ -37,7 +38,7 @@ def describe_results(results: Results, traces: int = 10) -> str:
                        f"{_count(results.ranks, 'rank')}"),
         ("units", units),
         ("size", f"{len(results.nodes.position)} nodes, {elements} elements, "
-                 f"{_count(len(results.contact), 'interface')}, {_count(len(results.reactions), 'outer curve')}"),
+                 f"{_count(len(results.contact), 'interface')}, {_count(count_outer_curves(results), 'outer curve')}"),
         ("steps stored", _describe_steps(results)),
         ("iterations", _describe_iterations(results)),
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import asdict
 from typing import Any
@@ -15,6 +16,11 @@ from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.results.traces import list_traces
 
 
+def count_outer_curves(results: Results) -> int:
+    """The curves that have a reaction; point supports have one besides."""
+    return len(results.reactions) - len(json.loads(results.configuration).get("point_supports", {}))
+
+
 def collect_facts(results: Results, traces: int | None = None) -> dict[str, Any]:
     """All of it; quantities are those of the last stored step. traces: list so many of them, all by default."""
     steps, table = results.steps, results.convergence
@@ -24,7 +30,7 @@ def collect_facts(results: Results, traces: int | None = None) -> dict[str, Any]
         "units": {"length": results.units.length, "stress": results.units.stress},
         "size": {
             "nodes": len(results.nodes.position), "elements": len(results.elements.vertices),
-            "order": results.nodes.order, "interfaces": len(results.contact), "outer_curves": len(results.reactions),
+            "order": results.nodes.order, "interfaces": len(results.contact), "outer_curves": count_outer_curves(results),
             "regions": len(results.nodes.region_names),
             "interior_points": 0 if results.interior is None else len(results.interior.position),
         },

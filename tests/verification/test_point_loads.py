@@ -236,6 +236,31 @@ def test_loads_with_weights_springs_and_cracks_keep_energy(tmp_path: Path) -> No
     assert stored["b"]["half_angle"] == pytest.approx(0.5 * np.pi)
 
 
+def test_energy_is_the_work_on_what_the_other_loads_do(tmp_path: Path) -> None:
+    """The displacement around each load, in the mean of a small circle, less that of Kelvin's field of it alone."""
+    loads = {"a": (1.2 + 0.7j, 1.0 - 2.0j), "b": (2.1 + 1.3j, 0.5 + 3.0j)}
+    results = pbem.run({
+        "materials": {"m": MATERIAL},
+        "curves": {"bottom": {"points": [[0, 0], [3, 0]], "elements": 8},
+                   "rest": {"points": [[3, 0], [3, 2], [0, 2], [0, 0]], "elements": 24}},
+        "regions": {"block": {"material": "m", "boundary": ["bottom", "rest"]}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}}, "analysis": {"steps": 1},
+        "point_loads": {name: {"at": to_pairs([place])[0], "fx": force.real, "fy": force.imag}
+                        for name, (place, force) in loads.items()},
+    }, tmp_path / "two.h5")  # fmt: skip
+    shear, kappa, radius = 3e3 / 2.4, 2.2, 1e-3
+    ends = results.elements.vertices.reshape(-1, 2) @ [1, 1j]
+    unit = 8 * 2 * np.abs(ends - ends.mean()).max()
+    work = 0.0
+    for place, force in loads.values():
+        around = place + radius * np.exp(2j * np.pi * np.arange(8) / 8)
+        mean = (results.evaluate(to_pairs(around)).displacement[-1] @ [1, 1j]).mean()
+        alone = -kappa * force / (2 * np.pi * (1 + kappa)) * np.log(radius / unit) / shear
+        work += 0.5 * (np.conj(force) * (mean - alone)).real
+    assert results.energy.external[-1] == pytest.approx(work, rel=5e-4)
+    assert results.energy.elastic[-1] == pytest.approx(work, rel=5e-4)
+
+
 @pytest.mark.parametrize(("load", "words"), [
     ({"at": [5, 5], "fx": 1.0}, "outside of all regions"),
     ({"at": [0.5, 0], "fx": 1.0}, "prescribed"),

@@ -30,7 +30,8 @@ def collect_facts(results: Results, traces: int | None = None) -> dict[str, Any]
         "units": {"length": results.units.length, "stress": results.units.stress},
         "size": {
             "nodes": len(results.nodes.position), "elements": len(results.elements.vertices),
-            "order": results.nodes.order, "interfaces": len(results.contact), "outer_curves": count_outer_curves(results),
+            "order": results.nodes.order, "interfaces": len(results.contact),
+            "outer_curves": count_outer_curves(results),
             "regions": len(results.nodes.region_names),
             "interior_points": 0 if results.interior is None else len(results.interior.position),
         },

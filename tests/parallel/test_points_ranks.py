@@ -1,4 +1,4 @@
-"""Point loads, point supports, springs and growing stress give the same results on one rank and on three."""
+"""Point loads, point supports and growing stress give the same results on one rank and on three."""
 
 from __future__ import annotations
 
@@ -25,14 +25,6 @@ CASES: dict[str, dict[str, Any]] = {
         "regions": {"ground": {"material": "ground", "infinite": True, "boundary": ["wall"]}},
         "gravity": {"gy": -1.0}, "remote": {"syy": {"expression": "2*y"}, "sxx": {"expression": "y"}},
         "point_loads": {"bolt": {"at": [3, -9], "fx": 1.0}},
-    },
-    "springs": {
-        "materials": {"m": {"young": 3e3, "poisson": 0.2}},
-        "curves": {"bottom": {"points": [[0, 0], [2, 0]], "elements": 6},
-                   "rest": {"points": [[2, 0], [2, 1], [0, 1], [0, 0]], "elements": 12}},
-        "regions": {"block": {"material": "m", "boundary": ["bottom", "rest"]}},
-        "boundary": {"bottom": {"spring": {"kn": {"expression": "90 + 5*x"}, "ks": {"table": [[0, 5], [2, 9]]}},
-                                "ty": 0.3, "end_n": {"expression": "0.01*s"}}, "rest": {"tx": 0.1}},
     },
 }  # fmt: skip
 RUN_ALL = """

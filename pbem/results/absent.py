@@ -1,4 +1,6 @@
-"""What is stored of regions that a stage has taken away: not a number, and nothing that their state of zero says."""
+"""What is stored of regions that a stage has taken away: that they do not act, and not a number where values are asked
+for.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,8 @@ class Absence:
         return None if there is None else there.regions[list_faces(self._mesh).region]
 
     def blank(self, step: Step) -> Step:
-        """The step with what is gone as not a number; reactions are summed up before."""
+        """The step without displacement and traction of what is gone, and the rest as not a number; reactions are
+        summed up before."""
         there, faces = self.find(step.stage), self.list_faces(step.stage)
         if there is None or faces is None:
             return step
@@ -59,8 +62,8 @@ class Absence:
             interior = Interior(np.where(gone, NOTHING, interior.displacement),
                                 np.where(gone[:, None], np.nan, interior.stress))
         return replace(
-            step, displacement=np.where(faces, NOTHING, step.displacement),
-            traction=np.where(faces, NOTHING, step.traction), contact=contact, interior=interior,
+            step, displacement=np.where(faces, 0.0, step.displacement),
+            traction=np.where(faces, 0.0, step.traction), contact=contact, interior=interior,
         )
 
     def blank_tips(self, stage: int, names: Sequence[str], values: Mapping[str, Real]) -> dict[str, Real]:

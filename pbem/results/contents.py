@@ -153,7 +153,10 @@ class Balances:
 
 @dataclass(frozen=True)
 class Steps:
-    """Of every stored step (k,): its number (from 1), stage (index), factor in (0, 1], Newton iterations, residual."""
+    """Of every stored step (k,): its number (from 1), stage (index), factor in (0, 1], Newton iterations, residual.
+
+    stage_names: of all stages; removed: regions that are gone in each of them, if any ever is.
+    """
 
     number: Integer
     stage: Integer
@@ -161,6 +164,7 @@ class Steps:
     iterations: Integer
     residual: Real
     stage_names: tuple[str, ...]
+    removed: tuple[tuple[str, ...], ...] = ()
 
     def __len__(self) -> int:
         return len(self.factor)

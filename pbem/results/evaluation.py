@@ -180,11 +180,9 @@ class Evaluator:
         return [Values(displacement[:, k], stress[:, k]) for k in range(len(densities))]
 
     def _find_gone(self, at: int) -> Bool:
-        """Which regions are gone at a stored step: what is stored of them is not a number."""
-        moved, region = self._read(at)[0], self._run.mesh.node_region
-        gone = np.zeros(len(self._run.model.regions), dtype=bool)
-        gone[region[np.isnan(moved[: len(region)])]] = True
-        return gone
+        """Which regions are gone at a stored step."""
+        names = self._steps.removed[int(self._steps.stage[at])] if self._steps.removed else ()
+        return np.isin([region.name for region in self._run.model.regions], names)
 
     def _read(self, at: int) -> tuple[Complex, Complex, Real]:
         with open_quietly(self._path) as file:

@@ -46,6 +46,14 @@ def list_pair_datasets(model: Model) -> dict[str, str]:
     return SHOWN | {variable.name: variable.kind for variable in list_model_variables(model)}
 
 
+def name_stages(dataset: h5py.Dataset, model: Model) -> None:
+    """Let the file know the stages by name, and which regions are gone in each."""
+    dataset.attrs["names"] = _text([stage.name for stage in model.stages])
+    removed = [sorted(stage.construction.removed) for stage in model.stages]
+    if any(removed):
+        dataset.attrs["removed"] = json.dumps(removed)
+
+
 def join_pairs(interfaces: Mapping[str, Integer]) -> Integer:
     """The indices of `sort_pairs`, one interface after the other: the order of the columns under /all/contact."""
     return np.concatenate([np.zeros(0, dtype=np.int64), *interfaces.values()])
@@ -79,7 +87,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Int
     steps = file.create_group("steps")
     for name, kind in STEP_DATASETS.items():
         _create_growing(steps, name, (), kind)
-    steps["stage"].attrs["names"] = _text([stage.name for stage in model.stages])
+    name_stages(steps["stage"], model)
     fields = file.create_group("fields")
     for name in ("displacement", "traction"):
         _create_growing(fields, name, (len(faces.position), 2), "f8")

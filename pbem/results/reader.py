@@ -86,13 +86,13 @@ class Results:
 
     @cached_property
     def displacement(self) -> Real:
-        """(k, n, 2) at the nodes, in units of length."""
-        return self._load("fields/displacement")
+        """(k, n, 2) at the nodes, in units of length; NaN where a stage has taken the region away."""
+        return self._blank(self._load("fields/displacement"))
 
     @cached_property
     def traction(self) -> Real:
-        """(k, n, 2) at the nodes, in units of stress, global axes."""
-        return self._load("fields/traction")
+        """(k, n, 2) at the nodes, in units of stress, global axes; NaN where a stage has taken the region away."""
+        return self._blank(self._load("fields/traction"))
 
     @cached_property
     def hoop_stress(self) -> Real:
@@ -114,13 +114,15 @@ class Results:
     def displacement_at(self, step: int) -> Real:
         """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
         with open_quietly(self.path) as file:
-            return file["fields/displacement"][range(len(self.steps))[step]]
+            moved: Real = file["fields/displacement"][range(len(self.steps))[step]]
+        gone = self.find_gone(step)
+        return np.where(gone[self.nodes.region, None], np.nan, moved) if gone.any() else moved
 
     def find_gone(self, step: int) -> Bool:
         """Which regions (r,) a stage has taken away by a stored step."""
-        gone = np.zeros(len(self.nodes.region_names), dtype=bool)
-        gone[self.nodes.region[np.isnan(self.displacement_at(step)).any(axis=1)]] = True
-        return gone
+        steps = self.steps
+        names = steps.removed[int(steps.stage[step])] if steps.removed else ()
+        return np.isin(self.nodes.region_names, names)
 
     def evaluate(
         self, points: ArrayLike, steps: int | Sequence[int] | None = None, *, side: Side = "first"
@@ -208,6 +210,12 @@ class Results:
             stored = ", ".join(map(str, self.steps.number[:20])) + (", ..." if len(self.steps) > 20 else "")
             raise ResultFileError(str(self.path), f"holds no load step {number}; it holds: {stored or 'none'}")
         return int(found[0])
+
+    def _blank(self, values: Real) -> Real:
+        if not any(self.steps.removed):
+            return values
+        gone = np.array([self.find_gone(step) for step in range(len(self.steps))]).reshape(len(self.steps), -1)
+        return freeze(np.where(gone[:, self.nodes.region, None], np.nan, values))
 
     def _load(self, name: str) -> Real:
         with open_quietly(self.path) as file:
@@ -308,7 +316,8 @@ def _read_steps(file: h5py.File) -> Steps:
     k = count_steps(file)
     values = {name: freeze(group[name][:k].astype(float if name in ("factor", "residual") else int))
               for name in columns}
-    return Steps(**values, stage_names=read_names(group["stage"]))
+    removed = json.loads(str(group["stage"].attrs.get("removed", "[]")))
+    return Steps(**values, stage_names=read_names(group["stage"]), removed=tuple(map(tuple, removed)))
 
 
 def _read_reactions(file: h5py.File, steps: int) -> dict[str, Real]:

@@ -61,11 +61,6 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
                                     "run without resuming")
 
 
-def name_stages(file: h5py.File, model: Model) -> None:
-    """Let the file know the stages, to which some may have been added."""
-    file["steps/stage"].attrs["names"] = np.array([stage.name for stage in model.stages], dtype=h5py.string_dtype())
-
-
 def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:
     """The last step that was stored completely, without its iterations; None if there is none."""
     steps = file["steps"]

@@ -33,6 +33,7 @@ from pbem.results.layout import (
     extend,
     join_pairs,
     list_pair_datasets,
+    name_stages,
     to_columns,
     write_attributes,
     write_header,
@@ -40,7 +41,7 @@ from pbem.results.layout import (
 from pbem.results.lazy import refuse_damage
 from pbem.results.linearity import append_linearity
 from pbem.results.output import check_output_path
-from pbem.results.resume import check_same_case, name_stages, read_last_energy, read_last_step, truncate
+from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
 from pbem.results.rigid import append_rigid
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
@@ -118,7 +119,7 @@ class ResultWriter:
                 reached = None if last_step is None else read_last_energy(file)
                 truncate(file, 0 if last_step is None else last_step.number)
                 write_attributes(file, model, ranks, petsc_version, petsc_options)
-                name_stages(file, model)
+                name_stages(file["steps/stage"], model)  # some may have been added
             writer = cls.__new__(cls)
             writer._start(target, storage, model, mesh, last_step, reached)
             with refuse_damage(target):

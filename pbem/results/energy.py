@@ -47,6 +47,7 @@ from pbem.results.dissipation import (
     record_pairs_at_rest,
 )
 from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
+from pbem.results.runaway import Runaway
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Step
 
@@ -57,8 +58,6 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 LEAST_RELEASED = 0.01
 # Interfaces that took part in it have at least this part of what was released.
 LEAST_PART = 0.01
-# Of these, those that are named.
-MOST_NAMES = 4
 
 
 @dataclass(frozen=True)
@@ -80,16 +79,6 @@ class Energy:
     dissipated: float
     released: float = 0.0
     removed: float = 0.0
-
-
-@dataclass(frozen=True)
-class Runaway:
-    """A step within which faces ran away: released energy; its share of what was stored before, with the work of the
-    loads in the step; and the interfaces and cracks that set it free, the largest first."""
-
-    released: float
-    share: float
-    names: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -385,16 +374,6 @@ def weigh_faces(mesh: Mesh) -> Real:
         nodes = tips[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
         weight[nodes] = np.einsum("eq,eqj->ej", length, shapes)
     return np.concatenate([weight, weight[second_face_nodes(mesh)]])
-
-
-def describe_runaway(step: Step, runaway: Runaway) -> str:
-    """What a user is told of a step within which faces ran away."""
-    named, more = runaway.names[:MOST_NAMES], len(runaway.names) - MOST_NAMES
-    names = ", ".join(f"'{name}'" for name in named) + (f" and {more} more" if more > 0 else "")
-    return (
-        f"Step {step.number} is no path of equilibria: {names} ran away and released {100 * runaway.share:.2g} % of "
-        f"the stored energy ({runaway.released:.4g})."
-    )
 
 
 def _dot(weight: Real, traction: Complex, displacement: Complex) -> float:

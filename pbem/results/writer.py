@@ -22,7 +22,7 @@ from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
-from pbem.results.energy import Energy, EnergyBalance, describe_runaway
+from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.layout import (
     ENERGIES,
     ITERATION,
@@ -43,6 +43,7 @@ from pbem.results.linearity import append_linearity
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
 from pbem.results.rigid import append_rigid
+from pbem.results.runaway import describe_runaway
 from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.results.unfinished import drop_unfinished, read_unfinished, write_unfinished

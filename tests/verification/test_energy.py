@@ -30,8 +30,9 @@ from pbem.model.model import (
 )
 from pbem.results.describe import describe_results
 from pbem.results.dissipation import PairRecord, PairWork, measure_work
-from pbem.results.energy import Energy, EnergyBalance, Runaway, weigh_faces
+from pbem.results.energy import Energy, EnergyBalance, weigh_faces
 from pbem.results.reader import open_results
+from pbem.results.runaway import Runaway
 from pbem.results.writer import ResultWriter
 from pbem.solve.problem.step import Step
 from tests.verification.planes import FREE, ROCK, make_arc, make_circle, make_plane, make_straight, solve

@@ -23,6 +23,7 @@ from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import Judge, Settling, Solved, TangentOperator, size_residual
+from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows
 from pbem.solve.tangent.nearby import MOST_ASKED, MOST_NEARBY, answers_nearby, respond_nearby
 from pbem.solve.tangent.recycled import RecycledSpace
 from pbem.solve.tangent.sweeps import Sweeps
@@ -87,20 +88,20 @@ class KrylovTangent(TangentOperator):
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
         self._sweeps: Sweeps | None = None
         self._order = _find_order(problem)
-        self._matrix = PETSc.Mat().createPython(sizes, _Product(self), comm=problem.comm)
+        self._matrix = PETSc.Mat().createPython(sizes, Product(self), comm=problem.comm)
         self._matrix.setUp()
         self._right, self._left = self._matrix.createVecs()
         solver = PETSc.KSP().create(problem.comm)
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
-        self._space = MinimalResidual(problem.comm, _Rows(self), MOST_ITERATIONS)
+        self._space = MinimalResidual(problem.comm, Rows(self), MOST_ITERATIONS)
         self.recycled = RecycledSpace(problem.comm)
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
         inner = solver.getPC()
         inner.setType("python")
-        inner.setPythonContext(_Preconditioning(self))
+        inner.setPythonContext(Preconditioning(self))
         with petsc_options(_choose_options()):
             solver.setFromOptions()
         # The user may have asked for another method.
@@ -352,53 +353,6 @@ def _choose_options() -> dict[str, str]:
     """
     name = "ksp_gmres_cgs_refinement_type"
     return {} if PETSc.Options().hasName(PREFIX + name) else {name: "refine_always"}
-
-
-class _Product:
-    """What PETSc asks of a matrix that is not stored."""
-
-    def __init__(self, tangent: KrylovTangent) -> None:
-        self._tangent = tangent
-
-    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray(readonly=True)))))
-
-
-class _Rows:
-    """This rank's equations and preconditioner, turned within each node: see pbem.solve.petsc.minimal_residual.Rows."""
-
-    def __init__(self, tangent: KrylovTangent) -> None:
-        self._tangent = tangent
-
-    def multiply(self, part: Real) -> Real:
-        return self._tangent.multiply(self._tangent.gather(part))
-
-    def precondition(self, part: Real) -> Real:
-        (known, left), result = self._tangent.recycled.split(part, self), np.zeros(len(part))
-        self._tangent.preconditioner.apply(self._tangent.gather(left), result)
-        return known + result
-
-    def turn(self, part: Real) -> Real:
-        return self._tangent.preconditioner.turn(part)
-
-    def turn_back(self, part: Real) -> Real:
-        return self._tangent.preconditioner.turn_back(part)
-
-    @property
-    def judged(self) -> Real:
-        return self._tangent.preconditioner.judged
-
-
-class _Preconditioning:
-    """What PETSc asks of a preconditioner of ours."""
-
-    def __init__(self, tangent: KrylovTangent) -> None:
-        self._tangent = tangent
-
-    def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        result = np.zeros(x.getLocalSize())
-        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray(readonly=True))), result)
-        y.setArray(result)
 
 
 def _find_order(problem: Problem) -> Integer:

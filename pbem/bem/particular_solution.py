@@ -73,7 +73,7 @@ class ParticularSolution:
         return np.asarray(smooth + sum(each.stress(point, self.material) for each in self.points))
 
     def _integrate_growth(self, point: Complex) -> Complex:
-        """2 G u of the strain of the growing stress, which neither moves nor turns its center (theory, 96)."""
+        """2 G u of the strain of the growing stress, which neither moves nor turns its center (theory, 103)."""
         (xx, xy), (yx, yy) = (((0.5 * (by[0] + by[1])), 0.5 * (by[0] - by[1]) + 1j * by[2])
                               for by in (self.growth.by_x, self.growth.by_y))
         p, q, mean = 0.5 * (xy - 1j * yy), 0.5 * (xy + 1j * yy), complex(xx, yx)

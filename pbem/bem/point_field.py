@@ -38,7 +38,7 @@ class PointField:
         return -4 * math.pi * self._strength() if self.load.on_boundary else self.force
 
     def displacement(self, point: Complex, material: Material) -> Complex:
-        """Displacement (complex) at points; not a number at its own (theory, 91, 92, 93)."""
+        """Displacement (complex) at points; not a number at its own (theory, 98, 99, 100)."""
         load, kappa = self.load, material.kappa
         away = np.asarray(point - load.place)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -63,7 +63,7 @@ class PointField:
         return np.asarray(field / (2 * material.shear_modulus))
 
     def stress(self, point: Complex, material: Material) -> Real:
-        """sxx, syy, sxy (n, 3) at points; not numbers at its own (theory, 3, 91, 92, 93)."""
+        """sxx, syy, sxy (n, 3) at points; not numbers at its own (theory, 3, 98, 99, 100)."""
         load, kappa = self.load, material.kappa
         if not load.on_boundary:
             gamma = -self.force / (2 * np.pi * (1 + kappa))
@@ -87,7 +87,7 @@ class PointField:
         return stress
 
     def _strength(self) -> complex:
-        """The factor a of a wedge that takes the force at its apex, by purely radial stress (theory, 92)."""
+        """The factor a of a wedge that takes the force at its apex, by purely radial stress (theory, 99)."""
         angle, inward = self.load.half_angle, self.load.inward
         along, across = (np.conj(inward) * self.force).real, (np.conj(inward) * self.force).imag
         sine = 0.5 * math.sin(2 * angle)

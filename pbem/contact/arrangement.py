@@ -1,8 +1,8 @@
 """A construction on a mesh: pairs that a stage holds otherwise than by their law, and what regions that are gone leave.
 
 Faces that open in a stage bear, besides what their law says, what they carried at its beginning times the part of the
-stage that is left; faces that are closed are bonded with their jump at that time as its zero (theory, 91). Regions that
-are gone keep their equations, with a state of zero that disturbs no other (theory, 92).
+stage that is left; faces that are closed are bonded with their jump at that time as its zero (theory, 95). Regions that
+are gone keep their equations, with a state of zero that disturbs no other (theory, 96).
 """
 
 from __future__ import annotations

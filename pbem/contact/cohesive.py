@@ -72,7 +72,7 @@ class Cohesive(FrictionLaw):
         self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, tensile_strength: Real,
         fracture_energy: Real, fracture_energy_shear: Real,
     ) -> Strength:
-        """See FrictionLaw: of faces in touch (theory, 95)."""
+        """See FrictionLaw: of faces in touch (theory, 108)."""
         bonded = (tensile_strength > 0) & (cohesion > 0)
         shear = np.where(bonded, cohesion, 0.0)
         unit = np.where(bonded, self.softening.factor * fracture_energy_shear / np.where(bonded, cohesion, 1.0), 1.0)
@@ -90,7 +90,7 @@ class Cohesive(FrictionLaw):
         return parameters["friction"], np.where(find_bonded(parameters), parameters["cohesion"], 0.0)
 
     def find_units(self, parameters: Parameters) -> Real:
-        """The separations d_n and d_s (k, 2), lengths; 1 without a bond (theory, 91)."""
+        """The separations d_n and d_s (k, 2), lengths; 1 without a bond (theory, 104)."""
         energy = np.stack([parameters["fracture_energy"], parameters["fracture_energy_shear"]], axis=-1)
         own = find_bonded(parameters)[:, None]
         strength = _stack_strengths(parameters)
@@ -117,7 +117,7 @@ class Cohesive(FrictionLaw):
         return np.asarray(traction / strength + relative[:, None] * jump / self.find_units(parameters))
 
     def find_jump(self, trial: Real, relative: Real, start: Values, parameters: Parameters) -> Real:
-        """The jumps (k, 2) that belong to trial values; none in compression (theory, 94)."""
+        """The jumps (k, 2) that belong to trial values; none in compression (theory, 107)."""
         opened = np.stack([np.maximum(trial[:, 0], 0.0), trial[:, 1]], axis=1)
         size = np.hypot(*opened.T)
         x = self.softening.find_separation(size, relative, start[SEPARATION.name])
@@ -129,7 +129,7 @@ class Cohesive(FrictionLaw):
         return np.hypot(np.maximum(jump[:, 0], 0.0) / unit[:, 0], jump[:, 1] / unit[:, 1])
 
     def separate(self, jump: Real, start: Values, parameters: Parameters) -> Separating:
-        """The law of open pairs at some jumps (theory, 92)."""
+        """The law of open pairs at some jumps (theory, 105)."""
         unit, before = self.find_units(parameters), start[SEPARATION.name]
         stiffness = np.where(find_bonded(parameters)[:, None], _stack_strengths(parameters), 0.0) / unit
         jump = np.stack([np.maximum(jump[:, 0], 0.0), jump[:, 1]], axis=1)
@@ -155,7 +155,7 @@ class Cohesive(FrictionLaw):
         return {SEPARATION.name: own, DAMAGE.name: np.where(bonded, self.softening.find_damage(own), 1.0)}
 
     def store(self, jump: Real, state: Values, parameters: Parameters) -> Real:
-        """What unloading would give back (k,), energy per area (theory, 93)."""
+        """What unloading would give back (k,), energy per area (theory, 106)."""
         x = np.maximum(state[SEPARATION.name], RIGID)
         unit = self.find_units(parameters)
         stiffness = np.where(find_bonded(parameters)[:, None], _stack_strengths(parameters), 0.0) / unit
@@ -163,7 +163,7 @@ class Cohesive(FrictionLaw):
 
     def dissipate_open(self, before: Real, after: Real, old: Values, new: Values, parameters: Parameters) -> Real:
         """What a step from jumps to jumps (k, 2) of open pairs dissipates (k,), energy per area; of a step with a
-        constant ratio of opening and slip exact (theory, 93)."""
+        constant ratio of opening and slip exact (theory, 106)."""
         change = self.softening.find_damage(new[SEPARATION.name]) - self.softening.find_damage(old[SEPARATION.name])
         mixture = [self._mix(jump, parameters) for jump in (before, after)]
         mixture[0] = np.where(self.measure(before, parameters) > 0, mixture[0], mixture[1])

@@ -77,7 +77,7 @@ def build_constraints(
 ) -> ConstraintMap:
     """The map for the given linearised laws of the pairs and the given load; gap (m,): initial openings.
 
-    gone (k,): nodes on interfaces and cracks of regions that are gone. (theory, 44, 92)
+    gone (k,): nodes on interfaces and cracks of regions that are gone. (theory, 44, 96)
     """
     entries = _Entries(mesh.nodes)
     offset = np.zeros((2, mesh.nodes), dtype=complex)
@@ -98,7 +98,7 @@ def _hold_still(
     matrix: sparse.csr_matrix, constant: Real, gone: Integer, traction_scale: float
 ) -> tuple[sparse.csr_matrix, Real]:
     """The map in which these nodes do not move and their tractions are their own unknowns, and nothing else depends on
-    these: of a region that is gone, a state that is zero and disturbs no other (theory, 92)."""
+    these: of a region that is gone, a state that is zero and disturbs no other (theory, 96)."""
     nodes = len(constant) // 4
     own = number_components(gone)
     rows, columns = np.ones(4 * nodes), np.ones(2 * nodes)
@@ -133,7 +133,7 @@ def _constrain_pairs(
 
     The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge. carried (m, 2): what
     opened faces still carry besides their law.
-    (theory, 47, 65, 91)
+    (theory, 47, 65, 95)
     """
     pairs, links = mesh.pairs, mesh.links
     n, s = pairs.normal, 1j * pairs.normal

@@ -113,7 +113,7 @@ def _linearise_bonds(
     laws: PairLaws, modes: ModeState, memory: Memory, jump: Real, frozen: Frozen, traction_scale: float,
     tangent: Real, offset: Real,
 ) -> None:
-    """Enter open pairs whose bonds act, with what joints add (theory, 92).
+    """Enter open pairs whose bonds act, with what joints add (theory, 105).
 
     Bonds that have hardly given way are all but rigid in a direction: the unknowns are those that keep the two states
     that they stand for apart.

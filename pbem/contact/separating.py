@@ -72,7 +72,7 @@ def begin_jump(laws: PairLaws, memory: Memory) -> Real:
 
 def choose_jump(laws: PairLaws, modes: ModeState, memory: Memory, state: PairState, pressure: Real) -> Real:
     """Jumps (m, 2) at which the laws are taken next: those of the last solution, in the modes that led to it, and of
-    bonded pairs those that belong to their trial values (theory, 94)."""
+    bonded pairs those that belong to their trial values (theory, 107)."""
     jump = _find_jump(laws, modes, state)
     for bonds in list_bonds(laws, memory):
         relative = bonds.choose_stiffness(laws)
@@ -100,7 +100,7 @@ def choose_bond_slip(
     laws: PairLaws, modes: ModeState, memory: Memory, state: PairState, pressure: Real, slip: Real
 ) -> Real:
     """Plastic slips (m,) at which the laws in these modes are taken next: of the last solution, and of bonded pairs
-    that slip those that belong to their trial values, which softening does not overshoot (theory, 95)."""
+    that slip those that belong to their trial values, which softening does not overshoot (theory, 108)."""
     result, found = slip, plastic_slip(laws, state)
     for bonds in list_bonds(laws, memory):
         own = np.flatnonzero(modes.mode[bonds.pairs] == SLIP)
@@ -132,7 +132,7 @@ class Parting:
 def judge_bonds(
     laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, margin: float
 ) -> Parting:
-    """Which bonded pairs open: in tension, where the bond has given way or does so (theory, 94)."""
+    """Which bonded pairs open: in tension, where the bond has given way or does so (theory, 107)."""
     live, opens, violation = np.zeros(laws.count, dtype=bool), np.zeros(laws.count, dtype=bool), np.zeros(laws.count)
     jump = _find_jump(laws, modes, state)
     for bonds in list_bonds(laws, memory):

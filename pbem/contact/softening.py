@@ -35,12 +35,12 @@ class Softening:
     invert: Callable[[Real, Real], Real]
 
     def find_damage(self, x: Real) -> Real:
-        """The part (0 to 1) of the fracture energy that is dissipated: what unloading gives back is not (theory, 93).
+        """The part (0 to 1) of the fracture energy that is dissipated: what unloading gives back is not (theory, 106).
         """
         return np.asarray(self.factor * (self.area(x) - 0.5 * x * self.traction(x)))
 
     def find_separation(self, trial: Real, stiffness: Real, before: Real) -> Real:
-        """x (k,) >= 0 with traction + stiffness x = trial, after a largest separation before (theory, 94)."""
+        """x (k,) >= 0 with traction + stiffness x = trial, after a largest separation before (theory, 107)."""
         held = self.traction(before) / np.where(before > 0, before, 1.0)
         unloaded = trial / (held + stiffness)
         return np.where((before > 0) & (unloaded <= before), unloaded, self.invert(trial, stiffness))

@@ -97,7 +97,7 @@ def measure_work(
     laws: PairLaws, weight: Real, old: PairRecord, new: PairRecord, opened: Bool | None = None
 ) -> PairWork:
     """The work in a step; weight (m,): length of the boundary that belongs to each pair; opened (m,): those that a
-    stage has opened (theory, 76, 93)."""
+    stage has opened (theory, 76, 97)."""
     moved, slid = new.g_n - old.g_n, new.g_s - old.g_s
     pressed = 0.5 * (old.p_n + old.pressure + new.p_n + new.pressure) * moved
     trapezoid = pressed + 0.5 * (old.p_s + new.p_s) * slid
@@ -143,7 +143,7 @@ def _take(internal: Mapping[str, NDArray[Any]], pairs: Integer) -> dict[str, NDA
 
 def _dissipate_bonds(law: Cohesive, group: StrengthGroup, old: PairRecord, new: PairRecord) -> Real:
     """What the pairs (k,) of a cohesive law dissipate in a step, energy per area: by damage where they end open, by the
-    integral of the friction bound, less what is stored more in the bonds, where they slide (theory, 96)."""
+    integral of the friction bound, less what is stored more in the bonds, where they slide (theory, 109)."""
     at, parameters = group.pairs, group.parameters
     before, after = _take(old.internal, at), _take(new.internal, at)
     jumps = [

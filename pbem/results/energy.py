@@ -236,7 +236,7 @@ class EnergyBalance:
     def _measure_bared(self, old: _State, new: _State) -> tuple[float, float]:
         """On faces whose other side is gone: work of the fluid, and what the tractions take that are released.
 
-        (theory, 93)
+        (theory, 97)
         """
         there, mesh = self._there, self._mesh
         if there is None or not there.bared.any():

@@ -31,7 +31,7 @@ def measure_point_motions(
     model: Model, mesh: Mesh, faces: Faces, weight: Real, fields: tuple[Complex, Complex],
     backgrounds: list[tuple[ParticularSolution, ParticularSolution]],
 ) -> Real:
-    """Displacement along x and y and rotation (3 c,) at all point loads, without what each makes itself (theory, 94).
+    """Displacement along x and y and rotation (3 c,) at all point loads, without what each makes itself (theory, 101).
 
     weight (f,), fields: displacement, without swelling, and traction (f,) on all faces. Inside, Betti's theorem between
     the elastic field and those of unit loads at the point; on a boundary, the value of the elements there.

@@ -30,7 +30,7 @@ def describe_rest(problem: Problem) -> ContactState:
 def arrange_problem(problem: Problem, stage: int, factor: float, contact: ContactState) -> Problem:
     """The problem in a stage, of which a fraction has gone by, with the state of the pairs then.
 
-    What faces that open still carry is that of the stage's beginning times the part of it that is left (theory, 91).
+    What faces that open still carry is that of the stage's beginning times the part of it that is left (theory, 95).
     """
     arrangement = find_arrangement(problem.model, problem.mesh, problem.outer, stage)
     if arrangement is None:

@@ -37,7 +37,7 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     """The motion to add to displacements (f,) after a step, and what the supports would carry; None without need.
 
     traction (nodes,). motions: that the pairs leave free. What is left over of forces is carried by the supports, as
-    far as they work on these motions: an error of the mesh, since the loads balance (theory, 95).
+    far as they work on these motions: an error of the mesh, since the loads balance (theory, 102).
     """
     mesh, model = problem.mesh, problem.model
     supports = list(model.point_supports.values())

@@ -98,7 +98,7 @@ class RecycledSpace:
         self._moves, self._reach = self._directions @ combined, turned.astype(np.float32) @ combined
 
     def split(self, residual: Real, rows: Rows) -> tuple[Real, Real]:
-        """What the directions do about a residual (theory, 91): unknowns (k,), and the residual that is left (k,)."""
+        """What the directions do about a residual (theory, 110): unknowns (k,), and the residual that is left (k,)."""
         if not self._moves.shape[1]:
             return np.zeros(len(residual)), residual
         turned = rows.turn(residual)

@@ -1,0 +1,70 @@
+"""What PETSc's solvers and our GMRES ask of a tangent operator that is not stored."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from pbem.arrays import Real
+from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.tangent.recycled import RecycledSpace
+
+
+class Called(Protocol):
+    """What is asked of the tangent operator: its parts, products, and vectors on every rank."""
+
+    preconditioner: SchwarzPreconditioner
+    recycled: RecycledSpace
+
+    def multiply(self, unknowns: Real) -> Real: ...
+
+    def gather(self, part: Real) -> Real: ...
+
+
+class Product:
+    """What PETSc asks of a matrix that is not stored."""
+
+    def __init__(self, tangent: Called) -> None:
+        self._tangent = tangent
+
+    def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray(readonly=True)))))
+
+
+class Rows:
+    """This rank's equations and preconditioner, turned within each node: see pbem.solve.petsc.minimal_residual.Rows."""
+
+    def __init__(self, tangent: Called) -> None:
+        self._tangent = tangent
+
+    def multiply(self, part: Real) -> Real:
+        return self._tangent.multiply(self._tangent.gather(part))
+
+    def precondition(self, part: Real) -> Real:
+        (known, left), result = self._tangent.recycled.split(part, self), np.zeros(len(part))
+        self._tangent.preconditioner.apply(self._tangent.gather(left), result)
+        return known + result
+
+    def turn(self, part: Real) -> Real:
+        return self._tangent.preconditioner.turn(part)
+
+    def turn_back(self, part: Real) -> Real:
+        return self._tangent.preconditioner.turn_back(part)
+
+    @property
+    def judged(self) -> Real:
+        return self._tangent.preconditioner.judged
+
+
+class Preconditioning:
+    """What PETSc asks of a preconditioner of ours."""
+
+    def __init__(self, tangent: Called) -> None:
+        self._tangent = tangent
+
+    def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        result = np.zeros(x.getLocalSize())
+        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray(readonly=True))), result)
+        y.setArray(result)

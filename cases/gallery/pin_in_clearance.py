@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 
+SUBJECT = "contact"
 TITLE = "Pin pressed by a force into its clearance"
 PROBLEM = """A pin of radius R = 10 lies in the middle of a hole of radius 10.01 in a large plate of the same steel, and
 is pressed without friction by a force Q = 4000 per unit thickness. Nothing holds it before it touches: the program

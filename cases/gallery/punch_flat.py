@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+SUBJECT = "contact"
 TITLE = "Flat punch under a force beside its middle"
 PROBLEM = """A rigid punch with a flat face of width 2 a = 2 is pressed without friction on a large block by a force
 P = 1 that acts 0.2 to the right of its middle: the tool has a force, a moment, and no displacement along the face. The

@@ -70,11 +70,11 @@ class SecondSolution:
         Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
         custom law fails with what it is asked here; there is no further step then.
         """
+        if not self._ready:
+            self._prepare()
         if step.stage != self._stage:
             self.memory = begin_stage(self._whole, step.stage, self.memory, self._contact)
             self._enter(step.stage, 0.0)
-        if not self._ready:
-            self._prepare()
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)

@@ -18,9 +18,8 @@ from pbem.solve.problem.response import complete_states
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import free_at_last, march
 from pbem.solve.system.assembly import assemble_problem
-from pbem.solve.tangent import krylov
 from pbem.solve.tangent.krylov import KrylovTangent
-from pbem.solve.tangent.nearby import MOST_ASKED, part_by_block, part_by_distance
+from pbem.solve.tangent.nearby import MOST_ASKED, part_by_distance
 from tests.identities.solving import assemble_tangent, linearise_pairs
 
 Real = NDArray[np.float64]
@@ -114,44 +113,6 @@ def test_pairs_at_the_ends_of_the_comb_are_two_sets() -> None:
     for part in parts:
         assert len(set(mesh.position[nodes[part]].real < 4)) == 1
     np.testing.assert_array_equal(np.sort(np.concatenate(parts)), np.arange(len(nodes)))
-
-
-def test_pairs_around_a_sliver_are_one_set_with_all_that_surrounds_it() -> None:
-    text = write_comb(2).replace('"back_0"', '"back_0", "flank", "other"').replace("[curves]", """[curves]
-flank = { points = [[0, 5], [4, 5]], elements = 16 }
-other = { points = [[0, 5], [2, 5.2], [4, 5]], elements = 16 }""").replace("[interfaces]", """[interfaces]
-flank = { law = "coulomb", friction = 0.4 }
-other = { law = "coulomb", friction = 0.4 }""").replace("'back_0'", "'back_0', 'flank', 'other'")
-    _, model = parse_model(text)
-    problem = assemble_problem(model, generate_mesh(model), world)
-    mesh = problem.mesh
-    place, names = mesh.pairs.position, np.array(mesh.interface_names)[mesh.pairs.interface]
-    sliver = np.isin(names, ["flank", "other"])
-    ends = np.abs(place.real - 2) > 1.2
-    pairs = np.flatnonzero((sliver & ends) | (names == "up_0"))
-    sets = part_by_block(problem, pairs)
-    assert sorted(np.concatenate([members for members, _ in sets])) == list(range(len(pairs)))
-    around = [(members, elements) for members, elements in sets if sliver[pairs[members]].any()]
-    assert len(around) == 1 and sliver[pairs[around[0][0]]].all() and len(sets) > 1
-    assert set(around[0][1]) == set(np.unique(mesh.node_element[mesh.pairs.slave[sliver]]))
-    # By their distance alone both ends are sets of their own.
-    assert len(part_by_distance(mesh, mesh.pairs.slave[np.flatnonzero(sliver & ends)])) > 1
-
-
-def test_loose_solutions_leave_little_of_the_forces(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = assemble()
-    load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
-
-    def measure() -> float:
-        tangent = problem.make_tangent()
-        solved = tangent.solve(problem.constrain(law, load), load, law, 0.9)
-        tangent.destroy()
-        assert solved.loosely
-        return solved.residual
-
-    assert measure() <= krylov.LOOSEST
-    monkeypatch.setattr(krylov, "LOOSEST", 1.0)
-    assert measure() > 1e-4
 
 
 def test_products_are_freed_with_the_last_step(many_groups: None) -> None:

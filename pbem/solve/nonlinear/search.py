@@ -68,7 +68,7 @@ FEW_IN_ALL, MOST_IN_ALL = 60, 120
 # So often in a search: where it first fails and before it ends.
 MOST_WIDENED = 2
 # The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
-SWEPT = 2
+SWEPT = 4
 # Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
 

@@ -22,9 +22,9 @@ from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
-from pbem.solve.problem.tangent import Judge, Settling, Solved, TangentOperator, size_residual
+from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows
-from pbem.solve.tangent.nearby import MOST_ASKED, MOST_NEARBY, answers_nearby, respond_nearby
+from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.tangent.recycled import RecycledSpace
 from pbem.solve.tangent.sweeps import Sweeps
 
@@ -44,9 +44,6 @@ SAFETY = 0.1
 # The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
 # sets that are far from each other are settled one by one.
 MOST_SETTLED_BY_GMRES = 12
-# What a loose solution leaves of the forces at most, however far off it began: with more, thin blocks between open
-# cracks are anywhere, and thousands of pairs change by chance.
-LOOSEST = 1e-4
 # Responses of single pairs are found to this part of their forces.
 RESPONSE = 3e-2
 
@@ -82,7 +79,7 @@ class KrylovTangent(TangentOperator):
         self.expected: Real | None = None
         self.iterations: list[int] = []
         nearby = answers_nearby(problem)
-        self._settling = Settling(MOST_NEARBY if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
+        self._settling = Settling(MOST_SETTLED if nearby else MOST_SETTLED_BY_GMRES, False, nearby)
         self.widening = 1
         rows = 2 * len(problem.system.nodes)
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
@@ -167,7 +164,7 @@ class KrylovTangent(TangentOperator):
         """Until the residual is only this part of what it is (theory, 88); its true size is not asked for."""
         now = self._now
         begin, least = self.problem.measure(now.residual), self._tolerance * now.scale
-        now = self._improve(now, max(min(forcing * begin, LOOSEST * now.scale), least))
+        now = self._improve(now, max(forcing * begin, least))
         off, left = self.preconditioner.correct(now.residual)
         self._now = replace(now, part=now.part - off, residual=self.preconditioner.turn_back(left))
         unknowns = self.solution = self.gather(self._now.part)

@@ -28,7 +28,6 @@ from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import do_cracks_meet, find_nearest
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.tangent import MOST_SETTLED
 
 # So few pairs are answered for by the whole model: what is left at the end can hang on what is far away.
 MOST_ASKED = 12
@@ -36,10 +35,6 @@ MOST_ASKED = 12
 REACH = 4.0
 # Elements around a set of pairs, as a multiple of the pairs' own, and at least.
 AROUND, LEAST_AROUND = 3, 60
-# The most pairs that are answered for at once, all sets together.
-MOST_NEARBY = 1800
-# Elements around a block, at most, whose pairs are settled together.
-MOST_AROUND_BLOCK = 600
 
 
 def answers_nearby(problem: Problem) -> bool:
@@ -56,8 +51,7 @@ def settle_parts(
 ) -> Settled:
     """Modes of the pairs (s,) of a group, each set of them that no other answers to by itself.
 
-    Sets for which none are found, or that are too large, take the modes that are proposed (m,). Nothing is said of
-    whether there are any.
+    Sets for which none are found take the modes that are proposed (m,). Nothing is said of whether there are any.
     """
     count = subset.laws.count
     links = np.abs(response.change).max(axis=1).reshape(count, count, 2).max(axis=2) > 0
@@ -66,8 +60,6 @@ def settle_parts(
     wrong, found_any = np.zeros(count, dtype=bool), False
     for each in range(number):
         own = np.flatnonzero(label == each)
-        if len(own) > MOST_SETTLED:
-            continue
         part = take_subset(subset.laws, subset.memory, subset.pressure, subset.modes, own)
         change = response.change[own][:, :, number_components(own)]
 
@@ -95,41 +87,17 @@ def respond_nearby(
     result = np.zeros((2 * len(pairs), 2 * len(pairs)))
     slave = problem.mesh.pairs.slave[pairs]
     tree = cKDTree(_at(0.5 * (problem.mesh.start + problem.mesh.end)))
-    for number, (members, block) in enumerate(part_by_block(problem, pairs)):
+    for number, members in enumerate(part_by_distance(problem.mesh, slave)):
         if number % problem.comm.size != problem.comm.rank:
             continue
         own = np.unique(problem.mesh.node_element[slave[members]])
         further = find_nearest(problem.mesh, own, tree, max(AROUND * len(own), LEAST_AROUND))
-        further = np.union1d(further, block)
         unknowns = number_components(slave[members])
         at = number_components(members)
         result[np.ix_(at, at)] = preconditioner.respond(
             constraints.matrix, offsets, np.union1d(own, further), unknowns
         )
     return add_up(problem.comm, result)
-
-
-def part_by_block(problem: Problem, pairs: Integer) -> list[tuple[Integer, Integer]]:
-    """Places in pairs (k,) of each set, and elements that go with it.
-
-    A block moves as a whole, most of all a sliver in an open crack, which turns about one pair as another one parts:
-    pairs around the same block are one set, with all that surrounds it, unless that is much. A pair between two blocks
-    is the smaller one's. Others are parted by their distance.
-    """
-    mesh, cut, block = problem.mesh, problem.cut, problem.parts.block
-    element = mesh.node_element[mesh.pairs.slave]
-    most = len(cut.size)  # stands for no block
-    size = np.append(np.where(block & (cut.size <= MOST_AROUND_BLOCK), cut.size, np.inf), np.inf)
-    first, second = cut.first[pairs], cut.second[pairs]
-    body = np.where(size[first] <= size[second], first, second)
-    body = np.where(np.isfinite(size[body]) & (first != second), body, most)
-    others = np.flatnonzero(body == most)
-    apart = part_by_distance(mesh, mesh.pairs.slave[pairs[others]]) if len(others) else []
-    sets = [(others[each], element[:0]) for each in apart]
-    for each in np.unique(body[body < most]):
-        around, _ = cut.find_around(int(each))
-        sets.append((np.flatnonzero(body == each), np.unique(element[around])))
-    return sets
 
 
 def part_by_distance(mesh: Mesh, nodes: Integer) -> list[Integer]:

@@ -25,7 +25,7 @@ from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
-from pbem.solve.tangent.recycled import RecycledSpace
+from pbem.solve.tangent.recycled import MOST_KEPT, RecycledSpace
 from pbem.solve.tangent.sweeps import Sweeps
 
 # Most iterations of GMRES for one linear system, without restart.
@@ -92,7 +92,7 @@ class KrylovTangent(TangentOperator):
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
         self._space = MinimalResidual(problem.comm, Rows(self), MOST_ITERATIONS)
-        self.recycled = RecycledSpace(problem.comm)
+        self.recycled = RecycledSpace(problem.comm, 0 if nearby else MOST_KEPT)
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)

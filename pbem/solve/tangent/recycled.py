@@ -23,7 +23,8 @@ from pbem.solve.petsc.session import find_number
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner, find_changes
 
 # Directions that are kept at most, the newest first; in single precision, they take as much as so many vectors with
-# their products. Option newton_recycled; 0 keeps none.
+# their products. Option newton_recycled; 0 keeps none. Of networks of cracks none are kept unless that says otherwise:
+# loose solutions that hold what was before are off where thin blocks turn, and hundreds of pairs changed in vain.
 MOST_KEPT = 40
 # Systems that take no more iterations than this leave nothing that is worth to be kept.
 FEW = 10
@@ -36,8 +37,9 @@ Single = NDArray[np.float32]
 class RecycledSpace:
     """On this rank's rows (k,), all ranks together: n directions (k, n) and the products they had (k, n)."""
 
-    def __init__(self, comm: MPI.Intracomm) -> None:
-        self._comm, self._most = comm, max(0, int(find_number("newton_recycled", MOST_KEPT)))
+    def __init__(self, comm: MPI.Intracomm, most: int = MOST_KEPT) -> None:
+        """most: directions that are kept, unless the user says otherwise."""
+        self._comm, self._most = comm, max(0, int(find_number("newton_recycled", most)))
         self.drop()
 
     def drop(self) -> None:

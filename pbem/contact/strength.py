@@ -15,6 +15,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pbem.arrays import Bool, Real
+from pbem.contact.barton_bandis import BartonBandis
 from pbem.contact.cohesive import COHESIVE
 from pbem.contact.custom import CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
@@ -75,7 +76,9 @@ def _evaluate_cone(p_n: Real, friction: Real, cohesion: Real) -> Strength:
 coulomb, slip_weakening = Coulomb(), SlipWeakening()
 # Further laws by their names in a case; they are given the keys of their own. Shapes of softening are told apart by
 # `choose_strength`.
-LAWS: Mapping[str, FrictionLaw] = {"rate_and_state": RateAndState(), "cohesive": COHESIVE["linear"]}
+LAWS: Mapping[str, FrictionLaw] = {
+    "rate_and_state": RateAndState(), "cohesive": COHESIVE["linear"], "barton_bandis": BartonBandis(),
+}  # fmt: skip
 
 
 def list_model_variables(model: Model) -> tuple[InternalVariable, ...]:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pbem.description.schema import LawTable
 
-Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "custom"]
+Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "barton_bandis", "custom"]
 
 _FRICTION = ("friction", "friction_angle", "cohesion")
 _STRENGTH = (*_FRICTION, "tensile_strength")
@@ -17,10 +17,12 @@ _FILE = ("file", "parameters")
 NEEDED: dict[Kind, tuple[str, ...]] = {
     "rate_and_state": ("friction", "rate_effect", "state_effect", "reference_rate", "slip_distance"),
     "cohesive": ("tensile_strength", "fracture_energy"),
+    "barton_bandis": ("residual_friction_angle", "jrc", "jcs"),
 }
 OPTIONAL: dict[Kind, tuple[str, ...]] = {
     "rate_and_state": ("initial_state",),
     "cohesive": ("cohesion", "fracture_energy_shear", "softening", "friction"),
+    "barton_bandis": (),
 }
 # The laws that depend on time.
 TIMED: tuple[Kind, ...] = ("rate_and_state",)
@@ -30,15 +32,20 @@ OWN_KEYS: dict[Kind, tuple[str, ...]] = {
     for kind in NEEDED
 }
 _FURTHER = tuple(key for keys in OWN_KEYS.values() for key in keys)
-_COHESIVE = OWN_KEYS["cohesive"]
+_COHESIVE, _ROUGH = OWN_KEYS["cohesive"], OWN_KEYS["barton_bandis"]
 # Keys of a law's table that would change nothing, by the kind of law.
 WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
     "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", *_FILE, *_FURTHER),
     "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, *_FILE, *_FURTHER),
     "coulomb": (*_FILE, *_FURTHER),
     "frictionless": (*_FILE, *_FURTHER),
-    "rate_and_state": ("cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_FILE, *_COHESIVE),
-    "cohesive": ("cohesion_lost", *_WEAKENING, "gap", *_FILE, *OWN_KEYS["rate_and_state"]),
+    "rate_and_state": (
+        "cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_FILE, *_COHESIVE, *_ROUGH,
+    ),
+    "cohesive": ("cohesion_lost", *_WEAKENING, "gap", *_FILE, *OWN_KEYS["rate_and_state"], *_ROUGH),
+    "barton_bandis": (
+        *_STRENGTH, "cohesion_lost", *_WEAKENING, *_FILE, *OWN_KEYS["rate_and_state"], *_COHESIVE,
+    ),
     "custom": (*_FRICTION, *_WEAKENING, *_FURTHER),
 }
 # Keys that say the same.

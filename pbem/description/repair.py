@@ -65,7 +65,7 @@ def _patch(raw: dict[str, Any], loc: KeyPath) -> bool:
             raw[table][loc[1]].setdefault(needed, _LAW_STAND_IN)
         return True
     if table in ("interfaces", "contacts") and raw[table][loc[1]].get("law") in list(NEEDED):
-        law, key = raw[table][loc[1]], key.replace("friction_angle", "friction")
+        law, key = raw[table][loc[1]], "friction" if key == "friction_angle" else key
         if key not in known:  # it may be one of them
             for needed in NEEDED[law["law"]]:
                 law.setdefault(needed, _LAW_STAND_IN)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from pbem.description import law_keys
 from pbem.description.construction import ConstructionTable, FitTable
 from pbem.description.field_tables import (
     EigenstrainTable,
@@ -23,7 +24,6 @@ from pbem.description.field_tables import (
     PointSupportTable,
     RemoteTable,
 )
-from pbem.description.law_keys import FractureEnergy, LawName, ShearFractureEnergy, Softening
 from pbem.description.rigid_tables import ForceTable, RigidTable, StageForceTable, StageRigidTable, ToolTable
 from pbem.description.table import Table, UnitsTable
 from pbem.description.values import (
@@ -156,7 +156,7 @@ class LawTable(Table):
     """What the two faces do: of a curve of two regions (an interface) or of a crack. Strengths and pressures are
     stresses."""
 
-    law: LawName = None
+    law: law_keys.LawName = None
     friction: Strength | None = Field(
         None, description="friction coefficient; 0 if its angle is not given either; f0 of `rate_and_state`"
     )
@@ -178,9 +178,12 @@ class LawTable(Table):
     initial_state: Positive | None = Field(
         None, description="theta of `rate_and_state` at the start, time; `slip_distance/reference_rate` if not given"
     )
-    fracture_energy: FractureEnergy = None
-    fracture_energy_shear: ShearFractureEnergy = None
-    softening: Softening = None
+    fracture_energy: law_keys.FractureEnergy = None
+    fracture_energy_shear: law_keys.ShearFractureEnergy = None
+    softening: law_keys.Softening = None
+    residual_friction_angle: law_keys.ResidualFrictionAngle = None
+    jrc: law_keys.Roughness = None
+    jcs: law_keys.WallStrength = None
     normal_stiffness: Positive | None = Field(
         None, description="elastic joint in front of the law, stress per length; without this key rigid"
     )

@@ -110,8 +110,9 @@ def _read_parameters(loc: KeyPath, table: LawTable, kind: Kind) -> tuple[dict[st
     """The numbers of a law that has keys of its own, by their names; those that are missing are faults."""
     angle = table.friction_angle is not None
     given = {key: getattr(table, key) for key in (*NEEDED[kind], *OPTIONAL[kind])}
-    given["friction"] = _find_friction(table) if angle else table.friction
-    if isinstance(given["friction"], VaryingTable):
+    if "friction" in given:
+        given["friction"] = _find_friction(table) if angle else table.friction
+    if isinstance(given.get("friction"), VaryingTable):
         found = f"a friction that varies along the curve with law = \"{kind}\""
         return {}, [Fault.at((*loc, "friction"), found, "a number")]
     missing = [key for key in NEEDED[kind] if given[key] is None]

@@ -63,7 +63,7 @@ class Law:
     frictionless: that there is no friction was said, by `law = "frictionless"` or `friction = 0`.
     """
 
-    kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state", "cohesive"]
+    kind: Literal["bonded", "coulomb", "open", "custom", "rate_and_state", "cohesive", "barton_bandis"]
     friction: Value = 0.0
     cohesion: Value = 0.0
     tensile_strength: Value = 0.0

@@ -1,0 +1,37 @@
+"""A specimen with a rough joint."""
+
+import math
+
+from pbem.results.reader import Results
+
+TITLE = "A rough joint at three confining pressures: Barton's strength"
+SUBJECT = "rock joints"
+PROBLEM = """A specimen of granite is cut by a rough joint, JRC = 9, JCS = 120 MPa, residual friction angle 28 degrees,
+at an angle of q = 54.5 degrees to the direction across it. It is compressed under the confining pressures p = 1, 3 and
+10 MPa, each time until the joint slides. The stress is uniform in both parts: with the difference D = s1 - p the joint
+carries the normal stress s = p + D cos(q)^2 and the shear t = D sin(q) cos(q), and D follows from
+t = s tan(28 + 9 log10(120/s)) degrees. The friction angle falls from 46 degrees to 36."""
+SOURCE = """N. Barton, V. Choubey, The shear strength of rock joints in theory and practice, Rock Mechanics 10 (1977)
+1-54; for the stress on an inclined joint Jaeger, Cook, Zimmerman, Fundamentals of Rock Mechanics (Blackwell, 2007)."""
+ANGLE, PRESSURES = math.atan2(70, 50), (1.0, 3.0, 10.0)
+
+
+def find_difference(pressure: float) -> float:
+    """D by bisection: below it the joint holds."""
+    low, high = 0.0, 100 * pressure
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        stress = pressure + middle * math.cos(ANGLE) ** 2
+        strength = stress * math.tan(math.radians(28 + 9 * math.log10(120 / stress)))
+        low, high = (middle, high) if middle * math.sin(ANGLE) * math.cos(ANGLE) < strength else (low, middle)
+    return low
+
+
+EXPECTED = {f"axial stress at {p:g} MPa, MPa": (-p - find_difference(p), 1e-6) for p in PRESSURES}
+PICTURES = [("the specimen after sliding", ["plot", "--label", "joint"])]
+
+
+def compute(results: Results) -> dict[str, float]:
+    """The force on the upper plate, over its width."""
+    force = results.reactions["head"][:, 1] / 50
+    return {f"axial stress at {p:g} MPa, MPa": force[number] for number, p in enumerate(PRESSURES)}

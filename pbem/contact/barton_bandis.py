@@ -23,10 +23,12 @@ DEGREE = np.pi / 180
 
 
 class BartonBandis(FrictionLaw):
-    """The law as above; parameters: phi_r and JRC in degrees, JCS (stress)."""
+    """The law as above; parameters: phi_r and JRC in degrees, JCS (stress); closure (length): see
+    pbem.contact.closure."""
 
     def strength(  # type: ignore[override]
-        self, p_n: Real, slide: Slide, /, residual_friction_angle: Real, jrc: Real, jcs: Real
+        self, p_n: Real, slide: Slide, /, residual_friction_angle: Real, jrc: Real, jcs: Real,
+        closure: Real | None = None,
     ) -> Strength:
         """See FrictionLaw (theory, 111)."""
         stress = np.maximum(-p_n, 0.0)

@@ -47,6 +47,7 @@ class PairLaws:
     own_stiffness: of the surroundings of each pair alone.
     leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
     rest: the opening of pairs that stick and carry nothing, 0 but where a stage has closed faces that were apart.
+    stiffening: 1/length, one over the largest closure of joints that stiffen as they close; 0 of linear ones.
     """
 
     strengths: tuple[StrengthGroup, ...]
@@ -62,10 +63,12 @@ class PairLaws:
     own_stiffness: Real
     leader: Integer
     rest: Real = field(default_factory=lambda: np.zeros(0))
+    stiffening: Real = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        if not len(self.rest):
-            object.__setattr__(self, "rest", np.zeros(len(self.gap)))
+        for name in ("rest", "stiffening"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.zeros(len(self.gap)))
 
     @property
     def count(self) -> int:
@@ -174,6 +177,10 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         stiffness=SOFTNESS * modulus / length,
         own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
         leader=_find_leaders(model, mesh),
+        stiffening=spread([
+            1 / law.parameters["closure"] if law.kind == "barton_bandis" and "closure" in law.parameters else 0.0
+            for law in laws
+        ]),
     )
 
 

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.contact.closure import find_closure, find_pressed, measure_closure_error
 from pbem.contact.cohesive import Cohesive
 from pbem.contact.laws import (
     OPEN,
@@ -77,12 +78,15 @@ def linearise(
         modes.mode != OPEN, modes.mode == STICK, modes.mode == SLIP, modes.mode == OPEN
     )  # fmt: skip
     tangent[closed, P_N, 0] = traction_scale
-    tangent[closed, G_N, 0] = (laws.compliance_n * traction_scale)[closed]
     tangent[stick, P_S, 1] = traction_scale
     tangent[stick, G_S, 1] = (laws.compliance_s * traction_scale)[stick]
-    offset[stick, G_S], offset[stick, G_N] = memory.slip[stick], laws.rest[stick]
     # Rounding must not put a pair without cohesion beyond the apex of its cone, where friction has no slope.
     admissible = np.minimum(p_n, tensile_limit(laws, memory) - pressure)
+    joint, by_joint = find_closure(laws, admissible)
+    tangent[closed, G_N, 0] = (by_joint * traction_scale)[closed]
+    offset[closed, G_N] = np.where(laws.stiffening > 0, joint - by_joint * admissible, 0.0)[closed]
+    offset[stick, G_S] = memory.slip[stick]
+    offset[stick, G_N] += laws.rest[stick]
     strength = evaluate_strength(laws, admissible, memory.look_ahead(slip_ahead(modes, memory, slip)), pressure)
     creeps = find_creeping(laws)
     by_n = modes.sign * (np.zeros(laws.count) if frozen == "strength" else strength.by_traction)
@@ -180,7 +184,8 @@ def measure_law_error(
         low, middle, high = (np.sign(each) * find_bound(np.abs(each)) for each in moved)
         inside = (np.minimum(low, high) <= state.p_s) & (state.p_s <= np.maximum(low, high))
         error = np.where(creeps, np.where(inside, 0.0, np.abs(state.p_s - middle)), error)
-    worst = max(float(error[slips].max(initial=0.0)), measure_bond_error(laws, modes, state, memory, pressure))
+    worst = max(float(error[slips].max(initial=0.0)), measure_bond_error(laws, modes, state, memory, pressure),
+                float(measure_closure_error(laws, modes, state).max(initial=0.0)))
     return worst / scale if scale > 0 else 0.0
 
 
@@ -262,7 +267,9 @@ def update_active_set(
     is_open = modes.mode == OPEN
     slip = plastic_slip(laws, state)
     creeps = find_creeping(laws)
-    normal = state.p_n + stiffness * np.where(is_open, state.g_n - laws.compliance_n * state.p_n, 0.0)
+    apart = state.g_n - find_closure(laws, state.p_n)[0]
+    pressed = np.where(state.p_n + pressure > 0, find_pressed(laws, modes, state), state.p_n)
+    normal = pressed + stiffness * np.where(is_open, apart, 0.0)
     still = (modes.mode == STICK) | (creeps & ~is_open)
     tangential = state.p_s + stiffness * np.where(still, 0.0, slip - memory.slip)
     trials = (np.abs(a).max(initial=0.0) for a in (normal, tangential))

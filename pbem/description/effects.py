@@ -22,7 +22,7 @@ NEEDED: dict[Kind, tuple[str, ...]] = {
 OPTIONAL: dict[Kind, tuple[str, ...]] = {
     "rate_and_state": ("initial_state",),
     "cohesive": ("cohesion", "fracture_energy_shear", "softening", "friction"),
-    "barton_bandis": (),
+    "barton_bandis": ("closure",),
 }
 # The laws that depend on time.
 TIMED: tuple[Kind, ...] = ("rate_and_state",)

@@ -41,3 +41,10 @@ Roughness = Annotated[
 WallStrength = Annotated[
     Positive | None, Field(description="of `barton_bandis`: compressive strength of the joint's walls, stress")
 ]
+Closure = Annotated[
+    Positive | None,
+    Field(
+        description="of `barton_bandis`: largest closure V, length; `normal_stiffness` is then that at the beginning, "
+        "K in sigma = K v/(1 - v/V)"
+    ),
+]

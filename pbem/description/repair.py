@@ -69,7 +69,7 @@ def _patch(raw: dict[str, Any], loc: KeyPath) -> bool:
         if key not in known:  # it may be one of them
             for needed in NEEDED[law["law"]]:
                 law.setdefault(needed, _LAW_STAND_IN)
-        if key in NEEDED[law["law"]]:
+        if key in NEEDED[law["law"]] or (key == "normal_stiffness" and "closure" in law):
             if key == "friction":
                 law.pop("friction_angle", None)
             law[key] = _LAW_STAND_IN

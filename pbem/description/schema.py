@@ -184,6 +184,7 @@ class LawTable(Table):
     residual_friction_angle: law_keys.ResidualFrictionAngle = None
     jrc: law_keys.Roughness = None
     jcs: law_keys.WallStrength = None
+    closure: law_keys.Closure = None
     normal_stiffness: Positive | None = Field(
         None, description="elastic joint in front of the law, stress per length; without this key rigid"
     )

@@ -121,7 +121,11 @@ def _read_parameters(loc: KeyPath, table: LawTable, kind: Kind) -> tuple[dict[st
         return {}, [Fault.at(loc, found, f"all of {', '.join(NEEDED[kind])}")]
     if kind == "rate_and_state" and given["initial_state"] is None:
         given["initial_state"] = table.slip_distance / table.reference_rate  # type: ignore[operator]
-    return given, []
+    faults = []
+    if given.get("closure") is not None and table.normal_stiffness is None:
+        found = f"a closure of '{loc[-1]}' without its stiffness at the beginning"
+        faults.append(Fault.at((*loc, "closure"), found, "normal_stiffness with it, or no such key"))
+    return {key: value for key, value in given.items() if value is not None}, faults
 
 
 def _read_values(loc: KeyPath, table: LawTable) -> tuple[dict[str, Value | None], list[Fault]]:

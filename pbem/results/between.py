@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.contact.closure import find_closure
 from pbem.contact.declaration import SLIP_PATH, Slide
 from pbem.contact.laws import PairLaws, collect_laws, evaluate_strength, find_creeping
 from pbem.contact.loads import evaluate_pressure
@@ -55,7 +56,7 @@ class BetweenNodes:
             p_n, p_s, path = (
                 self._read(each, plain) for each in (contact.traction_n, contact.traction_s, contact.slip_path)
             )
-            penetration = np.maximum(penetration, laws.compliance_n * p_n - opening)
+            penetration = np.maximum(penetration, find_closure(laws, p_n)[0] - opening)
             tension = np.maximum(tension, p_n + pressure - limit)
             admissible = np.minimum(p_n, limit - pressure)
             slide = Slide(np.zeros(count), {**contact.internal, SLIP_PATH.name: np.maximum(path, 0.0)})

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from pbem.contact.barton_bandis import BartonBandis
+from pbem.contact.closure import choose_traction, find_closure, find_pressed, measure_closure_error, measure_stiffening
 from pbem.contact.declaration import Slide
-from pbem.contact.laws import collect_laws, evaluate_strength, start_memory
+from pbem.contact.laws import SLIP, STICK, ModeState, PairLaws, PairState, collect_laws, evaluate_strength, start_memory
 from pbem.mesh.generate import generate_mesh
 from pbem.results.model_text import describe_law
 from tests.unit.case_sample import BLOCKS, build, change, find_faults, find_only_fault
@@ -66,7 +67,73 @@ def test_the_numbers_reach_the_model_and_are_told() -> None:
     assert "barton_bandis" in told and "residual friction angle 28" in told and "jrc 10" in told and "jcs 100" in told
 
 
+CLOSING = change(CASE, ("jcs = 100.0", "jcs = 100.0\nnormal_stiffness = 50.0\nclosure = 0.2"))
+
+
+def make_closing() -> PairLaws:
+    model = build(CLOSING)
+    assert model.interfaces["interface"].law.parameters["closure"] == 0.2
+    assert "closure 0.2" in describe_law(model.interfaces["interface"].law)
+    return collect_laws(model, generate_mesh(model))
+
+
+def test_a_joint_closes_along_a_hyperbola() -> None:
+    """K = 50, V = 0.2: half of V is taken by sigma = K V = 10; the tangent, and energy as the integral over v."""
+    laws = make_closing()
+    some = -np.geomspace(1e-5, 1e4, laws.count)
+    opening, slope = find_closure(laws, some)
+    np.testing.assert_allclose(50 * -opening / (1 + opening / 0.2), -some, rtol=1e-9)
+    step = 1e-6 * some
+    by_difference = (find_closure(laws, some + step)[0] - find_closure(laws, some - step)[0]) / (2 * step)
+    np.testing.assert_allclose(slope, by_difference, rtol=1e-6)
+    np.testing.assert_allclose(find_closure(laws, 0 * some - 10)[0], -0.1)
+    np.testing.assert_allclose(find_closure(laws, 0 * some + 10)[0], 0.2)  # linear under tension
+    x = -opening / 0.2
+    points, weights = np.polynomial.legendre.leggauss(60)
+    v = 0.1 * x[:, None] * (points + 1)
+    integral = (50 * v / (1 - v / 0.2)) @ weights * 0.1 * x
+    stored = 0.5 * some * opening + measure_stiffening(laws, some)
+    gentle = x < 0.95
+    np.testing.assert_allclose(stored[gentle], integral[gentle], rtol=1e-11)
+    np.testing.assert_allclose(stored, -50 * 0.2**2 * (np.log1p(-x) + x), rtol=1e-5)
+    assert np.all(np.diff(stored) < 0) or np.all(np.diff(stored) > 0)
+
+
+def test_states_of_joints_that_close() -> None:
+    """The traction by the opening is the inverse; the error is in traction; relieved joints are followed by it."""
+    laws = make_closing()
+    some = -np.geomspace(1e-3, 1e3, laws.count)
+    opening, slope = find_closure(laws, some)
+    modes = ModeState(np.full(laws.count, SLIP), np.ones(laws.count))
+    zeros = np.zeros(laws.count)
+    state = PairState(some, zeros, opening, zeros)
+    assert measure_closure_error(laws, modes, state).max() < 1e-9
+    off = PairState(some, zeros, opening + 0.01 * slope, zeros)
+    np.testing.assert_allclose(measure_closure_error(laws, modes, off), 0.01, rtol=1e-6)
+    pulling = PairState(zeros + 3.0, zeros, opening, zeros)
+    np.testing.assert_allclose(find_pressed(laws, modes, pulling), some, rtol=1e-9)
+    np.testing.assert_allclose(choose_traction(laws, modes, some, pulling), some, rtol=1e-9)
+    pressed = PairState(2 * some, zeros, opening, zeros)
+    np.testing.assert_array_equal(choose_traction(laws, modes, some, pressed), 2 * some)
+    stuck = ModeState(np.full(laws.count, STICK), np.ones(laws.count))
+    np.testing.assert_array_equal(find_pressed(laws, stuck, PairState(some, zeros, zeros + 0.1, zeros)), some)
+
+
 WRONG = {
+    "closure without stiffness": (
+        ("jrc = 10.0", "jrc = 10.0\nclosure = 0.1"), "interfaces.interface.closure", "without its stiffness"
+    ),
+    "closure with a wrong stiffness": (
+        ("jrc = 10.0", "jrc = 10.0\nclosure = 0.1\nnormal_stiffness = -1"), "interfaces.interface.normal_stiffness",
+        "-1",
+    ),
+    "no closure": (
+        ("jrc = 10.0", "jrc = 10.0\nclosure = 0\nnormal_stiffness = 1"), "interfaces.interface.closure", "0"
+    ),
+    "closure of another law": (
+        (LAW, 'law = "coulomb"\nnormal_stiffness = 1.0\nclosure = 0.1\n'), "interfaces.interface.closure",
+        'law = "barton_bandis" with it',
+    ),
     "keys are missing": (("jrc = 10.0\njcs = 100.0\n", ""), "interfaces.interface", "without jrc, jcs"),
     "no angle": (("residual_friction_angle = 28\n", ""), "interfaces.interface", "without residual_friction_angle"),
     "an angle of the limit": (("= 28", "= 70"), "interfaces.interface.residual_friction_angle", "70"),

@@ -102,3 +102,49 @@ def test_direct_shear_follows_the_closed_formula(scheme: str, unit: float, size:
             np.abs(contact.slip[step]), abs(sign * (number + 1) * far - taken) * size, rtol=1e-6)
     left = energy.external - energy.elastic - energy.dissipated
     assert np.abs(left).max() < 1e-8 * np.abs(energy.external).max()
+
+
+LARGEST = 4e-4
+CLOSURE = f"normal_stiffness = {STIFF_N}\ntangential_stiffness = {STIFF_S}\nclosure = {LARGEST}\n"
+
+
+def find_stress(pressed: float) -> float:
+    """Of both blocks and the joint, shortened by so much: 2 s/E + V s/(K V + s) = d is quadratic in s."""
+    a, b, c = 2 / YOUNG, 2 * STIFF_N * LARGEST / YOUNG + LARGEST - pressed, -pressed * STIFF_N * LARGEST
+    return (-b + math.sqrt(b**2 - 4 * a * c)) / (2 * a)
+
+
+@pytest.mark.parametrize("scheme", ["SST", "THST"])
+def test_a_joint_closes_along_its_hyperbola_and_opens_again(scheme: str, tmp_path: Path) -> None:
+    """Displacements of the top: down in a few steps, nearly all the way up in one, pulled off, and down again."""
+    ends = [(4, -5e-3), (1, -1e-4), (2, 2e-4), (1, -2e-2), (3, -3e-3)]
+    text = "".join(
+        f'[[stages]]\nname = "{number}"\nsteps = {steps}\nboundary.top = {{ uy = {end} }}\n'
+        for number, (steps, end) in enumerate(ends))
+    text = write(1.0, 1.0, scheme, CLOSURE, text).replace("ux = 0, ty = 0", "ux = 0, uy = 0")
+    results = run(text, tmp_path)
+    contact, energy = results.contact["mid"], results.energy
+    at, tops = 0.0, []
+    for steps, end in ends:
+        tops += [at + (end - at) * (number + 1) / steps for number in range(steps)]
+        at = end
+    for step, top in enumerate(tops):
+        stress = find_stress(-top) if top < 0 else 0.0
+        closed = stress / (STIFF_N + stress / LARGEST)
+        np.testing.assert_allclose(contact.traction_n[step], -stress, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(contact.opening[step], -closed if top < 0 else top, rtol=1e-6)
+        x = closed / LARGEST
+        stored = 1.5 * (2 * stress**2 / (2 * YOUNG) - STIFF_N * LARGEST**2 * (math.log(1 - x) + x))
+        assert energy.elastic[step] == pytest.approx(stored, rel=1e-6, abs=1e-12)
+        assert energy.external[step] == pytest.approx(stored, rel=1e-6, abs=1e-9)
+        assert abs(energy.dissipated[step]) <= 1e-9 and energy.released[step] == 0
+
+
+def test_a_joint_that_has_closed_slides_by_the_closed_formula(tmp_path: Path) -> None:
+    stresses = [2.0, 30.0, 6.0]
+    results = run(write(1.0, 1.0, "SST", CLOSURE, make_stages(stresses, 1.0, 1.0, 0.1)), tmp_path)
+    contact = results.contact["mid"]
+    for step, stress in enumerate([2.0, *stresses]):
+        np.testing.assert_allclose(contact.opening[step], -stress / (STIFF_N + stress / LARGEST), rtol=1e-6)
+        np.testing.assert_allclose(np.abs(contact.traction_s[step]), find_shear(stress) if step else 0, rtol=1e-6,
+                                   atol=1e-9)

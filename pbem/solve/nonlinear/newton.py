@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Real
+from pbem.contact.closure import choose_traction
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
@@ -207,7 +208,8 @@ def _search_modes(
             lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
-        normal_traction, found = pairs.p_n, plastic_slip(laws, pairs)
+        normal_traction = choose_traction(laws, former, normal_traction, pairs)
+        found = plastic_slip(laws, pairs)
         if search.wary and frozen == "slip" and not proposal.changed.any():
             found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]
                 now.fingerprint(), at, new, now.mode == SLIP))

@@ -8,6 +8,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.arrangement import begin_memory, find_arrangement
+from pbem.contact.closure import find_closure
 from pbem.contact.laws import Memory, start_memory
 from pbem.contact.loads import evaluate_load
 from pbem.model.construction import arrange_model
@@ -47,7 +48,7 @@ def arrange_problem(problem: Problem, stage: int, factor: float, contact: Contac
 
 def find_rest(problem: Problem, contact: ContactState) -> Real:
     """The openings (m,) without those of elastic joints."""
-    rest: Real = contact.opening - problem.laws.compliance_n * contact.traction_n
+    rest: Real = contact.opening - find_closure(problem.laws, contact.traction_n)[0]
     return rest
 
 

@@ -15,25 +15,29 @@ from pbem.contact.laws import OPEN, STICK, ModeState, PairLaws, PairState
 SMALL = 1e-4
 
 
-def find_closure(laws: PairLaws, p_n: Real) -> tuple[Real, Real]:
+def find_closure(laws: PairLaws, p_n: Real, pressure: Real) -> tuple[Real, Real]:
     """What joints add to the opening (m,), negative under compression, and its derivative by p_n (theory, 112).
 
-    Under tension joints are linear, with their initial stiffness.
+    Joints that stiffen bear what the fluid inside leaves to them. Under tension they are linear, with their initial
+    stiffness.
     """
-    less = 1.0 + laws.compliance_n * laws.stiffening * np.maximum(-p_n, 0.0)
-    return laws.compliance_n * p_n / less, laws.compliance_n / less**2
+    borne = p_n + _relieve(laws, pressure)
+    less = 1.0 + laws.compliance_n * laws.stiffening * np.maximum(-borne, 0.0)
+    return laws.compliance_n * borne / less, laws.compliance_n / less**2
 
 
-def measure_stiffening(laws: PairLaws, p_n: Real) -> Real:
-    """What joints store beyond half the traction times the closure (m,), <= 0, energy per area (theory, 113)."""
+def measure_stiffening(laws: PairLaws, p_n: Real, pressure: Real) -> Real:
+    """What joints store beyond half of p_n times what they add to the opening (m,), energy per area (theory, 113)."""
     stiff = (laws.stiffening > 0) & (laws.compliance_n > 0)
-    ratio = np.where(stiff, laws.compliance_n * laws.stiffening * np.maximum(-p_n, 0.0), 0.0)
+    relief = np.where(stiff, _relieve(laws, pressure), 0.0)
+    ratio = np.where(stiff, laws.compliance_n * laws.stiffening * np.maximum(-p_n - relief, 0.0), 0.0)
     exact = np.log1p(ratio) - ratio * (1 + 0.5 * ratio) / (1 + ratio)
     unit = np.where(stiff, laws.compliance_n * laws.stiffening**2, 1.0)
-    return np.asarray(np.where(ratio < SMALL, -(ratio**3) * (1 / 6 - ratio / 4), exact) / unit)
+    beyond = np.where(ratio < SMALL, -(ratio**3) * (1 / 6 - ratio / 4), exact) / unit
+    return np.asarray(beyond + 0.5 * relief * find_closure(laws, p_n, pressure)[0])
 
 
-def find_pressed(laws: PairLaws, modes: ModeState, state: PairState) -> Real:
+def find_pressed(laws: PairLaws, modes: ModeState, state: PairState, pressure: Real) -> Real:
     """Normal tractions (m,) of closed joints that stiffen by their openings; of others, and of those that are not
     closed or closed beyond the largest closure, the tractions of the state.
 
@@ -44,21 +48,27 @@ def find_pressed(laws: PairLaws, modes: ModeState, state: PairState) -> Real:
     part = closed * laws.stiffening
     follows = (laws.stiffening > 0) & (laws.compliance_n > 0) & (modes.mode != OPEN) & (part > 0) & (part < 1)
     divisor = np.where(follows, laws.compliance_n * (1 - part), 1.0)
-    return np.where(follows, -closed / divisor, state.p_n)
+    return np.where(follows, -closed / divisor - _relieve(laws, pressure), state.p_n)
 
 
-def choose_traction(laws: PairLaws, modes: ModeState, before: Real, state: PairState) -> Real:
+def choose_traction(laws: PairLaws, modes: ModeState, before: Real, state: PairState, pressure: Real) -> Real:
     """Normal tractions (m,) at which the laws are taken next, after `before`: those of the solution in these modes, or
-    those by the openings where joints that stiffen are relieved. From either side Newton's steps stay on theirs (theory, 114).
+    those by the openings where joints that stiffen are relieved. From either side Newton's steps stay on theirs
+    (theory, 114).
     """
     if not laws.stiffening.any():
         return state.p_n
-    return np.where(state.p_n > before, find_pressed(laws, modes, state), state.p_n)
+    return np.where(state.p_n > before, find_pressed(laws, modes, state, pressure), state.p_n)
 
 
-def measure_closure_error(laws: PairLaws, modes: ModeState, state: PairState) -> Real:
+def measure_closure_error(laws: PairLaws, modes: ModeState, state: PairState, pressure: Real) -> Real:
     """Distance (m,) of closed joints that stiffen from their law, stress."""
-    value, slope = find_closure(laws, state.p_n)
+    value, slope = find_closure(laws, state.p_n, pressure)
     off = np.abs(state.g_n - np.where(modes.mode == STICK, laws.rest, 0.0) - value)
     counts = (laws.stiffening > 0) & (slope > 0) & (modes.mode != OPEN) & ~laws.follows
     return np.where(counts, off / np.where(counts, slope, 1.0), 0.0)
+
+
+def _relieve(laws: PairLaws, pressure: Real) -> Real:
+    """The pressure (m,) of the fluid inside of joints that stiffen."""
+    return np.where((laws.stiffening > 0) & laws.fluid_inside, pressure, 0.0)

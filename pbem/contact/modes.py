@@ -82,7 +82,7 @@ def linearise(
     tangent[stick, G_S, 1] = (laws.compliance_s * traction_scale)[stick]
     # Rounding must not put a pair without cohesion beyond the apex of its cone, where friction has no slope.
     admissible = np.minimum(p_n, tensile_limit(laws, memory) - pressure)
-    joint, by_joint = find_closure(laws, admissible)
+    joint, by_joint = find_closure(laws, admissible, pressure)
     tangent[closed, G_N, 0] = (by_joint * traction_scale)[closed]
     offset[closed, G_N] = np.where(laws.stiffening > 0, joint - by_joint * admissible, 0.0)[closed]
     offset[stick, G_S] = memory.slip[stick]
@@ -185,7 +185,7 @@ def measure_law_error(
         inside = (np.minimum(low, high) <= state.p_s) & (state.p_s <= np.maximum(low, high))
         error = np.where(creeps, np.where(inside, 0.0, np.abs(state.p_s - middle)), error)
     worst = max(float(error[slips].max(initial=0.0)), measure_bond_error(laws, modes, state, memory, pressure),
-                float(measure_closure_error(laws, modes, state).max(initial=0.0)))
+                float(measure_closure_error(laws, modes, state, pressure).max(initial=0.0)))
     return worst / scale if scale > 0 else 0.0
 
 
@@ -267,8 +267,8 @@ def update_active_set(
     is_open = modes.mode == OPEN
     slip = plastic_slip(laws, state)
     creeps = find_creeping(laws)
-    apart = state.g_n - find_closure(laws, state.p_n)[0]
-    pressed = np.where(state.p_n + pressure > 0, find_pressed(laws, modes, state), state.p_n)
+    apart = state.g_n - find_closure(laws, state.p_n, pressure)[0]
+    pressed = np.where(state.p_n + pressure > 0, find_pressed(laws, modes, state, pressure), state.p_n)
     normal = pressed + stiffness * np.where(is_open, apart, 0.0)
     still = (modes.mode == STICK) | (creeps & ~is_open)
     tangential = state.p_s + stiffness * np.where(still, 0.0, slip - memory.slip)

@@ -56,7 +56,7 @@ class BetweenNodes:
             p_n, p_s, path = (
                 self._read(each, plain) for each in (contact.traction_n, contact.traction_s, contact.slip_path)
             )
-            penetration = np.maximum(penetration, find_closure(laws, p_n)[0] - opening)
+            penetration = np.maximum(penetration, find_closure(laws, p_n, pressure)[0] - opening)
             tension = np.maximum(tension, p_n + pressure - limit)
             admissible = np.minimum(p_n, limit - pressure)
             slide = Slide(np.zeros(count), {**contact.internal, SLIP_PATH.name: np.maximum(path, 0.0)})

@@ -22,8 +22,8 @@ from pbem.solve.problem.step import ContactState
 class PairRecord:
     """The pairs (m,) at one time: mode; traction on the first side p_n, p_s; jump g_n, g_s, and what of it the elastic
     joints do not take, rigid_n and rigid_s; fluid pressure; the internal variables of the laws, by their names; bond:
-    what bonds that soften would give back in unloading, or joints that stiffen less than half the traction times the
-    closure, energy per area."""
+    what bonds that soften would give back in unloading, and joints that stiffen beyond half the traction times
+    what they add to the opening, energy per area."""
 
     mode: NDArray[np.int8]
     p_n: Real
@@ -76,8 +76,8 @@ def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairR
 def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairRecord:
     """After a step, with its fluid pressure (m,)."""
     p_n, p_s = contact.traction_n, contact.traction_s
-    rigid_n, rigid_s = contact.opening - find_closure(laws, p_n)[0], contact.slip - laws.compliance_s * p_s
-    bond = measure_stiffening(laws, p_n)
+    rigid_n, rigid_s = contact.opening - find_closure(laws, p_n, pressure)[0], contact.slip - laws.compliance_s * p_s
+    bond = measure_stiffening(laws, p_n, pressure)
     for group in laws.strengths:
         if isinstance(group.law, Cohesive):
             at = group.pairs

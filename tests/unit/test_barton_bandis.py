@@ -81,18 +81,19 @@ def test_a_joint_closes_along_a_hyperbola() -> None:
     """K = 50, V = 0.2: half of V is taken by sigma = K V = 10; the tangent, and energy as the integral over v."""
     laws = make_closing()
     some = -np.geomspace(1e-5, 1e4, laws.count)
-    opening, slope = find_closure(laws, some)
+    none = np.zeros(laws.count)
+    opening, slope = find_closure(laws, some, none)
     np.testing.assert_allclose(50 * -opening / (1 + opening / 0.2), -some, rtol=1e-9)
     step = 1e-6 * some
-    by_difference = (find_closure(laws, some + step)[0] - find_closure(laws, some - step)[0]) / (2 * step)
+    by_difference = (find_closure(laws, some + step, none)[0] - find_closure(laws, some - step, none)[0]) / (2 * step)
     np.testing.assert_allclose(slope, by_difference, rtol=1e-6)
-    np.testing.assert_allclose(find_closure(laws, 0 * some - 10)[0], -0.1)
-    np.testing.assert_allclose(find_closure(laws, 0 * some + 10)[0], 0.2)  # linear under tension
+    np.testing.assert_allclose(find_closure(laws, none - 10, none)[0], -0.1)
+    np.testing.assert_allclose(find_closure(laws, none + 10, none)[0], 0.2)  # linear under tension
     x = -opening / 0.2
     points, weights = np.polynomial.legendre.leggauss(60)
     v = 0.1 * x[:, None] * (points + 1)
     integral = (50 * v / (1 - v / 0.2)) @ weights * 0.1 * x
-    stored = 0.5 * some * opening + measure_stiffening(laws, some)
+    stored = 0.5 * some * opening + measure_stiffening(laws, some, none)
     gentle = x < 0.95
     np.testing.assert_allclose(stored[gentle], integral[gentle], rtol=1e-11)
     np.testing.assert_allclose(stored, -50 * 0.2**2 * (np.log1p(-x) + x), rtol=1e-5)
@@ -103,20 +104,20 @@ def test_states_of_joints_that_close() -> None:
     """The traction by the opening is the inverse; the error is in traction; relieved joints are followed by it."""
     laws = make_closing()
     some = -np.geomspace(1e-3, 1e3, laws.count)
-    opening, slope = find_closure(laws, some)
+    opening, slope = find_closure(laws, some, np.zeros(laws.count))
     modes = ModeState(np.full(laws.count, SLIP), np.ones(laws.count))
     zeros = np.zeros(laws.count)
     state = PairState(some, zeros, opening, zeros)
-    assert measure_closure_error(laws, modes, state).max() < 1e-9
+    assert measure_closure_error(laws, modes, state, zeros).max() < 1e-9
     off = PairState(some, zeros, opening + 0.01 * slope, zeros)
-    np.testing.assert_allclose(measure_closure_error(laws, modes, off), 0.01, rtol=1e-6)
+    np.testing.assert_allclose(measure_closure_error(laws, modes, off, zeros), 0.01, rtol=1e-6)
     pulling = PairState(zeros + 3.0, zeros, opening, zeros)
-    np.testing.assert_allclose(find_pressed(laws, modes, pulling), some, rtol=1e-9)
-    np.testing.assert_allclose(choose_traction(laws, modes, some, pulling), some, rtol=1e-9)
+    np.testing.assert_allclose(find_pressed(laws, modes, pulling, zeros), some, rtol=1e-9)
+    np.testing.assert_allclose(choose_traction(laws, modes, some, pulling, zeros), some, rtol=1e-9)
     pressed = PairState(2 * some, zeros, opening, zeros)
-    np.testing.assert_array_equal(choose_traction(laws, modes, some, pressed), 2 * some)
+    np.testing.assert_array_equal(choose_traction(laws, modes, some, pressed, zeros), 2 * some)
     stuck = ModeState(np.full(laws.count, STICK), np.ones(laws.count))
-    np.testing.assert_array_equal(find_pressed(laws, stuck, PairState(some, zeros, zeros + 0.1, zeros)), some)
+    np.testing.assert_array_equal(find_pressed(laws, stuck, PairState(some, zeros, zeros + 0.1, zeros), zeros), some)
 
 
 WRONG = {

@@ -148,3 +148,23 @@ def test_a_joint_that_has_closed_slides_by_the_closed_formula(tmp_path: Path) ->
         np.testing.assert_allclose(contact.opening[step], -stress / (STIFF_N + stress / LARGEST), rtol=1e-6)
         np.testing.assert_allclose(np.abs(contact.traction_s[step]), find_shear(stress) if step else 0, rtol=1e-6,
                                    atol=1e-9)
+
+
+def test_fluid_inside_opens_a_joint_by_the_effective_stress(tmp_path: Path) -> None:
+    """The pressure rises to 15 MPa under 20 MPa, then the load to 40 MPa; what is stored is of the effective stress."""
+    text = "".join(f"""[[stages]]
+name = "{number}"
+steps = {steps}
+boundary.top = {{ ty = {-stress} }}
+interfaces.mid = {{ pressure = {pressure} }}
+""" for number, (steps, stress, pressure) in enumerate([(1, 20.0, 0.0), (3, 20.0, 15.0), (1, 40.0, 15.0)]))
+    results = run(write(1.0, 1.0, "SST", CLOSURE + 'pressurised = "all"\n', text), tmp_path)
+    contact, energy = results.contact["mid"], results.energy
+    for step, (stress, pressure) in enumerate([(20, 0), (20, 5), (20, 10), (20, 15), (40, 15)]):
+        closed = (stress - pressure) / (STIFF_N + (stress - pressure) / LARGEST)
+        np.testing.assert_allclose(contact.traction_n[step], -stress, rtol=1e-6)
+        np.testing.assert_allclose(contact.opening[step], -closed, rtol=1e-6)
+        x = closed / LARGEST
+        stored = 1.5 * (2 * stress**2 / (2 * YOUNG) - STIFF_N * LARGEST**2 * (math.log(1 - x) + x))
+        assert energy.elastic[step] == pytest.approx(stored, rel=1e-6)
+        assert energy.external[step] == pytest.approx(stored, rel=1e-6)

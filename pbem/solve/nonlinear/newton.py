@@ -208,7 +208,7 @@ def _search_modes(
             lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
-        normal_traction = choose_traction(laws, former, normal_traction, pairs)
+        normal_traction = choose_traction(laws, former, normal_traction, pairs, load.pressure)
         found = plastic_slip(laws, pairs)
         if search.wary and frozen == "slip" and not proposal.changed.any():
             found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]

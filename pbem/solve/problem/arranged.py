@@ -40,15 +40,15 @@ def arrange_problem(problem: Problem, stage: int, factor: float, contact: Contac
     borne = np.stack([contact.traction_n + pressure, contact.traction_s], axis=1)
     opens = arrangement.opening & ~problem.laws.parted & ~problem.laws.follows & (factor < 1)
     carried = np.where(opens[:, None], borne, 0.0) / (1 - factor if factor < 1 else 1.0)
-    laws = arrangement.hold(problem.laws, find_rest(problem, contact))
+    laws = arrangement.hold(problem.laws, find_rest(problem, contact, pressure))
     return replace(
         problem, model=arrange_model(problem.model, stage), laws=laws, arrangement=arrangement, carried=carried
     )
 
 
-def find_rest(problem: Problem, contact: ContactState) -> Real:
-    """The openings (m,) without those of elastic joints."""
-    rest: Real = contact.opening - find_closure(problem.laws, contact.traction_n)[0]
+def find_rest(problem: Problem, contact: ContactState, pressure: Real) -> Real:
+    """The openings (m,) without those of elastic joints, under a pressure of fluid (m,)."""
+    rest: Real = contact.opening - find_closure(problem.laws, contact.traction_n, pressure)[0]
     return rest
 
 
@@ -60,7 +60,8 @@ def begin_stage(problem: Problem, stage: int, memory: Memory, contact: ContactSt
     )
     if before is None and now is None:
         return memory
-    return begin_memory(before, now, problem.laws, memory, find_rest(problem, contact))
+    pressure = evaluate_load(problem.model, problem.mesh, problem.outer, stage, 0.0).pressure
+    return begin_memory(before, now, problem.laws, memory, find_rest(problem, contact, pressure))
 
 
 class Arranged:

@@ -139,9 +139,7 @@ class EnergyBalance:
             self._refer(number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
             for number, each in enumerate(model.regions) if each.infinite
         ]  # fmt: skip
-        tools = np.array([each.rigid for each in model.regions])[self._faces.region]
-        self._tools = np.where(tools, self._weight, 0.0)
-        self._elastic = self._weight - self._tools
+        self._is_tool = np.array([each.rigid for each in model.regions])[self._faces.region]
         self._in_situ = self._sample_in_situ()
         self._reached = reached or Energy(0.0, 0.0, 0.0)
         self.runaway: Runaway | None = None
@@ -225,6 +223,16 @@ class EnergyBalance:
     def _add_stored(self, state: _State) -> float:
         """All that is stored: in the regions, in springs and in elastic joints."""
         return state.stored + state.springs + measure_stored(self._pair_weight, state.pairs)
+
+    @property
+    def _tools(self) -> Real:
+        """The weights of rigid tools alone."""
+        return np.where(self._is_tool, self._weight, 0.0)
+
+    @property
+    def _elastic(self) -> Real:
+        """The weights of what is elastic."""
+        return np.where(self._is_tool, 0.0, self._weight)
 
     def _arrange(self, stage: int) -> None:
         """From now on sums are those of what is there in a stage."""

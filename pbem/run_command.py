@@ -122,7 +122,7 @@ def _describe_end(error: BaseException, target: Path) -> tuple[str, int]:
 
 def _describe_rest(target: Path) -> str:
     """What is left of it."""
-    return f"if {target} was begun, it holds every step before, and --resume goes on after them"
+    return f"if {target} was begun, it holds every step before, and --resume goes on from there"
 
 
 def load_driver() -> Callable[..., Results]:

@@ -29,7 +29,8 @@ def evaluate(angle, b: float):
 
 
 EXPECTED = {"largest error over the largest pressure": (0.0, 1e-2), "force on the pin": (-FORCE, 1e-9)}
-PICTURES = [("the stress under the pin", ["plot", "--field", "mises", "--box", "-20", "-25", "20", "15"])]
+PICTURES = [("the stress under the pin", ["plot", "--field", "mises", "--box", "-20", "-25", "20", "15"]),
+            ("the pressure along the seat", ["plot", "--curve", "seat", "--field", "traction_n"])]
 
 
 def compute(results) -> dict[str, float]:

@@ -58,7 +58,17 @@ class Arrangement:
         return replace(
             load, values=np.where(self.outer[:, None], 0.0, load.values), known=np.where(components, 0.0, load.known),
             far=np.where(gone, 0.0, load.far), background=np.where(gone, 0.0, load.background), carried=carried,
+            rigid=_free_what_is_gone(load.rigid, outer, gone),
         )
+
+
+def _free_what_is_gone(given: Real, outer: OuterNodes, gone: Bool) -> Real:
+    """Forces and motions (b, 3) of rigid bodies, none of those that are gone."""
+    given = given.copy()
+    for body in outer.rigid:
+        if gone[body.nodes].all():
+            given[body.number] = 0.0
+    return given
 
 
 def find_arrangement(model: Model, mesh: Mesh, outer: OuterNodes, stage: int) -> Arrangement | None:

@@ -81,7 +81,8 @@ def _choose_row(table: Real, basis: Integer, entering: int, scale: float) -> int
         return None
     ratios = values[rows] / column[rows]
     least = float(ratios.min())
-    tied = rows[values[rows] - least * column[rows] <= ROUNDING * scale]
+    # Entries of the table may have grown far beyond those that it began with.
+    tied = rows[values[rows] - least * column[rows] <= ROUNDING * np.maximum(scale, values[rows])]
     last = tied[basis[tied] == artificial]
     return int(last[0]) if len(last) else int(tied[np.argmax(column[tied])])
 

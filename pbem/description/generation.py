@@ -173,7 +173,9 @@ def _spread_groups(stage: StageTable, groups: tuple[GeneratedGroup, ...]) -> Sta
     if members.keys() & set(list_named(stage)):
         stage = stage.model_copy(update=spread_named(stage, members))
     inclusions = tuple(group for group in groups if group.kind == "inclusions")
+    grains = {group.name: group.members for group in inclusions}
     return stage.model_copy(update={
+        "remove": tuple(each for name in stage.remove for each in grains.get(name, (name,))),
         "interfaces": _spread(stage.interfaces, groups), "temperature": _spread(stage.temperature, inclusions),
         "eigenstrain": _spread(stage.eigenstrain, inclusions),
     })

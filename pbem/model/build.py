@@ -119,7 +119,8 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     case, roles = cut.case, cut.roles
     loading = read_loading(case, roles)
     overlaps = [(name, table.between, table.overlap) for name, table in case.contacts.items()]
-    pointed = (case.point_loads, case.point_supports, case.tools, list_held(loading.conditions), overlaps)
+    in_stages = [stage.point_loads for stage in case.stages]
+    pointed = (case.point_loads, in_stages, case.point_supports, case.tools, list_held(loading.conditions), overlaps)
     drawn = (*shown, cut.notes, cut.faults, case.curves, pointed)
     topology = recall.find("topology", drawn, lambda: _find_topology(cut, loading))
     interior, wrong = list_interior_points(case)

@@ -36,9 +36,25 @@ def check_loads(case: Case, model: Model) -> list[Fault]:
         times = [model.find_time(stage, fraction) for stage in stages
                  for fraction in (*FRACTIONS, *_list_steps(model.stages[stage].steps))]
         faults += _check_value(loc, value, model.curves[curve], times if value.timed else times[-1:])
+    faults += _check_rigid(model)
     return faults + [fault for name, condition in model.conditions.items()
                      for key, value in zip(("kn", "ks"), condition.stiffness, strict=True) if isinstance(value, Varying)
                      for fault in _check_spring(("boundary", name, "spring", key), value, model.curves[name])]
+
+
+def _check_rigid(model: Model) -> Iterator[Fault]:
+    """Forces and motions of rigid bodies by expressions of the time have values."""
+    nowhere = Places(np.zeros(1, dtype=complex), np.zeros(1))
+    for name, body in model.rigid.items():
+        loc: KeyPath = ("tools", name) if body.tool else ("boundary", name, "rigid")
+        for number, stage in enumerate(model.stages):
+            times = [model.find_time(number, each) for each in (*FRACTIONS, *_list_steps(stage.steps))]
+            wrong = [time for time in times for value in stage.rigid[name]
+                     if isinstance(value, Varying) and not np.isfinite(value.evaluate(nowhere, time)).all()]
+            if wrong:
+                yield Fault.at(loc, f"a force or motion without a finite value at the time {wrong[0]:.6g}",
+                               "finite values at all times")
+                break
 
 
 def _check_spring(loc: KeyPath, value: Varying, curve: Curve) -> Iterator[Fault]:

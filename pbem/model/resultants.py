@@ -106,7 +106,8 @@ def _sum_tractions(
         force += push
         moment += turn + float((np.conj(about) * push).imag)
         power += float(sum(drive))
-        scale += abs(drive[0]) + abs(drive[1])
+        # Without what cancels: a force through the centre of a rotation has a power that is rounding.
+        scale += abs(push) * (abs(a) + abs(spin) * (abs(about) + model.size)) + abs(drive[1])
     for region in moving:
         a, spin = motion.velocities[region.name]
         for load in model.point_loads_by_region.get(region.name, ()):

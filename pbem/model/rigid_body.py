@@ -182,6 +182,31 @@ def _check_curves(
                 yield Fault.at(loc, f"curve '{name}', which has conditions of its own",
                                "a curve that no other table [boundary.CURVE] is for, once")
             taken[name] = body.name
+        yield from _check_regions(case, roles, body)
+    yield from _check_stages(case, {**taken, **dict.fromkeys(spreads, "")})
+
+
+def _check_regions(case: Case, roles: Roles, body: RigidBody) -> Iterator[Fault]:
+    """A rigid body that joins regions is not taken apart."""
+    regions = dict.fromkeys(roles.outer[name] for name in body.curves if name in roles.outer)
+    for number, stage in enumerate(case.stages if len(regions) > 1 else ()):
+        for name in regions:
+            if name in stage.remove:
+                yield Fault.at(("stages", number, "remove"), f"region '{name}', whose curves are in the rigid body of "
+                               f"'{body.name}' with those of others", "regions that share no rigid body with others")
+
+
+def _check_stages(case: Case, taken: Mapping[str, str]) -> Iterator[Fault]:
+    """Stages say nothing else of curves that are rigid or have a resultant."""
+    for number, stage in enumerate(case.stages):
+        for name, table in stage.boundary.items():
+            others = [key for key in type(table).model_fields if key not in ("rigid", "force")
+                      and getattr(table, key) is not None]
+            owner = taken.get(name, name)
+            if name in taken and others:
+                yield Fault.at(("stages", number, "boundary", name, others[0]), f"'{others[0]}' on a curve "
+                               + ("whose traction has a given resultant" if not owner else f"of the rigid body of "
+                                  f"'{owner}'"), "rigid or force, as in the curve's own table, or nothing")
 
 
 def find_reference(body: RigidBody | Spread, curves: Mapping[str, Curve], origin: complex) -> complex:

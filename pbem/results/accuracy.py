@@ -108,7 +108,8 @@ def decide(
     over = ", ".join(f"{name} {error:.1e}" for name, error in reached.errors.items() if not error * SAFETY <= accuracy)
     failure = ""
     if np.isnan(reached.worst):
-        failure = f"errors cannot be estimated ({estimator.missing}): whether {accuracy:g} is reached is not known"
+        why = estimator.missing or "those of some quantities, as faces in contact meet nowhere on the coarser mesh"
+        failure = f"errors cannot be estimated ({why}): whether {accuracy:g} is reached is not known"
     elif one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns:
         limit = f"{one.number} passes" if one.number >= MOST_PASSES else f"{MOST_GROWTH:g} times the first unknowns"
         failure = (

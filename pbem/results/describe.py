@@ -179,7 +179,9 @@ def _measure_stiffness(results: Results) -> float:
     """The work of strains of the size of the displacements: the largest modulus times the largest of them, squared."""
     stored = json.loads(results.configuration) if results.configuration else {}
     modulus = max((region["material"]["young"] for region in stored.get("regions", ())), default=0.0)
-    return float(modulus * np.abs(results.displacement_at(-1)).max(initial=0.0) ** 2)
+    # What is gone by then has moved before.
+    largest = max(np.nan_to_num(np.abs(results.displacement_at(k))).max(initial=0.0) for k in range(len(results.steps)))
+    return float(modulus * largest**2)
 
 
 def _describe_runaways(results: Results) -> list[str]:

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.laws import collect_laws
@@ -285,6 +285,8 @@ class EnergyBalance:
             moved = measure_point_motions(
                 self._model, self._mesh, self._faces, self._weight, (displacement, traction), backgrounds
             )
+            acting = np.repeat(self._find_acting_points(), 3)
+            point_forces, moved = np.where(acting, point_forces, 0.0), np.where(acting, moved, 0.0)
             loads.append(point_forces)
             conjugates.append(moved)
         stored = 0.5 * _dot(self._elastic, traction + self._in_situ, displacement)
@@ -316,6 +318,12 @@ class EnergyBalance:
             traction, displacement + swollen, swollen, np.concatenate(loads), np.concatenate(conjugates), stored,
             springs, pairs,
         )
+
+    def _find_acting_points(self) -> Bool:
+        """Which point loads (c,) act on regions that are there."""
+        gone = {name for name, is_gone in zip(self._mesh.region_names, self._there.regions, strict=True) if is_gone} \
+            if self._there is not None else set()
+        return np.array([load.region not in gone for load in self._model.point_loads.values()])
 
     def _measure_springs(self, displacement: Complex, stage: int, factor: float) -> float:
         outer = self._outer

@@ -4,7 +4,8 @@
 #     bash scripts/tasks/batch.sh CASE.toml [FOLDER] [RANKS]
 set -euo pipefail
 
-case=$1 folder=${2:-.} ranks=${3:-1}
+case=${1:?"usage: bash scripts/tasks/batch.sh CASE.toml [FOLDER] [RANKS]"} folder=${2:-.} ranks=${3:-1}
+mkdir -p "$folder"
 pbem=${PBEM:-pbem}
 name=$(basename "$case" .toml)
 results=$folder/$name.h5

@@ -57,7 +57,7 @@ from pbem.parallel import world
 how, number, *arguments = sys.argv[1:]
 whole = solving.describe_step
 
-def stop(problem, solution, memory, step, stage, factor):
+def stop(problem, solution, memory, step, stage, factor, *more):
     if step == int(number):
         world.Barrier()
         if how == "kill":
@@ -65,7 +65,7 @@ def stop(problem, solution, memory, step, stage, factor):
         if how == "fail":
             raise ConvergenceError("mode cycle", "made up")
         os.kill(os.getpid(), signal.SIGINT)
-    return whole(problem, solution, memory, step, stage, factor)
+    return whole(problem, solution, memory, step, stage, factor, *more)
 
 solving.describe_step = stop
 sys.exit(main(arguments))

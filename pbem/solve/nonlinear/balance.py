@@ -223,9 +223,9 @@ def _measure_whole(
     outer[problem.outer.node] = True
     if problem.arrangement is not None:
         outer[problem.arrangement.bare] = True  # what a region that is gone still carries, or fluid in its place
-    # Tools act by what their contacts carry.
+    # Tools act by what their contacts carry: on bodies that are gone, by nothing.
     tools = np.array([region.rigid for region in problem.model.regions])[of]
-    acting = outer[faces.node] | tools
+    acting = outer[faces.node] != tools
     seen = replace(
         faces, traction=np.where(acting, np.where(tools, -1.0, 1.0) * faces.traction, 0.0),
         weight=np.where(acting | (faces.bounding & (faces.known != 0)), faces.weight, 0.0),

@@ -34,6 +34,8 @@ Single = NDArray[np.float32]
 # Unknowns that are left in the matrix of a group and the nearest elements around it, at most, of cracks and of bodies;
 # or so many times those of the group alone.
 MOST_LEFT, MOST_LEFT_OF_BODIES, MOST_TIMES = 900, 1700, 2.0
+# Models with so many unknowns keep the inverses of groups in single precision.
+SINGLE = 20_000
 
 
 @dataclass
@@ -41,8 +43,7 @@ class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
 
     inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
-    eliminated within a node, of some of the own unknowns, on turned equations, in single precision unless the group is
-    the whole model; None where there is none.
+    eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
     formed: whether it has been tried; drift: by how much the constraint map has changed in what it sees since then.
     """
 
@@ -197,10 +198,9 @@ class SchwarzPreconditioner:
         inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
         if not zero_pivot:
             matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
-            # Of a part of the model the inverse is not that of the whole, and needs no more digits than these: all
-            # groups together are much of what is stored.
+            # All groups together are much of what is stored: of large models in single precision.
             stored: Real | Single = np.ascontiguousarray(matrix)
-            if len(around) < 2 * self._mesh.nodes:
+            if len(around) < 2 * self._mesh.nodes >= SINGLE:
                 with np.errstate(over="ignore"):
                     stored = stored.astype(np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None

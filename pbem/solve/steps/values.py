@@ -10,7 +10,8 @@ from pbem.solve.problem.problem import Problem
 
 
 def refuse_without_value(problem: Problem, stage: int, reached: float, target: float) -> None:
-    """Raise ConvergenceError ("no value") if a condition or pressure has no finite value at a fraction of a stage.
+    """Raise ConvergenceError ("no value") if a condition, a pressure, or what is given of a rigid body has no finite
+    value at a fraction of a stage.
 
     A case is checked at the planned ends of its steps; smaller steps come to other times.
     """
@@ -18,6 +19,15 @@ def refuse_without_value(problem: Problem, stage: int, reached: float, target: f
     if not model.timed:
         return
     load = problem.evaluate_load(stage, target)
+    rigid = np.isfinite(load.rigid).all(axis=1)
+    if not rigid.all():
+        name = list(model.rigid)[int(np.argmin(rigid))]
+        raise ConvergenceError(
+            "no value",
+            f"stage '{model.stages[stage].name}' stopped at the fraction {reached:.6g}: a force or motion of the rigid "
+            f"body of '{name}' has no finite value at the time {model.find_time(stage, target):.6g}; give expressions "
+            "that have one at all times",
+        )
     outer, pairs = np.isfinite(load.values).all(axis=1), np.isfinite(load.pressure)
     if outer.all() and pairs.all():
         return

@@ -120,8 +120,8 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     loading = read_loading(case, roles)
     overlaps = [(name, table.between, table.overlap) for name, table in case.contacts.items()]
     in_stages = [stage.point_loads for stage in case.stages]
-    pointed = (case.point_loads, in_stages, case.point_supports, case.tools, list_held(loading.conditions), overlaps)
-    drawn = (*shown, cut.notes, cut.faults, case.curves, pointed)
+    pointed = (case.point_loads, in_stages, case.point_supports, list_held(loading.conditions))
+    drawn = (*shown, cut.notes, cut.faults, case.curves, pointed, case.tools, overlaps)
     topology = recall.find("topology", drawn, lambda: _find_topology(cut, loading))
     interior, wrong = list_interior_points(case)
     faults = [*roles.faults, *check_tools(case, roles), *topology.faults, *loading.faults, *wrong]
@@ -210,9 +210,8 @@ def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
     return replace(loading, stages=tuple(stages))
 
 
-def _compose(
-    case: Case, roles: Roles, loading: Loading, topology: _Topology, recall: Recall
-) -> tuple[Model, list[Fault]]:
+def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, recall: Recall
+             ) -> tuple[Model, list[Fault]]:
     loading = _spread_forces(loading, topology.curves)
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.

@@ -102,11 +102,11 @@ class StopError(PbemError):
     search for the contact statuses was (`pbem.solve.problem.step.Unfinished`), once those who know have said it.
     """
 
-    def __init__(self, reason: str, detail: str, code: int = 1) -> None:
+    def __init__(self, reason: str, detail: str, code: int = 1, unfinished: Any = None) -> None:
         self.reason = reason
         self.detail = detail
         self.code = code
-        self.unfinished: Any = None
+        self.unfinished = unfinished
         super().__init__(f"{reason}: {detail}")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from pbem.arrays import Real
 from pbem.results.body_plot import draw_body
 from pbem.results.curve_plot import LINE_STYLES, draw_profile, finish_axes
-from pbem.results.curve_profile import check_abscissa, read_profile
+from pbem.results.curve_profile import Profile, check_abscissa, read_profile
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
 from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, widen_box, write_around
@@ -25,6 +25,8 @@ from pbem.results.trace_names import find_names
 __all__ = ["BodyOptions", "BodyPicture", "draw_results", "plot_model", "plot_results"]
 
 MOST_PANELS = 4
+# Tractions and jumps that are less than this part of the largest traction or displacement are drawn as zero.
+ROUNDED = 1e-9
 # The panels of an interface: the quantities, each with what the legend calls its line.
 PANELS = (("traction", ("traction_n", "traction_s")), ("opening, slip", ("opening", "slip")))
 LINES = ("normal traction $t_n$; opening", "shear traction $t_s$; slip")
@@ -90,8 +92,12 @@ class BodyPicture:
         self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
         places = [results.nodes.position, *(results.nodes.position + self._magnify * each for each in moved)]
         self._frame = widen_box(self._box, places, 0.04)
+        # What is this small beside all that moves, or is borne, is rounding.
+        least = {True: ROUNDED * float(np.abs(largest).max(initial=0.0)), False: ROUNDED * max((
+            float(np.nan_to_num(np.abs(results.traction[at])).max(initial=0.0)) for at in self._steps), default=0.0)}
         self._profiles = {
-            (name, quantity, at): read_profile(results, name, quantity, at, options.abscissa)
+            (name, quantity, at): _leave_out_rounding(
+                read_profile(results, name, quantity, at, options.abscissa), least[quantity in ("opening", "slip")])
             for name in self._names for _, quantities in PANELS for quantity in quantities for at in self._steps
         }
 
@@ -146,6 +152,12 @@ class BodyPicture:
                 "(--curve NAME draws others)")
 
 
+def _leave_out_rounding(profile: Profile, least: float) -> Profile:
+    """The profile with zeros for what is smaller than this."""
+    values, line = (np.where(np.abs(each) < least, 0.0, each) for each in (profile.values, profile.line_values))
+    return replace(profile, values=values, line_values=line)
+
+
 def choose_interfaces(results: Results, steps: Iterable[int]) -> list[str]:
     """The interfaces where most slips and opens along their length in the steps, else the longest, bonded ones last; in
     the order of the file."""
@@ -156,11 +168,14 @@ def choose_interfaces(results: Results, steps: Iterable[int]) -> list[str]:
     begins = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
     lengths = pairs.arc_length[begins[1:] - 1] - pairs.arc_length[begins[:-1]]
     share: Real = lengths / np.maximum(np.diff(begins), 1)
-    moved = np.zeros(len(pairs.names))
+    moved, there = np.zeros(len(pairs.names)), np.zeros(len(pairs.names), dtype=bool)
     for at in steps:
         jump = np.abs(pairs.at("slip", at)) + np.abs(pairs.at("opening", at))
+        there[pairs.interface[np.isfinite(jump)]] = True
         moved = np.maximum(moved, share * np.bincount(pairs.interface, np.nan_to_num(jump), len(moved)))
     # What is moved by rounding alone does not move.
     moved = np.where(moved > 1e-9 * moved.max(initial=0.0), moved, 0.0)
     order = sorted(range(len(lengths)), key=lambda i: (pairs.laws[i] != "bonded", moved[i], lengths[i]), reverse=True)
+    # Of faces beside what a stage has taken away there is nothing to draw.
+    order = [number for number in order if there[number]]
     return [pairs.names[number] for number in sorted(order[:MOST_PANELS])]

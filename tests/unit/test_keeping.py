@@ -41,7 +41,7 @@ def test_a_part_is_computed_again_where_what_it_is_found_from_has_changed() -> N
 
 def test_topology_is_found_once_and_the_model_is_that_of_the_case_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     found, whole = [], build._find_topology
-    monkeypatch.setattr(build, "_find_topology", lambda cut: found.append(1) or whole(cut))
+    monkeypatch.setattr(build, "_find_topology", lambda *given: found.append(1) or whole(*given))
     recall = Recall()
     # The last but one cuts the cracks at each other, the last has other elements.
     changes: list[dict[str, Any]] = [

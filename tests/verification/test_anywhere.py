@@ -130,7 +130,7 @@ def test_displacements_that_push_against_a_plane_end_the_run(solve: Solve) -> No
 def test_weight_in_a_plane_is_noted() -> None:
     text = PLANE + "materials.h = { young = 1.0, poisson = 0.2, density = 1.0 }\n"
     text += 'regions.i = { material = "h", boundary = ["a"] }\ngravity = { gy = -1.0 }\n'
-    expected = "The weight of what lies in the infinite region 'p' is a net force"
+    expected = f"Weight and point loads have a net force of (0, {-math.pi:.6g}) on the infinite region 'p'"
     assert any(expected in note for note in build(text).notes)
 
 

@@ -156,7 +156,8 @@ def test_points_on_a_crack_get_the_first_face() -> None:
     exact = griffith_field(ROCK.kappa, ROCK.shear_modulus, 1.0, 1.0)
     above = exact.displacement(points + 1e-13j)
     assert np.abs(found.displacement - above).max() < 1e-3 * np.abs(above).max()
-    np.testing.assert_allclose(found.stress, np.tile([-1.0, 0.0, 0.0], (4, 1)), atol=5e-3)
+    np.testing.assert_allclose(found.stress[1:3], np.tile([-1.0, 0.0, 0.0], (2, 1)), atol=5e-3)
+    assert np.isnan(found.stress[[0, 3]]).all()  # infinite at the tips
 
 
 def test_stress_inside_an_inclusion_is_uniform() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pbem.case.build import parse_model
@@ -96,7 +98,7 @@ def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: 
     problem = parse_model(write_pushed_block(0.2, {"friction": 0.25}))[1]
     assembled = assemble_problem(problem, generate_mesh(problem), world)
     monkeypatch.setattr(march, "solve_step", fail)
-    start = march.Start(2, 1, 0.499, start_memory(assembled.laws))
+    start = replace(march.start_from_rest(assembled), number=2, stage=1, factor=0.499)
     with pytest.raises(ConvergenceError) as caught:
         next(march.march(assembled, Listener(), start))
     assert caught.value.reason == "mode cycle"

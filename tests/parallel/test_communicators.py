@@ -46,7 +46,7 @@ both = pbem.run("blocks.toml", "both.h5")
 assert both.ranks == MPI.COMM_WORLD.size
 pair = MPI.COMM_WORLD.Split(rank % 2)
 assert pbem.run("blocks.toml", f"pair{rank % 2}.h5", comm=pair).ranks == pair.size
-print("done", rank, flush=True)
+print(f"done {rank}\\n", end="", flush=True)
 """
 
 

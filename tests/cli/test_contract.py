@@ -116,7 +116,6 @@ def test_calls(folder: Path) -> None:
 
 
 def test_tables_of_pandas(folder: Path) -> None:
-    pytest.importorskip("pandas")
     results = pbem.open_results("blocks.h5")
     joint = results.to_dataframe("joint")
     contact = results.contact["joint"]

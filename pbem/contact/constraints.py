@@ -34,6 +34,11 @@ class ConstraintMap:
     offset: Real
     released: Real | None = None
 
+    @property
+    def given(self) -> float:
+        """Norm of the displacements and jumps in the offset."""
+        return float(np.linalg.norm(self.offset[: len(self.offset) // 2]))
+
     def evaluate(self, unknowns: Real) -> Real:
         """v (4 nodes,) from x (2 nodes,)."""
         result: Real = self.matrix @ unknowns + self.offset

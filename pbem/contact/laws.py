@@ -178,7 +178,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
         leader=_find_leaders(model, mesh),
         stiffening=spread([
-            1 / law.parameters["closure"] if law.kind == "barton_bandis" and "closure" in law.parameters else 0.0
+            1 / law.parameters["closure"] if "closure" in law.parameters else 0.0
             for law in laws
         ]),
     )

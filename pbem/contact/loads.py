@@ -78,10 +78,11 @@ def collect_outer_nodes(model: Model, mesh: Mesh) -> OuterNodes:
     places = Places(mesh.position[node] + model.origin, _measure_along(model, mesh)[node])
     at_rest = Moment(0.0, 0.0, 1.0)
     stiffness = [_blend_all([(0.0, c.stiffness[k]) for c in conditions], which, places, at_rest) for k in (0, 1)]
-    # Rounding of an expression that is zero somewhere.
     rigid = collect_rigid_nodes(model, mesh)
-    return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which,
-                      np.maximum(np.stack(stiffness, axis=1), 0.0), places, rigid, np.isin(node, list_nodes_of(rigid)))
+    # An expression that is zero somewhere may be less than that by rounding.
+    stiff = np.maximum(np.stack(stiffness, axis=1), 0.0)
+    return OuterNodes(node, np.stack([first, 1j * first], axis=1), known.reshape(-1, 2)[which], which, stiff, places,
+                      rigid, np.isin(node, list_nodes_of(rigid)))
 
 
 def _measure_along(model: Model, mesh: Mesh) -> Real:

@@ -152,3 +152,14 @@ def test_a_force_through_the_middle_of_a_rotation_does_not_drive_it(tmp_path: Pa
     results = pbem.run(case, tmp_path / "case.h5")
     assert results.status == "finished"
     np.testing.assert_allclose(results.reactions["outer"][-1], [-5.0, -0.2], atol=5e-3)
+
+
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_a_body_that_conditions_move_as_a_whole_bears_nothing(operator: str, tmp_path: Path) -> None:
+    """Its forces are rounding, and no sign of a body that is free to move."""
+    moved = {name: {"ux": 0.3, "uy": -20.0} for name in ("bottom", "right", "top", "left")}
+    case = make_block(boundary=moved, tools={}, contacts={})
+    del case["curves"]["punch"]
+    results = pbem.run(case, tmp_path / "case.h5", operator=operator)  # type: ignore[arg-type]
+    assert np.abs(results.traction).max() < 1e-9 * 2.1e5
+    np.testing.assert_allclose(results.evaluate([1.0, 0.5]).displacement[-1], [[0.3, -20.0]], rtol=1e-10)

@@ -113,9 +113,15 @@ ROUNDED = 1e-5
 MOST_AMPLIFIED = 1e11
 
 
-def size_residual(forces: float, unknowns: Real) -> float:
-    """What the norm of a residual is compared with, from the norm of the forces B m and the unknowns x."""
+def size_residual(forces: float, unknowns: Real, given: float = 0.0) -> float:
+    """What the norm of a residual is compared with, from the norm of the forces B m, the unknowns x, and the norm of
+    the displacements and jumps in m (all lengths).
+
+    Of a body that conditions move as a whole forces and unknowns are both rounding of what is given.
+    """
     size = float(np.linalg.norm(unknowns))
+    if forces <= ROUNDED * given and size <= ROUNDED * given:
+        return ROUNDED * given
     return max(forces, ROUNDED * size) if size <= MOST_AMPLIFIED * forces else forces
 
 

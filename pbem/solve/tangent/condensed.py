@@ -210,7 +210,7 @@ class CondensedTangent(TangentOperator):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load)
             left_over = problem.measure(left)
-            residual = left_over / size_residual(scale, unknowns)
+            residual = left_over / size_residual(scale, unknowns, constraints.given)
             if best is not None and not residual < best.residual:
                 break
             best = Solved(unknowns, v, residual)

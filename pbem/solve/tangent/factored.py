@@ -54,7 +54,7 @@ class FactoredTangent(TangentOperator):
         for attempt in range(2):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load)
-            residual = problem.measure(left) / size_residual(scale, unknowns)
+            residual = problem.measure(left) / size_residual(scale, unknowns, constraints.given)
             if residual <= tolerance:
                 return Solved(unknowns, v, residual)
             if attempt == 0 and np.isfinite(residual):

@@ -168,7 +168,7 @@ class KrylovTangent(TangentOperator):
         off, left = self.preconditioner.correct(now.residual)
         self._now = replace(now, part=now.part - off, residual=self.preconditioner.turn_back(left))
         unknowns = self.solution = self.gather(self._now.part)
-        residual = self.problem.measure(left) / size_residual(now.scale, unknowns)
+        residual = self.problem.measure(left) / size_residual(now.scale, unknowns, constraints.given)
         return Solved(unknowns, constraints.evaluate(unknowns), residual, False, self.iterations[-1], loosely=True)
 
     def _complete(self, constraints: ConstraintMap, load: Load) -> Solved:
@@ -188,7 +188,7 @@ class KrylovTangent(TangentOperator):
             v = constraints.evaluate(unknowns)
             true = problem.apply(v, load, constraints.released)
             now = replace(now, part=now.part - off, residual=true)
-            residual = problem.measure(true) / size_residual(now.scale, unknowns)
+            residual = problem.measure(true) / size_residual(now.scale, unknowns, constraints.given)
             solved = residual <= tolerance
             widened = self.iterations[-1] > SLOW and self._widen()
             if solved:

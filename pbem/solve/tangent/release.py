@@ -71,7 +71,7 @@ class ReleasedTangent(TangentOperator):
         for _ in range(1 + MOST_CORRECTIONS):
             v = constraints.evaluate(unknowns)
             left = problem.apply(v, load, constraints.released)
-            residual = problem.measure(left) / size_residual(scale, unknowns)
+            residual = problem.measure(left) / size_residual(scale, unknowns, constraints.given)
             if best is not None and not residual < best.residual:
                 break
             best = Solved(unknowns, v, residual)

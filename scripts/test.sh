@@ -21,5 +21,7 @@ workers=$(nproc)
 # One thread for each process: those of BLAS would wait for each other on cores that other processes use. (After nproc,
 # which counts no more than that.)
 export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
+# The tests start hundreds of processes: where Python may not keep what it compiles, that is a third of their time.
+unset PYTHONDONTWRITEBYTECODE
 check .venv/bin/python -m pytest -n $((workers < 4 ? workers : 4)) --dist loadfile "$@"
 exit "$failure"

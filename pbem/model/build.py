@@ -31,6 +31,7 @@ from pbem.model.grading import check_turning, grade_curves
 from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.interior import list_interior_points
 from pbem.model.law import check_along
+from pbem.model.load_notes import note_jumps, note_loads
 from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
@@ -271,7 +272,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
     )
     stages = tuple(_center_remote(stage, model.middle) for stage in model.stages)
     model = replace(model, stages=stages)
-    return replace(model, notes=(*model.notes, *_note_loads(model))), list(fitted.faults)
+    return replace(model, notes=(*model.notes, *note_loads(model), *note_jumps(model))), list(fitted.faults)
 
 
 def _center_remote(stage: Stage, middle: complex) -> Stage:
@@ -291,25 +292,6 @@ def _note_choices(case: Case) -> list[str]:
     if unused:
         notes.append(f"Materials that no region uses: {list_names(unused)}.")
     return notes
-
-
-def _note_loads(model: Model) -> list[str]:
-    """A model whose answer is zero everywhere has probably lost its loads."""
-    weights = any(region.material.density for region in model.regions)
-    loads = [value for stage in model.stages for value in (
-        *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
-        *stage.pressure.values(), *stage.remote, not stage.remote_growth.is_zero,
-        *(stage.gravity if weights else ()), *(each for values in stage.rigid.values() for each in values))]
-    loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
-    loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
-    loads += [not stress.is_zero for stress in model.initial_stress.values()]
-    laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
-    loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]
-    loads += [contact.overlap for contact in model.contacts.values() if contact.law.kind != "open"]
-    return [] if any(loads) else [
-        "No load: all prescribed displacements and tractions, pressures, stresses far away, weights, in-situ stresses, "
-        "swellings, point loads and interferences are zero, and so will be the results."
-    ]
 
 
 def _has_soft_springs(model: Model, names: Sequence[str], soft: float) -> bool:

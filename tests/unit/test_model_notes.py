@@ -34,6 +34,29 @@ def test_a_case_without_loads_is_noted(load: str, noted: bool) -> None:
 
 
 @pytest.mark.parametrize(
+    ("first", "second", "noted"),
+    [
+        # The time of the second stage begins at 1, or at the duration of the first.
+        ("", '{ expression = "x*t" }', "is 1 there"), ("", '{ expression = "x*(t - 1)" }', None),
+        ('{ expression = "2*t" }', '{ expression = "2 + 3*(t - 1)" }', None), ("2.0", '{ expression = "2*t" }', None),
+        ('{ expression = "2*t" }', '{ expression = "2*sin(t)" }', "is 1 there"), ('{ expression = "t" }', "", None),
+        ('{ expression = "t" }', "5.0", None), ("", '{ expression = "1e-5 + t - 1" }', None),
+    ],
+)  # fmt: skip
+def test_a_value_by_time_that_jumps_as_a_stage_begins_is_noted(first: str, second: str, noted: str | None) -> None:
+    stages = "".join(
+        f'[[stages]]\nname = "{name}"\nremote.syy = -1\n' + (f"interfaces.crack.pressure = {value}\n" if value else "")
+        for name, value in zip("ab", (first, second), strict=True)
+    )
+    found = [note for note in parse_model(CRACK + stages)[1].notes if "jumps" in note]
+    if noted is None:
+        assert not found
+    else:
+        assert found == ["What is prescribed on 'crack' jumps when stage 'b' begins: the time t goes on from stage to "
+                         f"stage, and {noted}."]
+
+
+@pytest.mark.parametrize(
     ("law", "noted"),
     [
         ('law = "coulomb"', True), ('law = "coulomb"\ntensile_strength = 1.0', True), ('law = "frictionless"', False),

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.curve import Leg
 from pbem.geometry.elements import Elements
 
@@ -22,11 +25,15 @@ class Boxes:
 
     def __init__(self, low: Real, high: Real) -> None:
         self.low, self.high = low.reshape(-1, 2), high.reshape(-1, 2)
-        extent = float((self.high.max(axis=0) - self.low.min(axis=0)).max()) if len(low) else 0.0
+
+    @cached_property
+    def _sizes(self) -> dict[float, Integer]:
+        """Numbers of the boxes by the size of the cells that they are kept in."""
+        extent = float((self.high.max(axis=0) - self.low.min(axis=0)).max()) if len(self.low) else 0.0
         finest = max(extent / FINEST, 1e-300)
         # A little more than enough, for rounding.
         level = np.ceil(np.log2(np.maximum((self.high - self.low).max(axis=1, initial=0.0) / finest, 1.0)) + 1e-9)
-        self._sizes = {finest * 2.0**k: np.flatnonzero(level == k) for k in np.unique(level)}
+        return {finest * 2.0**k: np.flatnonzero(level == k) for k in np.unique(level)}
 
     @classmethod
     def around_legs(cls, legs: Sequence[Leg], tolerance: float) -> Boxes:
@@ -37,10 +44,20 @@ class Boxes:
         return cls(low - tolerance, high + tolerance)
 
     @classmethod
+    def around_points(cls, points: Complex, reach: Real) -> Boxes:
+        """Squares around points (m,), which reach so far (m,) on every side."""
+        low = np.stack([points.real, points.imag], axis=1) - reach[:, None]
+        return cls(low, low + 2 * reach[:, None])
+
+    @classmethod
     def of_corners(cls, corners: Sequence[tuple[complex, complex]]) -> Boxes:
         """Boxes given by their lower left and upper right corners."""
         both = np.array(corners, dtype=complex).reshape(-1, 2)
         return cls(*(np.stack([side.real, side.imag], axis=1) for side in both.T))
+
+    def select(self, numbers: Integer) -> Boxes:
+        """Some of the boxes."""
+        return Boxes(self.low[numbers], self.high[numbers])
 
     def find_around(self, points: Complex) -> tuple[Integer, Integer]:
         """Numbers of points (m,) and of the boxes around them, a pair for each, in rising order."""
@@ -49,16 +66,23 @@ class Boxes:
 
     def find_meeting(self, others: Boxes) -> tuple[Integer, Integer]:
         """Numbers of the others and of the boxes that they meet, a pair for each meeting, in rising order."""
-        found = [np.zeros((0, 2), dtype=np.int64)]
+        found = [np.zeros(0, dtype=np.int64)]
         for size, numbers in self._sizes.items():
             for other_size, other_numbers in others._sizes.items():
                 # In cells of the larger size neither covers more than four.
-                found.append(_match(others, other_numbers, self, numbers, max(size, other_size)))
-        pairs = np.concatenate(found)
-        meet = (others.low[pairs[:, 0]] <= self.high[pairs[:, 1]]).all(axis=1)
-        meet &= (others.high[pairs[:, 0]] >= self.low[pairs[:, 1]]).all(axis=1)
-        pairs = np.unique(pairs[meet], axis=0)
-        return pairs[:, 0], pairs[:, 1]
+                one, own = _match(others, other_numbers, self, numbers, max(size, other_size))
+                meet = self._meet(own, others, one)
+                found.append(one[meet] * len(self.low) + own[meet])
+        first, second = np.divmod(np.sort(np.concatenate(found)), max(len(self.low), 1))
+        return first, second
+
+    def _meet(self, own: Integer, others: Boxes, other: Integer) -> Bool:
+        """Whether boxes (k,) meet those of the others (k,) with the same place in the lists."""
+        meet = np.ones(len(own), dtype=bool)
+        for axis in range(2):
+            meet &= others.low[other, axis] <= self.high[own, axis]
+            meet &= others.high[other, axis] >= self.low[own, axis]
+        return meet
 
     def find_pairs(self) -> tuple[Integer, Integer]:
         """Numbers i < j of all boxes that meet, in rising order."""
@@ -66,31 +90,64 @@ class Boxes:
         return i[i < j], j[i < j]
 
 
-def _match(first: Boxes, chosen: Integer, second: Boxes, own: Integer, size: float) -> Integer:
-    """Pairs (k, 2) of boxes that share a cell of the given size, which none of them exceeds."""
+@dataclass(frozen=True)
+class Meetings:
+    """Pairs (k,) of boxes that meet some others: numbers of the others, in rising order, and of the boxes."""
+
+    boxes: Boxes
+    other: Integer
+    box: Integer
+
+    def narrow(self, inner: Boxes, within: Integer) -> Meetings:
+        """The same for boxes each of which lies in that one of the others whose number (m,) is given."""
+        begin = np.searchsorted(self.other, within, side="left")
+        count = np.searchsorted(self.other, within, side="right") - begin
+        box = self.box[np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)]
+        other = np.repeat(np.arange(len(within)), count)
+        meet = self.boxes._meet(box, inner, other)
+        return Meetings(self.boxes, other[meet], box[meet])
+
+    def select(self, which: Bool) -> Meetings:
+        """Some of the pairs."""
+        return Meetings(self.boxes, self.other[which], self.box[which])
+
+
+def _match(first: Boxes, chosen: Integer, second: Boxes, own: Integer, size: float) -> tuple[Integer, Integer]:
+    """Pairs (k,), each once, of boxes that share a cell of the given size, which none of them exceeds."""
     origin = second.low.min(axis=0)
-    cell, box = _cover(first, chosen, origin, size)
-    other_cell, other = _cover(second, own, origin, size)
+    cell, box, part = _cover(first, chosen, origin, size)
+    other_cell, other, other_part = _cover(second, own, origin, size)
     order = np.argsort(other_cell, kind="stable")
-    other_cell, other = other_cell[order], other[order]
+    other_cell, other, other_part = other_cell[order], other[order], other_part[order]
     begin = np.searchsorted(other_cell, cell, side="left")
     count = np.searchsorted(other_cell, cell, side="right") - begin
-    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    return np.stack([np.repeat(box, count), other[np.repeat(begin, count) + within]], axis=1)
+    found = np.flatnonzero(count)
+    begin, count = begin[found], count[found]
+    at = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+    by = np.repeat(found, count)
+    # Of the cells that two boxes share one is the lowest and leftmost: it is such a one of either box.
+    once = (part[by] | other_part[at]) == _LEFT | _LOWEST
+    return box[by[once]], other[at[once]]
 
 
-def _cover(boxes: Boxes, chosen: Integer, origin: Real, size: float) -> tuple[Integer, Integer]:
-    """The cells, at most four each, that some boxes lie in, and the boxes' numbers."""
+_LEFT, _LOWEST = 1, 2
+
+
+def _cover(boxes: Boxes, chosen: Integer, origin: Real, size: float) -> tuple[Integer, Integer, NDArray[np.int8]]:
+    """The cells, at most four each, that some boxes lie in, the boxes' numbers, and which of its box's cells each is:
+    whether one of the leftmost ones and of the lowest ones."""
     limit = 2.0**30
     low = np.floor(np.clip((boxes.low[chosen] - origin) / size, -limit, limit)).astype(np.int64)
     high = np.floor(np.clip((boxes.high[chosen] - origin) / size, -limit, limit)).astype(np.int64)
-    cells, numbers = [], []
-    for x, there in ((low[:, 0], None), (high[:, 0], high[:, 0] > low[:, 0])):
-        for y, too in ((low[:, 1], None), (high[:, 1], high[:, 1] > low[:, 1])):
+    cells, numbers, parts = [], [], []
+    for x, left in ((low[:, 0], _LEFT), (high[:, 0], 0)):
+        for y, lowest in ((low[:, 1], _LOWEST), (high[:, 1], 0)):
             taken = np.ones(len(chosen), dtype=bool)
-            for part in (there, too):
-                if part is not None:
-                    taken &= part
+            if not left:
+                taken &= high[:, 0] > low[:, 0]
+            if not lowest:
+                taken &= high[:, 1] > low[:, 1]
             cells.append((x * 2**32 + y)[taken])
             numbers.append(chosen[taken])
-    return np.concatenate(cells), np.concatenate(numbers)
+            parts.append(np.full(len(cells[-1]), left | lowest, dtype=np.int8))
+    return np.concatenate(cells), np.concatenate(numbers), np.concatenate(parts)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.geometry.boxes import Boxes
+from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
 
@@ -66,6 +66,7 @@ class Surroundings:
         first: dict[str, int] = {}
         for number, name in enumerate(self.curve):
             first.setdefault(name, number)
+        self._boxes = _surround(self.pieces)
         self._members: list[Integer] = []
         for names in regions:
             numbers = [first[name] + at for name in dict.fromkeys(names) for at in range(len(curves[name].legs))]
@@ -75,31 +76,43 @@ class Surroundings:
         unseen = [min(pair) * len(self.legs) + max(pair) for pair in blind]
         self._unseen = np.union1d(met, np.array(unseen, dtype=np.int64))
 
-    def find_distances(self, leg: Integer, t: Real, points: Complex, reach: Real) -> tuple[Real, Integer]:
-        """Distance (k,) from points at the fractions t of legs (k,) to the nearest face that they see within a reach
-        (k,), and the number of its leg; infinity and -1 where nothing is that near."""
-        piece_of_point = np.minimum((t * self._counts[leg]).astype(np.int64), self._counts[leg] - 1)
-        distance, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
+    def find_near(self, leg: Integer, around: Boxes) -> Meetings:
+        """The pieces in boxes (k,) around points of legs (k,), as far as they belong to a region of the leg."""
         count = len(self.legs)
+        found = [np.zeros(0, dtype=np.int64)]
         for members in self._members:
             inside = np.zeros(count, dtype=bool)
             inside[members] = True
             own, faces = np.flatnonzero(inside[leg]), np.flatnonzero(inside[self.pieces.leg])
             if not len(own) or len(faces) < 2:
                 continue
-            low = np.stack([points[own].real, points[own].imag], axis=1) - reach[own, None]
-            which, piece = _surround(self.pieces.select(faces)).find_meeting(Boxes(low, low + 2 * reach[own, None]))
-            at, seen = own[which], faces[piece]
-            apart = np.abs(piece_of_point[at] - self.pieces.number[seen]) > 1
-            keep = np.where(leg[at] == self.pieces.leg[seen], apart, ~self._are_blind(leg[at], self.pieces.leg[seen]))
-            at, seen = at[keep], seen[keep]
-            far = measure_nearness(points[at], self.pieces.select(seen))
-            order = np.lexsort((far, at))
-            at, far, seen = at[order], far[order], seen[order]
-            head = np.flatnonzero(np.diff(at, prepend=-1))
-            better = far[head] < np.minimum(distance[at[head]], reach[at[head]])
-            distance[at[head[better]]] = far[head[better]]
-            nearest[at[head[better]]] = self.pieces.leg[seen[head[better]]]
+            which, piece = self._boxes.select(faces).find_meeting(around.select(own))
+            found.append(own[which] * len(self.pieces.leg) + faces[piece])
+        # Two legs may have both of their regions in common.
+        at, seen = np.divmod(np.unique(np.concatenate(found)), max(len(self.pieces.leg), 1))
+        return Meetings(self._boxes, at, seen)
+
+    def find_distances(self, leg: Integer, t: Real, points: Complex, reach: Real, near: Meetings | None = None
+                       ) -> tuple[Real, Integer]:
+        """Distance (k,) from points at the fractions t of legs (k,) to the nearest face that they see within a reach
+        (k,), and the number of its leg; infinity and -1 where nothing is that near.
+
+        near: what `find_near` found in squares of this reach around the points, if it is known."""
+        if near is None:
+            near = self.find_near(leg, Boxes.around_points(points, reach))
+        piece_of_point = np.minimum((t * self._counts[leg]).astype(np.int64), self._counts[leg] - 1)
+        distance, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
+        at, seen = near.other, near.box
+        apart = np.abs(piece_of_point[at] - self.pieces.number[seen]) > 1
+        keep = np.where(leg[at] == self.pieces.leg[seen], apart, ~self._are_blind(leg[at], self.pieces.leg[seen]))
+        at, seen = at[keep], seen[keep]
+        far = measure_nearness(points[at], self.pieces.select(seen))
+        order = np.lexsort((far, at))
+        at, far, seen = at[order], far[order], seen[order]
+        head = np.flatnonzero(np.diff(at, prepend=-1))
+        close = head[far[head] < reach[at[head]]]
+        distance[at[close]] = far[close]
+        nearest[at[close]] = self.pieces.leg[seen[close]]
         return distance, nearest
 
     def _are_blind(self, one: Integer, other: Integer) -> Bool:

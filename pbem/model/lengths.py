@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.geometry.boxes import Boxes
+from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Surroundings
 from pbem.model.sliver import Wedges
@@ -58,13 +58,29 @@ class Cells:
 
 
 @dataclass(frozen=True)
+class Near:
+    """What may bound the lengths in cells: faces and tips that meet squares around them. within: see `pass_on`."""
+
+    faces: Meetings
+    tips: Meetings
+    within: Integer
+
+    def pass_on(self, within: Integer) -> Near:
+        """For other cells, whose squares lie in those of the cells with these numbers (m,)."""
+        return replace(self, within=within)
+
+
+@dataclass(frozen=True)
 class Measured:
-    """Of each cell (k,): allowed length, whether it needs no halving, distance of the nearest face and its leg."""
+    """Of each cell (k,): allowed length, whether it needs no halving, distance of the nearest face and its leg.
+
+    near: what was found around the cells, for their halves."""
 
     allowed: Real
     final: Bool
     distance: Real
     nearest: Integer
+    near: Near
 
 
 @dataclass(frozen=True)
@@ -113,14 +129,18 @@ class LengthField:
             wanted = np.where(from_end * self.length[leg] < 4 * least, np.maximum(wanted, least), wanted)
         return Cells(leg, low, high, given, wanted)
 
-    def measure(self, cells: Cells) -> Measured:
-        """The lengths that are allowed in the middle of cells, and whether they hold for the cells as a whole."""
+    def measure(self, cells: Cells, before: Near | None = None) -> Measured:
+        """The lengths that are allowed in the middle of cells, and whether they hold for the cells as a whole.
+
+        before: what was found around the cells that these are halves of. The square around a half lies in that around
+        the whole: their middles are a quarter of a length apart, and it reaches half a length less."""
         legs, length = cells.leg, cells.lengths(self.length)
         t = 0.5 * (cells.low + cells.high)
         points = self.place(cells)
         graded = self.refined[legs].any(axis=1)
         sight = np.where(graded, np.maximum(cells.wanted, self._mean[legs]), cells.wanted) / self.reach + length
-        distance, nearest = self.surroundings.find_distances(legs, t, points, sight)
+        near = self._find_near(cells, points, sight, length, before)
+        distance, nearest = self.surroundings.find_distances(legs, t, points, sight, near.faces)
         allowed = self.reach * distance
         thin = np.isfinite(distance)
         corner = np.zeros(len(t), dtype=bool)
@@ -132,11 +152,11 @@ class LengthField:
             allowed = np.where(floor > 0, np.minimum(allowed, self._growth[legs, k] * from_end), allowed)
             corner |= touches & (floor > 0) & (length <= floor)
         allowed = np.where(self.kept[legs], np.inf, np.where(corner, length, allowed))
-        beside_tips = self._measure_from_tips(points, cells, length)
+        beside_tips = self._measure_from_tips(points, near.tips)
         steepest = max(self.reach, GROWTH, SLOPE)
         allowed = np.minimum(allowed, beside_tips)
         final = (length <= FINENESS * allowed) | (allowed - 0.5 * steepest * length >= cells.wanted) | corner
-        return Measured(allowed, final, distance, nearest)
+        return Measured(allowed, final, distance, nearest, near)
 
     def measure_by_distance(self, cells: Cells) -> Real:
         """Lengths (k,) that the distance of other faces allows in the middle of cells, whosever their grading is."""
@@ -149,19 +169,21 @@ class LengthField:
         t = 0.5 * (cells.low + cells.high)
         return self.surroundings.shapes.select(cells.leg).place_fractions(t[:, None])[:, 0]
 
-    def _measure_from_tips(self, points: Complex, cells: Cells, length: Real) -> Real:
+    def _find_near(self, cells: Cells, points: Complex, sight: Real, length: Real, before: Near | None) -> Near:
+        """Faces within sight of cells, and the tips of the same set of connected cracks that bound their lengths."""
+        around, wider = Boxes.around_points(points, sight), Boxes.around_points(points, cells.wanted / SLOPE + length)
+        if before is not None:
+            return Near(before.faces.narrow(around, before.within), before.tips.narrow(wider, before.within),
+                        np.arange(len(points)))
+        boxes = Boxes.around_points(self._tips.point, np.zeros(len(self._tips.point)))
+        tips = Meetings(boxes, *boxes.find_meeting(wider))
+        tips = tips.select(self._component[cells.leg[tips.other]] == self._tips.component[tips.box])
+        return Near(self.surroundings.find_near(cells.leg, around), tips, np.arange(len(points)))
+
+    def _measure_from_tips(self, points: Complex, near: Meetings) -> Real:
         """What the tips of the same set of connected cracks allow."""
         allowed = np.full(len(points), np.inf)
-        own = np.flatnonzero(self._component[cells.leg] >= 0)
-        if not len(self._tips.point) or not len(own):
-            return allowed
-        reach = (cells.wanted / SLOPE + length)[own, None]
-        low = np.stack([points[own].real, points[own].imag], axis=1) - reach
-        at = np.stack([self._tips.point.real, self._tips.point.imag], axis=1)
-        which, tip = Boxes(at, at).find_meeting(Boxes(low, low + 2 * reach))
-        which = own[which]
-        same = self._component[cells.leg[which]] == self._tips.component[tip]
-        which, tip = which[same], tip[same]
+        which, tip = near.other, near.box
         np.minimum.at(allowed, which, self._tips.length[tip] + SLOPE * np.abs(points[which] - self._tips.point[tip]))
         return allowed
 

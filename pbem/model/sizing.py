@@ -84,13 +84,14 @@ def fit_lengths(
     if excess is not None:
         return Sizes(curves, wedges, excess=excess)
     legs = list(surroundings.legs)
-    counts = cells.lengths(field.length) / np.minimum(cells.wanted, allowed)
+    limits = np.minimum(cells.wanted, allowed)
+    counts = cells.lengths(field.length) / limits
     changed = (allowed < cells.wanted * (1 - 1e-9)) | (cells.wanted != cells.given)
     by_leg = np.lexsort((cells.low, cells.leg))
     bounds = np.searchsorted(cells.leg[by_leg], np.arange(len(legs) + 1))
     for number in np.unique(cells.leg[changed]).tolist():
         own = by_leg[bounds[number]:bounds[number + 1]]
-        limit = np.minimum(cells.wanted, allowed)[own] / field.length[number]
+        limit = limits[own] / field.length[number]
         begin, end = (
             wedges.grade(number, at_end, field.length[number], cells.low[own], limit, field.reach)
             if number not in field.kept_legs else [0.0] for at_end in (False, True)
@@ -121,9 +122,9 @@ def _divide(field: LengthField) -> tuple[Cells, Real, Excess | None]:
     cells = field.list_elements()
     most = max(10 * len(cells.leg), MOST_ADDED) + len(cells.leg)
     done: list[tuple[Cells, Real]] = []
-    total = 0.0
+    total, near = 0.0, None
     while len(cells.leg):
-        measured = field.measure(cells)
+        measured = field.measure(cells, near)
         allowed = np.minimum(measured.allowed, cells.wanted)
         total += float((cells.lengths(field.length) / allowed)[measured.final].sum())
         if total + np.count_nonzero(~measured.final) > most:
@@ -135,6 +136,7 @@ def _divide(field: LengthField) -> tuple[Cells, Real, Excess | None]:
             other = names[measured.nearest[worst]] if measured.nearest[worst] >= 0 else one
             return cells, allowed, Excess(one, other, float(measured.distance[worst]), float(allowed[worst]))
         done.append((cells.select(measured.final), measured.allowed[measured.final]))
+        near = measured.near.pass_on(np.tile(np.flatnonzero(~measured.final), 2))
         cells = cells.select(~measured.final).halve()
     return Cells.join([part for part, _ in done]), np.concatenate([part for _, part in done]), None
 

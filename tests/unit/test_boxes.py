@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.geometry.boxes import Boxes
+from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Leg
 
 
@@ -54,3 +54,25 @@ def test_a_box_of_a_leg_holds_its_arc() -> None:
     boxes = Boxes.around_legs([arc, Leg(0j, 1 + 1j, 1)], 0.25)
     np.testing.assert_allclose(boxes.low, [[-1.25, -0.25], [-0.25, -0.25]], atol=1e-15)
     np.testing.assert_allclose(boxes.high, [[1.25, 1.25], [1.25, 1.25]], atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_boxes_inside_others_meet_is_found_among_what_those_meet(seed: int) -> None:
+    boxes, others = make_boxes(seed, 150), make_boxes(seed + 100, 90)
+    random = np.random.default_rng(seed + 200)
+    within = random.integers(90, size=300)
+    low, high = others.low[within], others.high[within]
+    sides = np.sort(random.uniform(0, 1, (2, 300, 2)), axis=0)
+    inner = Boxes(low + sides[0] * (high - low), np.minimum(low + sides[1] * (high - low), high))
+    found = Meetings(boxes, *boxes.find_meeting(others)).narrow(inner, within)
+    assert list(zip(found.other, found.box, strict=True)) == compare_all(boxes, inner)
+    # And once more, in boxes inside these.
+    again = found.narrow(Boxes(inner.low, inner.low), np.arange(300))
+    assert list(zip(again.other, again.box, strict=True)) == compare_all(boxes, Boxes(inner.low, inner.low))
+
+
+def test_pairs_in_cells_of_several_sizes_are_found_once() -> None:
+    # Each lies across a corner of cells of its own size.
+    low = np.array([[x, y] for x in (0.4, 0.9, 1.4) for y in (0.4, 0.9, 1.4)])
+    boxes = Boxes(np.concatenate([low, [[0.0, 0.0]]]), np.concatenate([low + 0.25, [[1.9, 1.9]]]))
+    assert list(zip(*boxes.find_pairs(), strict=True)) == [(number, 9) for number in range(9)]

@@ -27,17 +27,14 @@ class ConstraintMap:
     """matrix (4 nodes, 2 nodes), offset (4 nodes,): displacements and tractions from the unknowns.
 
     released (a, r): orthonormal combinations of the a anchors that do not act, as the pairs hold what they would hold;
-    None if all act.
+    None if all act. given: norm of all that is given, whether it cancels or not: displacements, jumps and tractions
+    over their scale in the offset, and those of the fields that the equations do not see (length).
     """
 
     matrix: sparse.csr_matrix
     offset: Real
     released: Real | None = None
-
-    @property
-    def given(self) -> float:
-        """Norm of the displacements and jumps in the offset."""
-        return float(np.linalg.norm(self.offset[: len(self.offset) // 2]))
+    given: float = 0.0
 
     def evaluate(self, unknowns: Real) -> Real:
         """v (4 nodes,) from x (2 nodes,)."""
@@ -96,7 +93,15 @@ def build_constraints(
     matrix = entries.build()
     if gone is not None and len(gone):
         matrix, constant = _hold_still(matrix, constant, gone, traction_scale)
-    return ConstraintMap(matrix, constant)
+    return ConstraintMap(matrix, constant, given=_measure_given(constant, load, traction_scale))
+
+
+def _measure_given(constant: Real, load: Load, traction_scale: float) -> float:
+    """See `ConstraintMap`: tractions and fields that balance each other leave forces of rounding (theory, 44)."""
+    half = len(constant) // 2
+    parts = [part for each in (constant, load.known) for part in (each[:half], each[half:] / traction_scale)]
+    parts += [load.far[0], load.far[1] / traction_scale]
+    return float(np.linalg.norm([np.linalg.norm(part) for part in parts]))
 
 
 def _hold_still(

@@ -115,9 +115,10 @@ MOST_AMPLIFIED = 1e11
 
 def size_residual(forces: float, unknowns: Real, given: float = 0.0) -> float:
     """What the norm of a residual is compared with, from the norm of the forces B m, the unknowns x, and the norm of
-    the displacements and jumps in m (all lengths).
+    all that is given (all lengths).
 
-    Of a body that conditions move as a whole forces and unknowns are both rounding of what is given.
+    Of a body that conditions move as a whole, or whose loads and stresses at rest balance everywhere, forces and
+    unknowns are both rounding of what is given.
     """
     size = float(np.linalg.norm(unknowns))
     if forces <= ROUNDED * given and size <= ROUNDED * given:

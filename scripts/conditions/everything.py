@@ -1,0 +1,8 @@
+"""All conditions, entered by the modules that make them."""
+
+from __future__ import annotations
+
+from scripts.conditions import joints, rest, values
+from scripts.conditions.trial import CONDITIONS
+
+__all__ = ["CONDITIONS", "joints", "rest", "values"]

@@ -1,0 +1,47 @@
+"""Conditions and loads of every kind against exact answers, each in one setting; all: scripts/study_conditions.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scripts.conditions.draft import SCHEMES
+from scripts.conditions.everything import CONDITIONS
+from scripts.conditions.trial import Figure, Trial
+from scripts.study_conditions import judge, main, make_setting
+
+# Of each condition one setting, so that all schemes, both operators and models elsewhere have their turn.
+SETTINGS = [
+    pytest.param(name, SCHEMES[k % 4], "hierarchical" if k % 7 == 3 else "dense", k % 3, id=name.replace(" ", "_"))
+    for k, name in enumerate(CONDITIONS)
+]
+
+
+@pytest.mark.parametrize(("name", "scheme", "operator", "seed"), SETTINGS)
+def test_conditions_give_their_exact_answers(
+    name: str, scheme: str, operator: str, seed: int, tmp_path: Path
+) -> None:
+    cell = judge(name, make_setting(scheme, operator, 2, seed), tmp_path)
+    assert cell.word in ("ok", "refused"), cell
+
+
+def test_faults_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A figure that is off, one that is no number, a message that is not the one, and a case that should be refused."""
+    name = next(iter(CONDITIONS))
+    trial = CONDITIONS[name](make_setting("SST", "dense", 2, 0))
+    empty = Trial({"title": "nothing"}, trial.check)
+    wrong = {
+        "off": Trial(trial.case, lambda _: iter([Figure("good", 0.0, 1.0), Figure("bad", 2.0, 1.0)])),
+        "no number": Trial(trial.case, lambda _: iter([Figure("bad", float("nan"), 1.0)])),
+        "nothing": Trial(trial.case, lambda _: iter([])),
+        "stopped": empty, "other words": Trial(empty.case, trial.check, "some words"),
+        "not refused": Trial(trial.case, trial.check, "materials"),
+    }  # fmt: skip
+    monkeypatch.setattr("scripts.study_conditions.CONDITIONS", {key: lambda _, each=each: each
+                                                                for key, each in wrong.items()})
+    for key in wrong:
+        assert judge(key, make_setting("SST", "dense", 2, 0), tmp_path).word == "FAULT", key
+    monkeypatch.setattr("sys.argv", ["study", "--schemes", "SST", "--operators", "dense", "--names", "off"])
+    assert main() == 1
+    assert "FAULT 2e+00" in capsys.readouterr().out

@@ -104,7 +104,8 @@ def begin_memory(
 ) -> Memory:
     """What the pairs bring into a stage, of which those that are held otherwise than before change their mode.
 
-    laws: by which the faces go where nothing holds them; opening (m,): without that of elastic joints. Faces that
+    laws: by which the faces go where nothing holds them; opening (m,): without that of elastic joints and without
+    dilation. Faces that
     follow their law again are open if they lie apart. Brittle bonds of faces that were opened are lost.
     """
     nothing = np.zeros(laws.count, dtype=bool)

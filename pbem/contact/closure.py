@@ -37,34 +37,41 @@ def measure_stiffening(laws: PairLaws, p_n: Real, pressure: Real) -> Real:
     return np.asarray(beyond + 0.5 * relief * find_closure(laws, p_n, pressure)[0])
 
 
-def find_pressed(laws: PairLaws, modes: ModeState, state: PairState, pressure: Real) -> Real:
+def find_pressed(
+    laws: PairLaws, modes: ModeState, state: PairState, pressure: Real, seat: Real | None = None
+) -> Real:
     """Normal tractions (m,) of closed joints that stiffen by their openings; of others, and of those that are not
     closed or closed beyond the largest closure, the tractions of the state.
 
     The tangent of a joint under pressure is stiffer than the joint is when it is relieved: where it would pull already
-    the joint is still closed (theory, 114).
+    the joint is still closed (theory, 114). seat (m,): openings that closed pairs have without traction; by default
+    those that a stage has closed them with.
     """
-    closed = np.where(modes.mode == STICK, laws.rest, 0.0) - state.g_n
+    closed = (np.where(modes.mode == STICK, laws.rest, 0.0) if seat is None else seat) - state.g_n
     part = closed * laws.stiffening
     follows = (laws.stiffening > 0) & (laws.compliance_n > 0) & (modes.mode != OPEN) & (part > 0) & (part < 1)
     divisor = np.where(follows, laws.compliance_n * (1 - part), 1.0)
     return np.where(follows, -closed / divisor - _relieve(laws, pressure), state.p_n)
 
 
-def choose_traction(laws: PairLaws, modes: ModeState, before: Real, state: PairState, pressure: Real) -> Real:
+def choose_traction(
+    laws: PairLaws, modes: ModeState, before: Real, state: PairState, pressure: Real, seat: Real | None = None
+) -> Real:
     """Normal tractions (m,) at which the laws are taken next, after `before`: those of the solution in these modes, or
     those by the openings where joints that stiffen are relieved. From either side Newton's steps stay on theirs
-    (theory, 114).
+    (theory, 114). seat: see `find_pressed`.
     """
     if not laws.stiffening.any():
         return state.p_n
-    return np.where(state.p_n > before, find_pressed(laws, modes, state, pressure), state.p_n)
+    return np.where(state.p_n > before, find_pressed(laws, modes, state, pressure, seat), state.p_n)
 
 
-def measure_closure_error(laws: PairLaws, modes: ModeState, state: PairState, pressure: Real) -> Real:
-    """Distance (m,) of closed joints that stiffen from their law, stress."""
+def measure_closure_error(
+    laws: PairLaws, modes: ModeState, state: PairState, pressure: Real, seat: Real | None = None
+) -> Real:
+    """Distance (m,) of closed joints that stiffen from their law, stress; seat: see `find_pressed`."""
     value, slope = find_closure(laws, state.p_n, pressure)
-    off = np.abs(state.g_n - np.where(modes.mode == STICK, laws.rest, 0.0) - value)
+    off = np.abs(state.g_n - (np.where(modes.mode == STICK, laws.rest, 0.0) if seat is None else seat) - value)
     counts = (laws.stiffening > 0) & (slope > 0) & (modes.mode != OPEN) & ~laws.follows
     return np.where(counts, off / np.where(counts, slope, 1.0), 0.0)
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Real
-from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide
+from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Passage, Slide, StepEnd, keep_value
 from pbem.contact.friction_bound import Strength
 from pbem.contact.softening import SOFTENINGS, Softening
 
@@ -29,13 +29,9 @@ def _begin_damage(parameters: Parameters) -> Real:
     return np.where(find_bonded(parameters), 0.0, 1.0)
 
 
-def _keep(old: NDArray[Any], slip: Real, duration: float, parameters: Parameters) -> NDArray[Any]:
-    return old
-
-
 # Both advance together, with openings too: see `Cohesive.advance`.
-SEPARATION = InternalVariable("separation", "none", lambda _: 0.0, _keep)
-DAMAGE = InternalVariable("damage", "none", _begin_damage, _keep)
+SEPARATION = InternalVariable("separation", "none", lambda _: 0.0, keep_value)
+DAMAGE = InternalVariable("damage", "none", _begin_damage, keep_value)
 # Separations that differ from the largest one so far by less than this part are that.
 SAME = 1e-9
 # Bonds that have given way by less than this part of their separation are as stiff as there.
@@ -144,12 +140,11 @@ class Cohesive(FrictionLaw):
         tangent = secant + (falls[:, None] * stiffness * jump)[:, :, None] * by_jump[:, None, :]
         return Separating(np.einsum("kij,kj->ki", secant, jump), tangent, secant)
 
-    def advance(self, start: Values, jump: Real, opened: Bool, slid: Real, parameters: Parameters) -> dict[str, Real]:
-        """The internal variables after a step with so much slip (k,) of faces in touch, which ended with jumps (k, 2)
-        of pairs that are open (k,)."""
-        before = start[SEPARATION.name]
-        own = np.where(opened, np.maximum(before, self.measure(jump, parameters)),
-                       before + slid / self.find_units(parameters)[:, 1])
+    def advance(self, end: StepEnd, parameters: Parameters) -> dict[str, Real]:
+        """By the jumps of pairs that are open, and by the slip of faces in touch."""
+        before = end.slide.start[SEPARATION.name]
+        own = np.where(end.opened, np.maximum(before, self.measure(end.jump, parameters)),
+                       before + end.slide.ahead / self.find_units(parameters)[:, 1])
         bonded = find_bonded(parameters)
         own = np.where(bonded, own, before)
         return {SEPARATION.name: own, DAMAGE.name: np.where(bonded, self.softening.find_damage(own), 1.0)}
@@ -160,6 +155,17 @@ class Cohesive(FrictionLaw):
         unit = self.find_units(parameters)
         stiffness = np.where(find_bonded(parameters)[:, None], _stack_strengths(parameters), 0.0) / unit
         return np.asarray(0.5 * self.softening.traction(x) / x * (stiffness * jump**2).sum(axis=1))
+
+    def dissipate(self, passage: Passage, rubbed: Real, parameters: Parameters) -> Real:
+        """By damage where pairs end open; by the integral of the friction bound, less what is stored more in the bonds,
+        where they slide (theory, 109)."""
+        (old, new), (before, after) = passage.internal, passage.jump
+        opened = self.dissipate_open(before, after, old, new, parameters)
+        pressed = -np.minimum(0.5 * (passage.p_n[0] + passage.p_n[1]), 0.0)
+        bound = self.work_of_bond(old[SEPARATION.name], new[SEPARATION.name], parameters)
+        slid = bound + parameters["friction"] * pressed * np.abs(after - before)[:, 1]
+        slid -= passage.stored[1] - passage.stored[0]
+        return np.maximum(np.where(passage.opened, opened, np.where(passage.slips, slid, 0.0)), 0.0)
 
     def dissipate_open(self, before: Real, after: Real, old: Values, new: Values, parameters: Parameters) -> Real:
         """What a step from jumps to jumps (k, 2) of open pairs dissipates (k,), energy per area; of a step with a

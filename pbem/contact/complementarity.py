@@ -31,8 +31,8 @@ from pbem.contact.laws import (
     evaluate_strength,
     plastic_slip,
     resists_slip,
+    tensile_limit,
 )
-from pbem.contact.modes import tensile_limit
 from pbem.contact.pivoting import solve_by_pivoting
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.

@@ -46,8 +46,15 @@ class InternalVariable:
 SLIP_PATH = InternalVariable(
     "slip_path", "length", lambda _: 0.0, lambda old, slip, duration, _: old + slip, carry="as the jump"
 )
+
+
+def keep_value(old: NDArray[Any], slip: Real, duration: float, parameters: Parameters) -> NDArray[Any]:
+    """How a variable advances that its law advances otherwise: see `FrictionLaw.advance`."""
+    return old
+
+
 # Brittle bonds fail within Newton's method, by the loads that they find there.
-BROKEN = InternalVariable("broken", "none", lambda _: False, lambda old, slip, duration, _: old, kind="?")
+BROKEN = InternalVariable("broken", "none", lambda _: False, keep_value, kind="?")
 # The variables of all pairs, whatever their law.
 COMMON = (SLIP_PATH, BROKEN)
 
@@ -90,19 +97,61 @@ class Slide:
         return Slide(self.ahead[pairs], {name: values[pairs] for name, values in self.start.items()}, self.duration)
 
 
+@dataclass(frozen=True)
+class Dilation:
+    """opening (k,): by how much slip has pushed faces apart in a step so far, length >= 0; by_traction, by_slip: its
+    derivatives by p_n and by the slip."""
+
+    opening: Real
+    by_traction: Real
+    by_slip: Real
+
+
+@dataclass(frozen=True)
+class StepEnd:
+    """How a step ends for k pairs.
+
+    p_n: normal traction, less the fluid pressure inside. slide: its ahead is the plastic slip of pairs that slip in
+    touch, 0 of others. jump (k, 2): without what elastic joints take. opened: pairs that are open.
+    """
+
+    p_n: Real
+    slide: Slide
+    jump: Real
+    opened: Bool
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What k pairs do in a step: pairs of arrays, before and after it.
+
+    p_n: normal tractions, less the fluid pressure inside, 0 of open pairs before. jump (k, 2): without what elastic
+    joints take, no opening of closed pairs. internal: the variables of their law. stored: what it stored, energy per
+    area. opened, slips (k,): pairs that end open, or slipping.
+    """
+
+    p_n: tuple[Real, Real]
+    jump: tuple[Real, Real]
+    internal: tuple[Mapping[str, NDArray[Any]], Mapping[str, NDArray[Any]]]
+    stored: tuple[Real, Real]
+    opened: Bool
+    slips: Bool
+
+
 class FrictionLaw(ABC):
     """A friction law of closed pairs. Parameters are arrays (k,), by the names of the law's own arguments.
 
     variables: what it remembers beside the common variables. linear: the bound is cohesion - friction p_n whatever was
     before, as Coulomb's. creeps: the bound rises with the rate of slip from nothing, so that closed pairs never stick;
     then it depends on the step's duration, and `guess_slip` is asked. bonds: open pairs have tractions until their
-    bonds are lost (see pbem.contact.cohesive).
+    bonds are lost (see pbem.contact.cohesive). dilates: slip pushes the faces apart, as `dilate` says.
     """
 
     variables: tuple[InternalVariable, ...] = ()
     linear = False
     creeps = False
     bonds = False
+    dilates = False
 
     @abstractmethod
     def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:
@@ -126,6 +175,28 @@ class FrictionLaw(ABC):
     def guess_slip(self, slide: Slide, parameters: Parameters) -> Real:
         """Of a law that creeps: a slip (k,) > 0 to begin the step with, as at the rate of the last one."""
         raise NotImplementedError
+
+    def dilate(self, p_n: Real, slide: Slide, parameters: Parameters) -> Dilation:
+        """Of a law that dilates: what the slip ahead adds to the opening at the normal traction (as for `strength`).
+        """
+        raise NotImplementedError
+
+    def find_tension(self, start: Mapping[str, NDArray[Any]], parameters: Parameters) -> Real | None:
+        """The tension (k,) that bonds still bear; None where that is the tensile strength of the pairs."""
+        return None
+
+    def advance(self, end: StepEnd, parameters: Parameters) -> Mapping[str, NDArray[Any]]:
+        """The internal variables that depend on more than the slip, at the end of a step."""
+        return {}
+
+    def store(self, jump: Real, state: Mapping[str, NDArray[Any]], parameters: Parameters) -> Real | float:
+        """What the law gives back in unloading from jumps (k, 2), energy per area."""
+        return 0.0
+
+    def dissipate(self, passage: Passage, rubbed: Real, parameters: Parameters) -> Real:
+        """What is dissipated in a step (k,), energy per area; rubbed: by the tractions along the faces alone, and by
+        bonds that are lost at once."""
+        return rubbed
 
     @property
     def integrates(self) -> bool:

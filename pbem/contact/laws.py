@@ -14,8 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.cohesive import Cohesive
-from pbem.contact.declaration import BROKEN, COMMON, SLIP_PATH, FrictionLaw, InternalVariable, Slide, list_variables
+from pbem.contact.declaration import (
+    BROKEN,
+    COMMON,
+    SLIP_PATH,
+    FrictionLaw,
+    InternalVariable,
+    Slide,
+    StepEnd,
+    list_variables,
+)
 from pbem.contact.friction_bound import Strength
 from pbem.contact.strength import choose_strength
 from pbem.mesh.mesh import Mesh
@@ -241,9 +249,19 @@ def spread_values(values: Sequence[Value], owner: Integer, places: Places) -> Re
     return result
 
 
+def find_effective(laws: PairLaws, p_n: Real, pressure: Real) -> Real:
+    """Normal tractions (m,) less the pressure of the fluid that is inside of closed parts."""
+    return np.asarray(p_n + np.where(laws.fluid_inside, pressure, 0.0))
+
+
+def take_values(internal: Mapping[str, NDArray[Any]], pairs: Integer) -> dict[str, NDArray[Any]]:
+    """The internal variables of some pairs."""
+    return {name: values[pairs] for name, values in internal.items()}
+
+
 def evaluate_strength(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -> Strength:
     """Friction bound of all pairs and its derivatives; brittle pairs that are broken have no cohesion."""
-    effective = p_n + np.where(laws.fluid_inside, pressure, 0.0)
+    effective = find_effective(laws, p_n, pressure)
     result = Strength(np.zeros(laws.count), np.zeros(laws.count), np.zeros(laws.count))
     for group in laws.strengths:
         at, own = group.pairs, slide.take(group.pairs)
@@ -255,6 +273,16 @@ def evaluate_strength(laws: PairLaws, p_n: Real, slide: Slide, pressure: Real) -
         part = group.law.strength(effective[at], own, **parameters)
         result.bound[at], result.by_traction[at], result.by_slip[at] = part.bound, part.by_traction, part.by_slip
     return result
+
+
+def tensile_limit(laws: PairLaws, memory: Memory) -> Real:
+    """Tensile strength (m,), none where a brittle bond is lost, and what is left of those that soften."""
+    limit = np.where(memory.broken, 0.0, laws.tensile_strength)
+    for group in laws.strengths:
+        tension = group.law.find_tension(take_values(memory.internal, group.pairs), group.parameters)
+        if tension is not None:
+            limit[group.pairs] = tension
+    return limit
 
 
 def resists_slip(laws: PairLaws) -> Bool:
@@ -328,20 +356,25 @@ def plastic_slip(laws: PairLaws, state: PairState) -> Real:
     return state.g_s - laws.compliance_s * state.p_s
 
 
-def commit(laws: PairLaws, memory: Memory, modes: ModeState, state: PairState) -> Memory:
-    """What is remembered of a converged step (theory, 50)."""
+def slip_ahead(modes: ModeState, memory: Memory, slip: Real) -> Real:
+    """Length of the present step's slip (m,) in the sense of the friction traction, 0 against it (theory, 50)."""
+    ahead = np.where(modes.mode == SLIP, modes.sign * (slip - memory.slip), 0.0)
+    return np.maximum(ahead, 0.0)
+
+
+def commit(laws: PairLaws, memory: Memory, modes: ModeState, state: PairState, pressure: Real) -> Memory:
+    """What is remembered of a converged step with a fluid pressure (m,) (theory, 50)."""
     slip = plastic_slip(laws, state)
     slipped = np.where(modes.mode == SLIP, np.abs(slip - memory.slip), 0.0)
     internal = {name: values.copy() for name, values in memory.internal.items()}
     for variable, at, parameters in _list_parts(laws):
         old = memory.internal[variable.name][at]
         internal[variable.name][at] = variable.advance(old, slipped[at], memory.duration, parameters)
+    effective, slide = find_effective(laws, state.p_n, pressure), memory.look_ahead(slipped)
+    jump, opened = np.stack([state.g_n - laws.compliance_n * state.p_n, slip], axis=1), modes.mode == OPEN
     for group in laws.strengths:
-        if isinstance(group.law, Cohesive):
-            at = group.pairs
-            start = {name: values[at] for name, values in memory.internal.items()}
-            jump = np.stack([state.g_n - laws.compliance_n * state.p_n, slip], axis=1)[at]
-            own = group.law.advance(start, jump, modes.mode[at] == OPEN, slipped[at], group.parameters)
-            for name, values in own.items():
-                internal[name][at] = values
+        at = group.pairs
+        end = StepEnd(effective[at], slide.take(at), jump[at], opened[at])
+        for name, values in group.law.advance(end, group.parameters).items():
+            internal[name][at] = values
     return Memory(modes, slip, internal, state.p_n, state.g_n)

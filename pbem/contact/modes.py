@@ -12,8 +12,7 @@ from typing import Literal
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.closure import find_closure, find_pressed, measure_closure_error
-from pbem.contact.cohesive import Cohesive
+from pbem.contact.closure import find_closure, find_pressed
 from pbem.contact.laws import (
     OPEN,
     SLIP,
@@ -26,7 +25,10 @@ from pbem.contact.laws import (
     find_creeping,
     plastic_slip,
     resists_slip,
+    slip_ahead,
+    tensile_limit,
 )
+from pbem.contact.seat import find_opening_at_rest, find_seat, linearise_dilation, measure_clearance, measure_seat_error
 from pbem.contact.separating import begin_jump, judge_bonds, linearise_bonds, measure_bond_error
 
 Frozen = Literal["nothing", "slip", "strength"]
@@ -86,8 +88,9 @@ def linearise(
     tangent[closed, G_N, 0] = (by_joint * traction_scale)[closed]
     offset[closed, G_N] = np.where(laws.stiffening > 0, joint - by_joint * admissible, 0.0)[closed]
     offset[stick, G_S] = memory.slip[stick]
-    offset[stick, G_N] += laws.rest[stick]
-    strength = evaluate_strength(laws, admissible, memory.look_ahead(slip_ahead(modes, memory, slip)), pressure)
+    offset[closed, G_N] += find_opening_at_rest(laws, modes, memory)[closed]
+    ahead = slip_ahead(modes, memory, slip)
+    strength = evaluate_strength(laws, admissible, memory.look_ahead(ahead), pressure)
     creeps = find_creeping(laws)
     by_n = modes.sign * (np.zeros(laws.count) if frozen == "strength" else strength.by_traction)
     by_s = strength.by_slip if frozen == "nothing" else np.where(creeps, strength.by_slip, 0.0)
@@ -103,6 +106,11 @@ def linearise(
     tangent[slips, G_S] = (laws.compliance_s[:, None] * along)[slips]
     tangent[slips, G_S, 1] += unit[slips]
     offset[slips, G_S] = (begin + laws.compliance_s * constant)[slips]
+    if any(group.law.dilates for group in laws.strengths):
+        rises = linearise_dilation(
+            laws, modes, memory, admissible, slip, begin, unit, pressure, frozen != "strength")
+        tangent[slips, G_N] += (rises.tangent * [traction_scale, 1.0])[slips]
+        offset[slips, G_N] += rises.offset[slips]
     tangent[is_open, G_N, 0] = 1.0
     tangent[is_open, G_S, 1] = 1.0
     offset[is_open, P_N] = -pressure[is_open]
@@ -146,22 +154,6 @@ def carry_over(state: Real, after: Linearisation, traction_scale: float) -> Real
     return np.asarray(np.linalg.solve(after.tangent[at, both], left[..., None])[..., 0])
 
 
-def tensile_limit(laws: PairLaws, memory: Memory) -> Real:
-    """Tensile strength (m,), none where a brittle bond is lost, and what is left of those that soften."""
-    limit = np.where(memory.broken, 0.0, laws.tensile_strength)
-    for group in laws.strengths:
-        if isinstance(group.law, Cohesive):
-            start = {name: values[group.pairs] for name, values in memory.internal.items()}
-            limit[group.pairs] = group.law.find_tension(start, group.parameters)
-    return limit
-
-
-def slip_ahead(modes: ModeState, memory: Memory, slip: Real) -> Real:
-    """Length of the present step's slip (m,) in the sense of the friction traction, 0 against it (theory, 50)."""
-    ahead = np.where(modes.mode == SLIP, modes.sign * (slip - memory.slip), 0.0)
-    return np.maximum(ahead, 0.0)
-
-
 def measure_law_error(
     laws: PairLaws, modes: ModeState, state: PairState, memory: Memory, pressure: Real, floor: float = 0.0
 ) -> float:
@@ -185,7 +177,7 @@ def measure_law_error(
         inside = (np.minimum(low, high) <= state.p_s) & (state.p_s <= np.maximum(low, high))
         error = np.where(creeps, np.where(inside, 0.0, np.abs(state.p_s - middle)), error)
     worst = max(float(error[slips].max(initial=0.0)), measure_bond_error(laws, modes, state, memory, pressure),
-                float(measure_closure_error(laws, modes, state, pressure).max(initial=0.0)))
+                measure_seat_error(laws, modes, memory, state, pressure))
     return worst / scale if scale > 0 else 0.0
 
 
@@ -267,8 +259,9 @@ def update_active_set(
     is_open = modes.mode == OPEN
     slip = plastic_slip(laws, state)
     creeps = find_creeping(laws)
-    apart = state.g_n - find_closure(laws, state.p_n, pressure)[0]
-    pressed = np.where(state.p_n + pressure > 0, find_pressed(laws, modes, state, pressure), state.p_n)
+    apart = measure_clearance(laws, memory, state, pressure)
+    seat = find_seat(laws, modes, memory, state, pressure)
+    pressed = np.where(state.p_n + pressure > 0, find_pressed(laws, modes, state, pressure, seat), state.p_n)
     normal = pressed + stiffness * np.where(is_open, apart, 0.0)
     still = (modes.mode == STICK) | (creeps & ~is_open)
     tangential = state.p_s + stiffness * np.where(still, 0.0, slip - memory.slip)

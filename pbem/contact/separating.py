@@ -61,7 +61,9 @@ def stick_bonded(laws: PairLaws, memory: Memory, modes: ModeState, state: PairSt
 
     memory: of the beginning of a step; state: in which further bonds may be lost.
     """
-    holds = find_bonded(laws, memory if state is None else commit(laws, memory, modes, state)) & (modes.mode == OPEN)
+    if state is not None:  # bonds do not ask for the fluid pressure
+        memory = commit(laws, memory, modes, state, np.zeros(laws.count))
+    holds = find_bonded(laws, memory) & (modes.mode == OPEN)
     return ModeState(np.where(holds, STICK, modes.mode).astype(np.int8), modes.sign) if holds.any() else modes
 
 

@@ -15,10 +15,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from pbem.arrays import Bool, Real
-from pbem.contact.barton_bandis import BartonBandis
+from pbem.contact.barton_bandis import BartonBandis, DilatingJoint
 from pbem.contact.cohesive import COHESIVE
 from pbem.contact.custom import CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
+from pbem.contact.dilating import ConstantDilation
 from pbem.contact.friction_bound import Strength
 from pbem.contact.rate_and_state import RateAndState
 from pbem.errors import Fault
@@ -73,7 +74,31 @@ def _evaluate_cone(p_n: Real, friction: Real, cohesion: Real) -> Strength:
     return Strength(np.maximum(bound, 0.0), np.where(bound >= 0, -friction, 0.0), np.zeros_like(p_n))
 
 
+class DilatingCoulomb(ConstantDilation, Coulomb):
+    """Coulomb's law of faces that dilate."""
+
+    def strength(  # type: ignore[override]
+        self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, dilation_angle: Real, dilation_slip: Real
+    ) -> Strength:
+        """See Coulomb."""
+        return _evaluate_cone(p_n, friction, cohesion)
+
+
+class DilatingSlipWeakening(ConstantDilation, SlipWeakening):
+    """Friction that falls with slip, of faces that dilate."""
+
+    def strength(  # type: ignore[override]
+        self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, friction_dynamic: Real, slip_distance: Real,
+        dilation_angle: Real, dilation_slip: Real,
+    ) -> Strength:
+        """See SlipWeakening."""
+        return SlipWeakening.strength(self, p_n, slide, friction, cohesion, friction_dynamic, slip_distance)
+
+
 coulomb, slip_weakening = Coulomb(), SlipWeakening()
+dilating_coulomb, dilating_slip_weakening, dilating_joint = (
+    DilatingCoulomb(), DilatingSlipWeakening(), DilatingJoint()
+)  # fmt: skip
 # Further laws by their names in a case; they are given the keys of their own. Shapes of softening are told apart by
 # `choose_strength`.
 LAWS: Mapping[str, FrictionLaw] = {
@@ -83,7 +108,13 @@ LAWS: Mapping[str, FrictionLaw] = {
 
 def list_model_variables(model: Model) -> tuple[InternalVariable, ...]:
     """The internal variables of all pairs of a model."""
-    return list_variables(LAWS[law.kind] for law in list_laws(model).values() if law.kind in LAWS)
+    laws = {id(law): law for law in list_laws(model).values()}  # many that were generated together have one law
+    return list_variables(choose_strength(law)[0] for law in laws.values() if law.kind != "custom")
+
+
+def list_own_variables(law: Law) -> tuple[InternalVariable, ...]:
+    """The internal variables that a law has beside the common ones."""
+    return () if law.kind == "custom" else choose_strength(law)[0].variables
 
 
 def choose_strength(law: Law, text: str | None = None) -> tuple[FrictionLaw, dict[str, Value]]:
@@ -92,14 +123,19 @@ def choose_strength(law: Law, text: str | None = None) -> tuple[FrictionLaw, dic
         own = {"friction": law.friction, "cohesion": law.cohesion, "tensile_strength": law.tensile_strength}
         return COHESIVE[law.softening], {**own, **law.parameters}
     if law.kind in LAWS:
-        return LAWS[law.kind], dict(law.parameters)
+        own_law = dilating_joint if "dilation_part" in law.parameters else LAWS[law.kind]
+        return own_law, dict(law.parameters)
     if law.kind == "custom":
         assert law.file is not None
         return CustomLaw(law.file, read_law_texts([law.file])[law.file] if text is None else text), dict(law.parameters)
     parameters: dict[str, Value] = {"friction": law.friction, "cohesion": law.cohesion}
+    dilates = "dilation_angle" in law.parameters
+    if dilates:
+        parameters |= {"dilation_slip": np.inf, **law.parameters}
     if law.friction_dynamic is None or law.slip_distance is None:
-        return coulomb, parameters
-    return slip_weakening, parameters | {"friction_dynamic": law.friction_dynamic, "slip_distance": law.slip_distance}
+        return dilating_coulomb if dilates else coulomb, parameters
+    parameters |= {"friction_dynamic": law.friction_dynamic, "slip_distance": law.slip_distance}
+    return dilating_slip_weakening if dilates else slip_weakening, parameters
 
 
 def list_laws(model: Model) -> dict[str, Law]:

@@ -31,8 +31,9 @@ from pbem.contact.laws import (
     SLIP,
     ModeState,
     PairState,
+    tensile_limit,
 )
-from pbem.contact.modes import Proposal, limit_changes, tensile_limit
+from pbem.contact.modes import Proposal, limit_changes
 
 # The most pairs that are pivoted; Newton's steps among them cost a hundredth of it.
 MOST_PIVOTED = 300

@@ -11,6 +11,7 @@ Kind = Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "c
 _FRICTION = ("friction", "friction_angle", "cohesion")
 _STRENGTH = (*_FRICTION, "tensile_strength")
 _WEAKENING = ("friction_dynamic", "slip_distance")
+_DILATION = ("dilation_angle", "dilation_slip")
 _JOINT = ("normal_stiffness", "tangential_stiffness")
 _FILE = ("file", "parameters")
 # Keys of further laws that all have to be there, friction as `friction` or `friction_angle`; and those that need not.
@@ -22,7 +23,7 @@ NEEDED: dict[Kind, tuple[str, ...]] = {
 OPTIONAL: dict[Kind, tuple[str, ...]] = {
     "rate_and_state": ("initial_state",),
     "cohesive": ("cohesion", "fracture_energy_shear", "softening", "friction"),
-    "barton_bandis": ("closure",),
+    "barton_bandis": ("closure", "dilation_part", "peak_slip"),
 }
 # The laws that depend on time.
 TIMED: tuple[Kind, ...] = ("rate_and_state",)
@@ -35,18 +36,19 @@ _FURTHER = tuple(key for keys in OWN_KEYS.values() for key in keys)
 _COHESIVE, _ROUGH = OWN_KEYS["cohesive"], OWN_KEYS["barton_bandis"]
 # Keys of a law's table that would change nothing, by the kind of law.
 WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
-    "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, "gap", "pressure", *_FILE, *_FURTHER),
-    "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_JOINT, *_FILE, *_FURTHER),
+    "bonded": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_DILATION, "gap", "pressure", *_FILE,
+               *_FURTHER),
+    "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_DILATION, *_JOINT, *_FILE, *_FURTHER),
     "coulomb": (*_FILE, *_FURTHER),
-    "frictionless": (*_FILE, *_FURTHER),
+    "frictionless": (*_DILATION, *_FILE, *_FURTHER),
     "rate_and_state": (
-        "cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_FILE, *_COHESIVE, *_ROUGH,
+        "cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_DILATION, *_FILE, *_COHESIVE, *_ROUGH,
     ),
-    "cohesive": ("cohesion_lost", *_WEAKENING, "gap", *_FILE, *OWN_KEYS["rate_and_state"], *_ROUGH),
+    "cohesive": ("cohesion_lost", *_WEAKENING, *_DILATION, "gap", *_FILE, *OWN_KEYS["rate_and_state"], *_ROUGH),
     "barton_bandis": (
-        *_STRENGTH, "cohesion_lost", *_WEAKENING, *_FILE, *OWN_KEYS["rate_and_state"], *_COHESIVE,
+        *_STRENGTH, "cohesion_lost", *_WEAKENING, *_DILATION, *_FILE, *OWN_KEYS["rate_and_state"], *_COHESIVE,
     ),
-    "custom": (*_FRICTION, *_WEAKENING, *_FURTHER),
+    "custom": (*_FRICTION, *_WEAKENING, *_DILATION, *_FURTHER),
 }
 # Keys that say the same.
 _EITHER = {"friction": "friction_angle", "friction_angle": "friction"}
@@ -61,7 +63,7 @@ def combine_laws(family: LawTable, own: LawTable) -> LawTable:
     keys: dict[str, Any] = {key: getattr(family, key) for key in fields if key in family.model_fields_set}
     named = {key: getattr(own, key) for key in fields if key in own.model_fields_set}
     if own.law is not None and "law" in named:
-        smooth = (*_FRICTION, *_WEAKENING) if own.law == "frictionless" else ()
+        smooth = (*_FRICTION, *_WEAKENING, *_DILATION) if own.law == "frictionless" else ()
         for key in (*WITHOUT_EFFECT[own.law], *smooth):
             keys.pop(key, None)
         if own.law != family.law and (own.law in NEEDED or family.law in NEEDED):

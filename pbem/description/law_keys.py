@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pbem.description.values import NotNegative, Positive, ResidualAngle
+from pbem.description.values import FrictionAngle, NotNegative, PartOrWhole, Positive, ResidualAngle, RoughnessNumber
 
 LawName = Annotated[
     Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "barton_bandis", "custom"]
@@ -36,7 +36,8 @@ ResidualFrictionAngle = Annotated[
     Field(description="of `barton_bandis`: friction angle of smooth, weathered faces, degrees; below 70"),
 ]
 Roughness = Annotated[
-    NotNegative | None, Field(description="of `barton_bandis`: joint roughness coefficient, degrees; 0 (smooth) to 20")
+    RoughnessNumber | None,
+    Field(description="of `barton_bandis`: joint roughness coefficient, degrees; 0 (smooth) to 20"),
 ]
 WallStrength = Annotated[
     Positive | None, Field(description="of `barton_bandis`: compressive strength of the joint's walls, stress")
@@ -47,4 +48,36 @@ Closure = Annotated[
         description="of `barton_bandis`: largest closure V, length; `normal_stiffness` is then that at the beginning, "
         "K in sigma = K v/(1 - v/V)"
     ),
+]
+DilationAngle = Annotated[
+    FrictionAngle | None,
+    Field(
+        description="of `coulomb`: slip pushes the faces apart by the tangent of this angle, degrees; at most the "
+        "angle of friction"
+    ),
+]
+DilationSlip = Annotated[
+    Positive | None, Field(description="... over this length of slip, in either direction; without end if not given")
+]
+DilationPart = Annotated[
+    PartOrWhole | None,
+    Field(
+        description="of `barton_bandis`: the dilation angle is this part of JRC log10(JCS/sigma), 0.5 under high and 1 "
+        "under low stress; needs `peak_slip`"
+    ),
+]
+PeakSlip = Annotated[
+    Positive | None,
+    Field(
+        description="of `barton_bandis`: slip at which dilation is steepest, length; about a hundredth of the joint's"
+    ),
+]
+RateEffect = Annotated[Positive | None, Field(description="a of `rate_and_state`: how friction rises with ln V")]
+StateEffect = Annotated[
+    NotNegative | None, Field(description="b of `rate_and_state`: how friction rises with ln theta")
+]
+ReferenceRate = Annotated[Positive | None, Field(description="V0 of `rate_and_state`, length/time")]
+InitialState = Annotated[
+    Positive | None,
+    Field(description="theta of `rate_and_state` at the start, time; `slip_distance/reference_rate` if not given"),
 ]

@@ -170,14 +170,12 @@ class LawTable(Table):
     slip_distance: Positive | None = Field(
         None, description="... over this length of slip; L of `rate_and_state`, over which the state changes"
     )
-    rate_effect: Positive | None = Field(None, description="a of `rate_and_state`: how friction rises with ln V")
-    state_effect: NotNegative | None = Field(
-        None, description="b of `rate_and_state`: how friction rises with ln theta"
-    )
-    reference_rate: Positive | None = Field(None, description="V0 of `rate_and_state`, length/time")
-    initial_state: Positive | None = Field(
-        None, description="theta of `rate_and_state` at the start, time; `slip_distance/reference_rate` if not given"
-    )
+    dilation_angle: law_keys.DilationAngle = None
+    dilation_slip: law_keys.DilationSlip = None
+    rate_effect: law_keys.RateEffect = None
+    state_effect: law_keys.StateEffect = None
+    reference_rate: law_keys.ReferenceRate = None
+    initial_state: law_keys.InitialState = None
     fracture_energy: law_keys.FractureEnergy = None
     fracture_energy_shear: law_keys.ShearFractureEnergy = None
     softening: law_keys.Softening = None
@@ -185,6 +183,8 @@ class LawTable(Table):
     jrc: law_keys.Roughness = None
     jcs: law_keys.WallStrength = None
     closure: law_keys.Closure = None
+    dilation_part: law_keys.DilationPart = None
+    peak_slip: law_keys.PeakSlip = None
     normal_stiffness: Positive | None = Field(
         None, description="elastic joint in front of the law, stress per length; without this key rigid"
     )

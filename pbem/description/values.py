@@ -60,6 +60,8 @@ Spread = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=10), 
 Poisson = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=-1, lt=0.5), _SHORT]
 HalfTurn = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=90), _SHORT]
 FrictionAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, lt=90), _SHORT]
+RoughnessNumber = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=20), _SHORT]
+PartOrWhole = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1), _SHORT]
 ResidualAngle = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, lt=70), _SHORT]
 Power = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1, le=10), _SHORT]
 ProductTolerance = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=1e-13, le=1e-2), _SHORT]

@@ -26,7 +26,7 @@ from pbem.model.varying import Places, Value, Varying, evaluate
 
 # What of a law may vary along its curve.
 VARYING_KEYS = ("friction", "cohesion", "tensile_strength", "friction_dynamic", "gap")
-# A tensile strength may be written with so few digits that it exceeds cohesion/friction by this part.
+# A tensile strength or an angle may be written with so few digits that it exceeds what is possible by this part.
 APEX = 1e-4
 
 
@@ -59,6 +59,8 @@ def read_law(
         path, wrong = _find_file(case, loc, table)
         faults += wrong
     smooth = kind in ("frictionless", "custom")
+    parameters = {key: getattr(table, key) for key in ("dilation_angle", "dilation_slip") if table.dilation_angle}
+    parameters = {key: value for key, value in parameters.items() if value is not None and not smooth}
     law = Law(
         kind="custom" if kind == "custom" else "coulomb",
         friction=0.0 if smooth else friction,
@@ -72,7 +74,7 @@ def read_law(
         normal_stiffness=joint[0],
         tangential_stiffness=joint[1],
         file=path,
-        parameters=dict(table.parameters) if kind == "custom" else {},
+        parameters=dict(table.parameters) if kind == "custom" else parameters,
         frictionless=smooth or 0.0 in (table.friction, table.friction_angle),
     )
     return law, faults
@@ -125,6 +127,10 @@ def _read_parameters(loc: KeyPath, table: LawTable, kind: Kind) -> tuple[dict[st
     if given.get("closure") is not None and table.normal_stiffness is None:
         found = f"a closure of '{loc[-1]}' without its stiffness at the beginning"
         faults.append(Fault.at((*loc, "closure"), found, "normal_stiffness with it, or no such key"))
+    for key, other in (("dilation_part", "peak_slip"), ("peak_slip", "dilation_part")):
+        if given.get(key) is not None and given[other] is None:
+            found = f"a {key} of '{loc[-1]}' without {other}"
+            faults.append(Fault.at((*loc, key), found, "both of them for a joint that dilates, or none"))
     return {key: value for key, value in given.items() if value is not None}, faults
 
 
@@ -169,6 +175,7 @@ def _evaluate_or_nan(value: Value, places: Places) -> Real:
 def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fault]:
     """What `_check_strengths` asks of numbers, where one of them varies along the curve."""
     strengths = (law.friction, law.cohesion, law.tensile_strength, law.friction_dynamic)
+    climb = math.tan(math.radians(law.parameters.get("dilation_angle", 0.0))) if law.kind == "coulomb" else 0.0
     if not any(isinstance(value, Varying) for value in strengths):
         return
 
@@ -183,6 +190,12 @@ def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fau
     if law.friction_dynamic is not None and least < 0:
         found = f"friction_dynamic above the static friction at {format_point(place)}"
         yield Fault.at((*loc, "friction_dynamic"), found, "friction that falls with slip everywhere on the curve")
+    for friction in (law.friction, law.friction_dynamic):
+        if climb and isinstance(friction, Varying):
+            least, place = find_least(curve, functools.partial(evaluate, friction))
+            if climb > least * (1 + APEX):
+                found = f"dilation_angle beyond the angle of friction at {format_point(place)}"
+                yield Fault.at((*loc, "dilation_angle"), found, "at most the angle of friction everywhere on the curve")
     least, place = find_least(curve, reaches)
     if law.tensile_strength and law.softening is None and least < 0:
         found = f"tensile_strength beyond the apex of the cone of friction at {format_point(place)}"
@@ -234,10 +247,26 @@ def _check_strengths(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Faul
         found = f"tensile_strength = {tension:g} beyond the apex of the cone of friction, {apex:.6g}"
         expected = f"at most cohesion/friction = {apex:.6g}: faces that slide without any strength carry no tension"
         yield Fault.at((*loc, "tensile_strength"), found, expected)
+    yield from _check_dilation(loc, table, kind)
     strengths = {"coulomb": ("cohesion", "tensile_strength"), "frictionless": ("tensile_strength",)}.get(kind, ())
     if table.cohesion_lost and strengths and not any(getattr(table, key) for key in strengths):
         expected = f"{' or '.join(strengths)} > 0, which can be lost"
         yield Fault.at((*loc, "cohesion_lost"), "cohesion_lost on faces without strength", expected)
+
+
+def _check_dilation(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Fault]:
+    """Slip that lifts its load by more than friction takes would give work from nothing."""
+    if kind != "coulomb":
+        return
+    if table.dilation_slip is not None and table.dilation_angle is None:
+        found, expected = f"a dilation_slip of '{loc[-1]}' without dilation_angle", "both of them, or none"
+        yield Fault.at((*loc, "dilation_slip"), found, expected)
+    climb = math.tan(math.radians(table.dilation_angle or 0.0))
+    least = min([_find_friction(table), *(each for each in [table.friction_dynamic] if isinstance(each, float))])
+    if not isinstance(table.friction, VaryingTable) and climb > least * (1 + APEX):
+        angle = math.degrees(math.atan(least))
+        found = f"dilation_angle = {table.dilation_angle:g} on '{loc[-1]}', beyond the angle of friction, {angle:.6g}"
+        yield Fault.at((*loc, "dilation_angle"), found, "at most the angle of friction: dilation cannot give work")
 
 
 def _find_file(case: Case, loc: KeyPath, table: LawTable) -> tuple[str | None, list[Fault]]:

@@ -11,6 +11,7 @@ from pbem.contact.closure import find_closure
 from pbem.contact.declaration import SLIP_PATH, Slide
 from pbem.contact.laws import PairLaws, collect_laws, evaluate_strength, find_creeping
 from pbem.contact.loads import evaluate_pressure
+from pbem.contact.seat import read_dilation
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
@@ -52,7 +53,7 @@ class BetweenNodes:
         count = laws.count
         penetration, tension, cone = np.zeros(count), np.zeros(count), np.zeros(count)
         for plain, rooted in zip(self._plain, self._rooted, strict=True):
-            opening = self._read(contact.opening, rooted)
+            opening = self._read(contact.opening - read_dilation(laws, contact.internal), rooted)
             p_n, p_s, path = (
                 self._read(each, plain) for each in (contact.traction_n, contact.traction_s, contact.slip_path)
             )

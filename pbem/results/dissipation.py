@@ -9,11 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Real
 from pbem.contact.closure import find_closure, measure_stiffening
-from pbem.contact.cohesive import SEPARATION, Cohesive
-from pbem.contact.declaration import BROKEN, SLIP_PATH, Slide
-from pbem.contact.laws import OPEN, SLIP, PairLaws, StrengthGroup, evaluate_strength, start_memory
+from pbem.contact.declaration import BROKEN, SLIP_PATH, Passage, Slide
+from pbem.contact.laws import (
+    OPEN,
+    SLIP,
+    PairLaws,
+    StrengthGroup,
+    evaluate_strength,
+    find_effective,
+    start_memory,
+    take_values,
+)
 from pbem.mesh.mesh import Mesh
 from pbem.solve.problem.step import ContactState
 
@@ -78,12 +86,10 @@ def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairR
     p_n, p_s = contact.traction_n, contact.traction_s
     rigid_n, rigid_s = contact.opening - find_closure(laws, p_n, pressure)[0], contact.slip - laws.compliance_s * p_s
     bond = measure_stiffening(laws, p_n, pressure)
+    jump = np.stack([np.where(contact.mode == OPEN, rigid_n, 0.0), rigid_s], axis=1)
     for group in laws.strengths:
-        if isinstance(group.law, Cohesive):
-            at = group.pairs
-            opened = np.where(contact.mode == OPEN, rigid_n, 0.0)
-            jump, state = np.stack([opened, rigid_s], axis=1)[at], _take(contact.internal, at)
-            bond[at] = group.law.store(jump, state, group.parameters)
+        at = group.pairs
+        bond[at] += group.law.store(jump[at], take_values(contact.internal, at), group.parameters)
     return PairRecord(
         contact.mode, p_n, p_s, contact.opening, contact.slip,
         rigid_n, rigid_s, pressure, contact.internal, bond,
@@ -101,7 +107,10 @@ def measure_work(
     """The work in a step; weight (m,): length of the boundary that belongs to each pair; opened (m,): those that a
     stage has opened (theory, 76, 97)."""
     moved, slid = new.g_n - old.g_n, new.g_s - old.g_s
-    pressed = 0.5 * (old.p_n + old.pressure + new.p_n + new.pressure) * moved
+    # In closed parts the fluid is or is not.
+    wet = laws.fluid_inside | (old.mode == OPEN) | (new.mode == OPEN)
+    fluid = np.where(wet, 0.5 * (old.pressure + new.pressure), 0.0) * moved
+    pressed = 0.5 * (old.p_n + new.p_n) * moved + fluid
     trapezoid = pressed + 0.5 * (old.p_s + new.p_s) * slid
     stored = _store(new) - _store(old)
     slipped, parted = new.rigid_s - old.rigid_s, new.rigid_n - old.rigid_n
@@ -117,16 +126,17 @@ def measure_work(
     dissipated = np.where(slides & ~lost, by_law, falling) + torn
     friction = np.where(slides, by_law, np.where(lost, 0.0, falling))
     for group in laws.strengths:
-        if isinstance(group.law, Cohesive):
-            at = group.pairs
-            dissipated[at] = friction[at] = _dissipate_bonds(group.law, group, old, new)
+        at, passage = group.pairs, _describe_passage(laws, group, old, new)
+        dissipated[at], friction[at] = (
+            group.law.dissipate(passage, each[at], group.parameters) for each in (dissipated, friction)
+        )
     opened = np.zeros(laws.count, dtype=bool) if opened is None else opened
     taken = np.where(opened, trapezoid - stored, 0.0)
     dissipated, friction = (np.where(opened, 0.0, each) for each in (dissipated, friction))
     return PairWork(
         stored=float(weight @ stored),
         dissipated=float(weight @ dissipated),
-        fluid=float(weight @ (0.5 * (old.pressure + new.pressure) * moved)),
+        fluid=float(weight @ fluid),
         excess=float(weight @ (trapezoid - stored - dissipated - taken)),
         friction=float(weight @ friction),
         surplus=weight * (trapezoid - stored - friction - taken),
@@ -139,25 +149,19 @@ def _store(record: PairRecord) -> Real:
     return 0.5 * (record.p_n * normal + record.p_s * tangential) + record.bond
 
 
-def _take(internal: Mapping[str, NDArray[Any]], pairs: Integer) -> dict[str, NDArray[Any]]:
-    return {name: values[pairs] for name, values in internal.items()}
-
-
-def _dissipate_bonds(law: Cohesive, group: StrengthGroup, old: PairRecord, new: PairRecord) -> Real:
-    """What the pairs (k,) of a cohesive law dissipate in a step, energy per area: by damage where they end open, by the
-    integral of the friction bound, less what is stored more in the bonds, where they slide (theory, 109)."""
-    at, parameters = group.pairs, group.parameters
-    before, after = _take(old.internal, at), _take(new.internal, at)
+def _describe_passage(laws: PairLaws, group: StrengthGroup, old: PairRecord, new: PairRecord) -> Passage:
+    """What the pairs of a group do in a step."""
+    at = group.pairs
+    before, after = (find_effective(laws, each.p_n, each.pressure)[at] for each in (old, new))
     jumps = [
         np.stack([np.where(each.mode == OPEN, each.rigid_n, 0.0), each.rigid_s], axis=1)[at] for each in (old, new)
     ]
-    opened = law.dissipate_open(jumps[0], jumps[1], before, after, parameters)
-    pressed = -np.minimum(0.5 * (np.where(old.mode == OPEN, 0.0, old.p_n) + new.p_n)[at], 0.0)
-    slid = np.abs(new.rigid_s - old.rigid_s)[at]
-    bound = law.work_of_bond(before[SEPARATION.name], after[SEPARATION.name], parameters)
-    rubbed = bound + parameters["friction"] * pressed * slid - (new.bond - old.bond)[at]
     mode = new.mode[at]
-    return np.maximum(np.where(mode == OPEN, opened, np.where(mode == SLIP, rubbed, 0.0)), 0.0)
+    return Passage(
+        (np.where(old.mode[at] == OPEN, 0.0, before), after), (jumps[0], jumps[1]),
+        (take_values(old.internal, at), take_values(new.internal, at)), (old.bond[at], new.bond[at]), mode == OPEN,
+        mode == SLIP,
+    )  # fmt: skip
 
 
 # Gauss points and weights on (0, 1).

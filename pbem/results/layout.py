@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Integer
 from pbem.contact.laws import find_joint
-from pbem.contact.strength import LAWS, list_model_variables
+from pbem.contact.strength import list_model_variables, list_own_variables
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions
@@ -220,8 +220,7 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
         for quantity, values in fixed.items():
             create_array(interface, quantity, values[first:last])
         # The common variables are for going on with a run.
-        kind = find_joint(model, name).law.kind
-        own = [variable.name for variable in LAWS[kind].variables] if kind in LAWS else []
+        own = [variable.name for variable in list_own_variables(find_joint(model, name).law)]
         for quantity in (*SHOWN, *own):
             sources[quantity].create_view(interface, quantity, first, len(pairs))
         _describe_interface(interface, model, mesh, name, bool(mesh.pairs.crack[pairs].any()))
@@ -234,7 +233,7 @@ def _describe_interface(group: h5py.h5g.GroupID, model: Model, mesh: Mesh, name:
     set_attribute(group, "second", joint.second or "")
     set_attribute(group, "crack", crack)
     set_attribute(group, "law", joint.law.kind)
-    own = joint.law.parameters if joint.law.kind in LAWS else {}
+    own = joint.law.parameters if joint.law.kind != "custom" else {}
     for key, value in {**vars(joint.law), **own}.items():
         if key != "kind" and isinstance(value, str | bool | int | float):
             set_attribute(group, key, value)

@@ -169,6 +169,7 @@ def describe_law(law: Law) -> str:
         return ", ".join([law.kind, *(f"{name.replace('_', ' ')} {value:.4g}" for name, value in numbers.items())])
     strengths = {"friction": law.friction, "cohesion": law.cohesion, "tensile strength": law.tensile_strength}
     given = [f"{name} {value:.4g}" for name, value in strengths.items() if value or name == "friction"]
+    given += [f"{name.replace('_', ' ')} {value:.4g}" for name, value in law.parameters.items()]
     return ", ".join([*given, *([f"gap {law.gap:.4g}"] if law.gap else [])])
 
 

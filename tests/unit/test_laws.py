@@ -448,7 +448,7 @@ def test_memory_adds_up_the_way_of_slipping_pairs() -> None:
     modes = ModeState(np.array([SLIP, STICK, OPEN], dtype=np.int8), np.array([-1.0, 1.0, 1.0]))
     # jump = plastic slip + 0.5 p_s
     state = PairState(np.array([-1.0, -2.0, 0.0]), np.array([-0.5, 0.4, 0.0]), np.zeros(3), np.array([-0.35, 0.3, 0.7]))
-    after = commit(laws, before, modes, state)
+    after = commit(laws, before, modes, state, np.zeros(3))
     np.testing.assert_allclose(after.slip, [-0.1, 0.1, 0.7])
     np.testing.assert_allclose(after.path, [1.2, 1.0, 1.0])
     np.testing.assert_array_equal(after.normal_traction, state.p_n)

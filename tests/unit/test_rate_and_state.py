@@ -127,7 +127,7 @@ def test_without_time_friction_is_as_it_was_at_the_end_of_the_step() -> None:
     memory = remember(laws, duration=duration)
     during = LAW.strength(np.full(count, -1.0), memory.look_ahead(ahead), **spread(count))
     state = PairState(np.full(count, -1.0), during.bound, np.zeros(count), ahead)
-    after = commit(laws, memory, ModeState(np.full(count, SLIP), np.ones(count)), state)  # type: ignore[arg-type]
+    after = commit(laws, memory, ModeState(np.full(count, SLIP), np.ones(count)), state, np.zeros(count))  # type: ignore[arg-type]
     np.testing.assert_allclose(after.internal["slip_rate"], ahead / duration, rtol=1e-14)
     np.testing.assert_allclose(after.internal["slip_path"], ahead, rtol=1e-14)
     still = LAW.strength(np.full(count, -1.0), after.look_ahead(np.zeros(count)), **spread(count))
@@ -139,7 +139,7 @@ def test_open_pairs_age_without_slip() -> None:
     laws = make_creeping()
     memory = remember(laws, duration=4.0)
     after = commit(laws, memory, ModeState(np.array([OPEN]), np.ones(1)),  # type: ignore[arg-type]
-                   PairState(np.zeros(1), np.zeros(1), np.ones(1), np.ones(1)))
+                   PairState(np.zeros(1), np.zeros(1), np.ones(1), np.ones(1)), np.zeros(1))
     assert after.internal["state"][0] == pytest.approx(L / V0 + 4.0)
     assert after.internal["slip_rate"][0] == after.path[0] == 0.0
 

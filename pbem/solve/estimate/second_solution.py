@@ -82,7 +82,8 @@ class SecondSolution:
             self._watch.check()  # a law that failed has answered with no strength
             self._take_over(step.contact)
             raise
-        self.memory = commit(self.problem.laws, solution.memory, solution.modes, solution.pairs)
+        self.memory = commit(
+            self.problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
         self._watch.check()
         found = describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
         self._contact = found.contact
@@ -120,7 +121,8 @@ class SecondSolution:
         if not solved.checked:
             solved = self.tangent.check(solved, constraints, load, law)
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
-        return Solution(solved.unknowns, solved.v, pairs.bear(load.carried), modes, memory, solved.residual, ())
+        pairs, residual = pairs.bear(load.carried), solved.residual
+        return Solution(solved.unknowns, solved.v, pairs, modes, memory, residual, (), load.pressure)
 
     def _carry_internal(self, contact: ContactState) -> dict[str, NDArray[Any]]:
         """The internal variables of the run's pairs, carried over as they are declared to be."""

@@ -25,6 +25,7 @@ from pbem.contact.modes import (
     measure_law_error,
     update_active_set,
 )
+from pbem.contact.seat import find_seat
 from pbem.contact.separating import begin_jump, choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError, StopError
@@ -47,7 +48,7 @@ from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
 class Solution:
     """A converged state: unknowns (2 nodes,), v (4 nodes,), pairs, modes and the iterations that led to it.
 
-    memory: that of the last step, with the brittle bonds that failed in this one.
+    memory: that of the last step, with the brittle bonds that failed in this one. pressure (m,): of fluid.
     """
 
     unknowns: Real
@@ -57,6 +58,7 @@ class Solution:
     memory: Memory
     residual: float
     iterations: tuple[Iteration, ...]
+    pressure: Real
 
 
 # Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
@@ -178,7 +180,8 @@ def _search_modes(
             for note in hold.describe(modes) if comm.rank == 0 else ():
                 reporter.note(note)
             whole = pairs.bear(load.carried)
-            return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations))
+            return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations),
+                            load.pressure)
         refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
         if refused:
             forcing.used = False  # no solution was asked for that
@@ -208,8 +211,9 @@ def _search_modes(
             lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped, now)),
         )
-        normal_traction = choose_traction(laws, former, normal_traction, pairs, load.pressure)
         found = plastic_slip(laws, pairs)
+        seat = find_seat(laws, former, memory, pairs, load.pressure)
+        normal_traction = choose_traction(laws, former, normal_traction, pairs, load.pressure, seat)
         if search.wary and frozen == "slip" and not proposal.changed.any():
             found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]
                 now.fingerprint(), at, new, now.mode == SLIP))

@@ -11,6 +11,7 @@ from pbem.contact.arrangement import begin_memory, find_arrangement
 from pbem.contact.closure import find_closure
 from pbem.contact.laws import Memory, start_memory
 from pbem.contact.loads import evaluate_load
+from pbem.contact.seat import read_dilation
 from pbem.model.construction import arrange_model
 from pbem.model.model import Construction
 from pbem.solve.problem.problem import Problem
@@ -47,9 +48,9 @@ def arrange_problem(problem: Problem, stage: int, factor: float, contact: Contac
 
 
 def find_rest(problem: Problem, contact: ContactState, pressure: Real) -> Real:
-    """The openings (m,) without those of elastic joints, under a pressure of fluid (m,)."""
+    """The openings (m,) without those of elastic joints, under a pressure of fluid (m,), and without dilation."""
     rest: Real = contact.opening - find_closure(problem.laws, contact.traction_n, pressure)[0]
-    return rest
+    return rest - read_dilation(problem.laws, contact.internal)
 
 
 def begin_stage(problem: Problem, stage: int, memory: Memory, contact: ContactState) -> Memory:

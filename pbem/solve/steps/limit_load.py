@@ -14,9 +14,9 @@ from scipy import sparse
 
 from pbem.arrays import Integer, Real
 from pbem.contact.constraints import build_constraints
-from pbem.contact.laws import Memory, PairLaws
+from pbem.contact.laws import Memory, PairLaws, tensile_limit
 from pbem.contact.loads import Load
-from pbem.contact.modes import P_N, P_S, Linearisation, tensile_limit
+from pbem.contact.modes import P_N, P_S, Linearisation
 from pbem.solve.problem.problem import Problem
 
 # What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.

@@ -108,7 +108,7 @@ def march(
                 solution, reached, ceiling = _advance(
                     problem, tangent, memory, stage, reached, planned, ceiling, reporter, guess
                 )
-                memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs)
+                memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
                 number += 1
                 step = describe_step(problem, solution, memory, number, stage, reached, recover)
                 noted = note_imbalance(problem, step, noted, reporter)

@@ -67,7 +67,8 @@ def find_seat(laws: PairLaws, modes: ModeState, memory: Memory, state: PairState
 def measure_clearance(laws: PairLaws, memory: Memory, state: PairState, pressure: Real) -> Real:
     """By how much (m,) open pairs clear their asperities: negative where they would touch.
 
-    What slips in the step rides up on them, also if it parts: else pairs would stay open because others lift them.
+    What slips in the step rides up on them, also if it parts: else pairs would stay open because others lift them
+    (theory, 117).
     """
     slide = memory.look_ahead(np.abs(plastic_slip(laws, state) - memory.slip))
     added = evaluate_dilation(laws, state.p_n, slide, pressure).opening

@@ -27,13 +27,21 @@ Shift = tuple[float, float]
 
 @dataclass(frozen=True)
 class PointSupport:
-    """place: a point (complex) of a curve of a region; held: whether its displacement along x and along y is said."""
+    """place: a point (complex) of boundaries; held: whether its displacement along x and along y is said.
+
+    owners: every region with the point on its boundary, and the curve of it, the nearest one first. Where these can
+    move against each other the support is that of the first one that is free to move (see pbem.model.support_motions).
+    """
 
     name: str
-    region: str
-    curve: str
+    owners: tuple[tuple[str, str], ...]
     place: complex
     held: tuple[bool, bool]
+
+    @property
+    def curve(self) -> str:
+        """The nearest curve."""
+        return self.owners[0][1]
 
     def move(self, shift: complex) -> PointSupport:
         """The same about another origin: the places of the model have become less by the shift."""
@@ -68,6 +76,7 @@ def place_point_supports(
     """Curves and regions of the supports; faults for those that lie on none, and for names of two things."""
     supports: dict[str, PointSupport] = {}
     faults: list[Fault] = []
+    sides = {**roles.shared, **{curve: (region,) for curve, region in roles.outer.items()}}
     for name, table in case.point_supports.items():
         loc, point = ("point_supports", name), complex(*table.at)
         if name in case.curves:
@@ -76,14 +85,17 @@ def place_point_supports(
         if table.ux is None and table.uy is None:
             faults.append(Fault.at(loc, "a support without ux and uy", "ux, uy or both"))
             continue
-        regions = {**{curve: pair[0] for curve, pair in roles.shared.items()}, **roles.outer}
-        near = min(((*project(leg, point)[::-1], curve.name, leg) for curve in curves.values() for leg in curve.legs
-                    if curve.name in regions), key=lambda each: each[0], default=None)
-        if near is None or near[0] > ON_CURVE * curves[near[2]].length:
-            away = "" if near is None else f", {near[0]:.3g} from the nearest curve '{near[2]}'"
-            faults.append(Fault.at((*loc, "at"), f"{format_point(point)}{away}", "a point on the boundary of a region"))
+        near = sorted(((*project(leg, point)[::-1], curve.name, leg) for curve in curves.values() for leg in curve.legs
+                       if curve.name in sides), key=lambda each: each[0])
+        if not near or near[0][0] > ON_CURVE * curves[near[0][2]].length:
+            said = f", {near[0][0]:.3g} from the nearest curve '{near[0][2]}'" if near else ""
+            faults.append(Fault.at((*loc, "at"), f"{format_point(point)}{said}", "a point on the boundary of a region"))
             continue
-        place = complex(near[3].point(np.array(near[1])))
-        supports[name] = PointSupport(name, regions[near[2]], near[2], place,
+        owners: dict[str, str] = {}
+        for away, _, curve, _ in near:
+            for region in sides[curve] if away <= ON_CURVE * curves[curve].length else ():
+                owners.setdefault(region, curve)
+        _, at, _, leg = near[0]
+        supports[name] = PointSupport(name, tuple(owners.items()), complex(leg.point(np.array(at))),
                                       (table.ux is not None, table.uy is not None))
     return supports, faults

@@ -14,6 +14,7 @@ from pbem.contact.loads import evaluate_load
 from pbem.contact.seat import read_dilation
 from pbem.model.construction import arrange_model
 from pbem.model.model import Construction
+from pbem.model.support_motions import find_settled_motion
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState
 from pbem.solve.problem.tangent import TangentOperator
@@ -35,15 +36,17 @@ def arrange_problem(problem: Problem, stage: int, factor: float, contact: Contac
     What faces that open still carry is that of the stage's beginning times the part of it that is left (theory, 95).
     """
     arrangement = find_arrangement(problem.model, problem.mesh, problem.outer, stage)
+    motion = find_settled_motion(problem.model, stage)
     if arrangement is None:
-        return problem
+        return replace(problem, settled_motion=motion) if motion else problem
     pressure = evaluate_load(problem.model, problem.mesh, problem.outer, stage, factor).pressure
     borne = np.stack([contact.traction_n + pressure, contact.traction_s], axis=1)
     opens = arrangement.opening & ~problem.laws.parted & ~problem.laws.follows & (factor < 1)
     carried = np.where(opens[:, None], borne, 0.0) / (1 - factor if factor < 1 else 1.0)
     laws = arrangement.hold(problem.laws, find_rest(problem, contact, pressure))
     return replace(
-        problem, model=arrange_model(problem.model, stage), laws=laws, arrangement=arrangement, carried=carried
+        problem, model=arrange_model(problem.model, stage), laws=laws, arrangement=arrangement, carried=carried,
+        settled_motion=motion,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Protocol, TypeVar
 
@@ -30,6 +30,7 @@ from pbem.mesh.numbering import number_components, split_components
 from pbem.mesh.parts import Parts, find_parts
 from pbem.model.model import Model
 from pbem.model.rigid_body_modes import RigidBodyMode, find_plane_translations
+from pbem.model.support_motions import Motion
 from pbem.parallel import do_on_first, gather_parts, norm_of_parts
 from pbem.solve.problem.tangent import TangentOperator
 
@@ -100,7 +101,8 @@ class Problem:
     traction_scale: modulus/length, the unit of traction unknowns. equation_scale (nodes,): factors of the equations.
     anchors: in the system, for good; anchored: the free motions for which they were made. arrangement: of a stage in
     which not all is as the laws say, whose problem it is (see pbem.solve.problem.arranged); carried (m, 2): traction of
-    the pairs that open in it at its beginning.
+    the pairs that open in it at its beginning; settled_motion: where supports had moved the bodies by
+    then.
     """
 
     comm: MPI.Intracomm
@@ -115,6 +117,7 @@ class Problem:
     anchored: tuple[RigidBodyMode, ...]
     arrangement: Arrangement | None = None
     carried: Real | None = None
+    settled_motion: Motion = field(default_factory=dict)
 
     @property
     def unknowns(self) -> int:

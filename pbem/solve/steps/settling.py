@@ -6,6 +6,7 @@ whose mean is none but for known fields. Here the one that is wanted is added, w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,11 +16,16 @@ from pbem.contact.loads import Load
 from pbem.mesh.interpolation import interpolate, locate_nodes
 from pbem.mesh.mesh import list_faces
 from pbem.model.rigid_body_modes import RigidBodyMode
-from pbem.model.support_motions import see_motions
+from pbem.model.support_motions import (
+    NOWHERE,
+    Motion,
+    PlacedSupport,
+    choose_parts,
+    place_supports,
+    see_motions,
+    weigh_turns,
+)
 from pbem.solve.problem.problem import Problem
-
-# A body is moved aside by so many times its size's part rather than turned.
-TURNS = 1e-4
 
 
 @dataclass(frozen=True)
@@ -40,22 +46,20 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     far as they work on these motions: an error of the mesh, since the loads balance (theory, 102).
     """
     mesh, model = problem.mesh, problem.model
-    supports = list(model.point_supports.values())
-    none = {support.name: np.zeros(2) for support in supports}
-    if not motions or not (supports or load.of_points.any()):
-        return Settled(np.zeros_like(displacement), np.zeros(mesh.pairs.count), none) if supports else None
-    seen = see_motions(supports, motions)
-    wanted = _find_wanted(problem, displacement, stage, factor)
-    # Mean motions of point loads' fields, which have any, where no support says otherwise.
+    none = {name: np.zeros(2) for name in model.point_supports}
+    if not motions or not (none or load.of_points.any()):
+        return Settled(np.zeros_like(displacement), np.zeros(mesh.pairs.count), none) if none else None
+    placed = place_supports(model.point_supports.values(), motions, model.stages[stage].construction.removed)
+    seen = see_motions(placed, motions)
+    wanted = _find_wanted(problem, placed, displacement, stage, factor)
+    # Mean motions of point loads' fields, which have any, where no support says otherwise; and where supports had moved
+    # what this construction cut free.
     functional = problem.anchor_parts[1][:, : 2 * mesh.nodes]
-    moves = np.stack([_split(_move(problem, motion)[: mesh.nodes]) for motion in motions], axis=1)
-    parts = np.linalg.lstsq(seen, wanted, rcond=None)[0] if len(seen) else np.zeros(len(motions))
-    free = _find_null_space(seen, len(motions))
-    if free.shape[1]:
-        resting = np.linalg.lstsq(functional @ moves, -functional @ _split(load.of_points), rcond=None)[0]
-        rows = _weigh_turns(problem, motions)
-        parts = parts + free @ np.linalg.lstsq(rows @ free, rows @ (resting - parts), rcond=None)[0]
-    moved = sum((part * _move(problem, motion) for part, motion in zip(parts, motions, strict=True)),
+    moves = np.stack([_split(_move(problem, motion.velocities)[: mesh.nodes]) for motion in motions], axis=1)
+    rest = _move(problem, problem.settled_motion)[: mesh.nodes] - load.of_points
+    resting = np.linalg.lstsq(functional @ moves, functional @ _split(rest), rcond=None)[0]
+    parts = choose_parts(seen, wanted, resting, weigh_turns(motions, _find_middles(problem, motions), model.size))
+    moved = sum((part * _move(problem, motion.velocities) for part, motion in zip(parts, motions, strict=True)),
                 np.zeros(len(displacement), dtype=complex))
     reactions = none
     if len(seen):
@@ -64,25 +68,28 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
         power = _split(forces) @ moves
         carried = -np.linalg.lstsq(seen.T, power, rcond=None)[0]
         at = 0
-        for support in supports:
-            for axis, held in enumerate(support.held):
+        for each in placed:
+            for axis, held in enumerate(each.support.held):
                 if held:
-                    reactions[support.name][axis] = carried[at]
+                    reactions[each.support.name][axis] = carried[at]
                     at += 1
     return Settled(moved, _slide(problem, motions, parts), reactions)
 
 
-def _find_wanted(problem: Problem, displacement: Complex, stage: int, factor: float) -> Real:
+def _find_wanted(
+    problem: Problem, placed: Sequence[PlacedSupport], displacement: Complex, stage: int, factor: float
+) -> Real:
     """What is missing of the supports' displacements (m,), x before y."""
     mesh, model = problem.mesh, problem.model
     before = model.stages[stage - 1].support_values if stage > 0 else {}
     after = model.stages[stage].support_values
     wanted = []
-    for support in model.point_supports.values():
+    for each in placed:
+        support = each.support
         start, end = np.array(before.get(support.name, (0.0, 0.0))), np.array(after[support.name])
         value = start + factor * (end - start)
-        own = np.flatnonzero((mesh.curve == mesh.curve_names.index(support.curve))
-                             & (mesh.region == mesh.region_names.index(support.region)))
+        own = np.flatnonzero((mesh.curve == mesh.curve_names.index(each.curve))
+                             & (mesh.region == mesh.region_names.index(each.region)))
         s = mesh.geometry.select(own).preimage(np.array([support.place])).ravel()
         off = np.maximum(np.abs(s.imag), np.abs(s.real) - 1)
         # At a corner or a joint of elements, the mean of what both have there.
@@ -98,31 +105,21 @@ def _find_wanted(problem: Problem, displacement: Complex, stage: int, factor: fl
     return np.array(wanted)
 
 
-def _find_null_space(rows: Real, count: int) -> Real:
-    """Orthonormal combinations (count, k) of motions that conditions (m, count) do not see; they are independent."""
-    if not len(rows):
-        return np.eye(count)
-    return np.linalg.svd(rows)[2][len(rows) :].T
-
-
-def _weigh_turns(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> Real:
-    """What motions do to every region: rather than to turn it is moved aside where supports ask for some of either."""
-    mesh, rows = problem.mesh, []
+def _find_middles(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> dict[str, complex]:
+    """The middles of the regions that motions move."""
+    mesh, middles = problem.mesh, {}
     for number, name in enumerate(mesh.region_names):
         own = mesh.node_region == number
         if any(name in motion.velocities for motion in motions) and own.any():
-            middle = complex(mesh.position[own].mean())
-            moved = [motion.velocities.get(name, (0j, 0.0)) for motion in motions]
-            shift = np.array([a + 1j * spin * middle for a, spin in moved])
-            rows += [shift.real, shift.imag, np.array([spin for _, spin in moved]) * problem.model.size / TURNS]
-    return np.array(rows)
+            middles[name] = complex(mesh.position[own].mean())
+    return middles
 
 
-def _move(problem: Problem, motion: RigidBodyMode) -> Complex:
+def _move(problem: Problem, motion: Motion) -> Complex:
     """The displacement (f,) of a motion on all faces."""
     mesh, faces = problem.mesh, list_faces(problem.mesh)
-    shift = np.array([motion.velocities.get(name, (0j, 0.0))[0] for name in mesh.region_names])
-    spin = np.array([motion.velocities.get(name, (0j, 0.0))[1] for name in mesh.region_names])
+    shift = np.array([motion.get(name, NOWHERE)[0] for name in mesh.region_names])
+    spin = np.array([motion.get(name, NOWHERE)[1] for name in mesh.region_names])
     return np.asarray(shift[faces.region] + 1j * spin[faces.region] * faces.position)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import pbem
-from tests.verification.dilating_sample import YOUNG, Sheared, make_case, predict
+from tests.verification.dilating_sample import SIDES, YOUNG, Sheared, make_case, predict
 
 FRICTION, ANGLE = 0.6, 12.0
 CLIMB = math.tan(math.radians(ANGLE))
@@ -146,6 +146,22 @@ def test_weakening_joints_dilate_too(tmp_path: Path) -> None:
     check(results, states)
 
 
+def make_crack(half: float, pressure: float, tau: float, at: complex = 0j, turn: float = 0.0) -> dict[str, Any]:
+    """A crack of a half-length, pressed and sheared, at a place in half-lengths and turned by degrees, in a plane."""
+    way = half * np.exp(1j * math.radians(turn))
+    stress = np.array([[0.0, tau], [tau, -pressure]])
+    rotation = np.array([[way.real, -way.imag], [way.imag, way.real]]) / half
+    turned = rotation @ stress @ rotation.T
+    ends = [at * half - way, at * half + way]
+    return {
+        "materials": {"m": {"young": 1e3, "poisson": 0.2}},
+        "curves": {"crack": {"points": [[z.real, z.imag] for z in ends], "elements": 10}},
+        "regions": {"plane": {"material": "m", "infinite": True, "cracks": ["crack"]}},
+        "interfaces": {"crack": {"friction": FRICTION, "dilation_angle": ANGLE}},
+        "remote": {"sxx": float(turned[0, 0]), "syy": float(turned[1, 1]), "sxy": float(turned[0, 1])},
+    }
+
+
 @pytest.mark.parametrize(("scheme", "operator", "half", "at", "turn", "sense"), [
     ("SST", "dense", 1.0, 0j, 0.0, 1), ("THST", "hierarchical", 50.0, 900 + 300j, 25.0, -1),
     ("HST", "dense", 1e-3, 0j, -60.0, 1),
@@ -155,18 +171,7 @@ def test_a_crack_that_dilates_has_both_factors(
 ) -> None:
     """The opening is tan(angle) times the slip: uniform drops of both tractions, K_I = tan(angle) |K_II|."""
     pressure, tau = 2.0, sense * 3.0
-    way = half * np.exp(1j * math.radians(turn))
-    stress = np.array([[0.0, tau], [tau, -pressure]])
-    rotation = np.array([[way.real, -way.imag], [way.imag, way.real]]) / half
-    turned = rotation @ stress @ rotation.T
-    ends = [at * half - way, at * half + way]
-    case = {
-        "materials": {"m": {"young": 1e3, "poisson": 0.2}},
-        "curves": {"crack": {"points": [[z.real, z.imag] for z in ends], "elements": 10}},
-        "regions": {"plane": {"material": "m", "infinite": True, "cracks": ["crack"]}},
-        "interfaces": {"crack": {"friction": FRICTION, "dilation_angle": ANGLE}},
-        "remote": {"sxx": turned[0, 0], "syy": turned[1, 1], "sxy": turned[0, 1]}, "analysis": {"scheme": scheme},
-    }
+    case = make_crack(half, pressure, tau, at, turn) | {"analysis": {"scheme": scheme}}
     results = pbem.run(case, tmp_path / "crack.h5", operator=operator)
     drop = (abs(tau) - FRICTION * pressure) / (1 + FRICTION * CLIMB)
     factor = math.sqrt(math.pi * half)
@@ -179,3 +184,69 @@ def test_a_crack_that_dilates_has_both_factors(
     np.testing.assert_allclose(contact.traction_n[-1], -pressure - CLIMB * drop, rtol=1e-6)
     released = (1 - 0.2**2) / 1e3 * (1 + CLIMB**2) * (drop * factor) ** 2
     np.testing.assert_allclose(tips.J[-1], released, rtol=1e-5)
+
+
+def add_stage(case: dict[str, Any], top: dict[str, float], shear: float = 0.0, **more: Any) -> None:
+    """One stage more, in which the stress is uniform with this shear on the sides."""
+    boundary = {"top": top, **{name: {"ts": shear} for name in SIDES}}
+    case["stages"].append({"name": f"further {len(case['stages'])}", "steps": 1, "boundary": boundary} | more)
+
+
+@pytest.mark.parametrize("scheme", ["SST", "HST"])
+def test_faces_that_parted_touch_again_where_they_were_lifted_to(scheme: str, tmp_path: Path) -> None:
+    """Pulled off and pressed again, without a shift in between: sooner than before they had slipped."""
+    ends = (0.02,)
+    states = predict(PRESSED, ends, lambda stress: FRICTION * stress, climb_up_to(math.inf))
+    case = make_case(make_law(), PRESSED, ends, states, scheme=scheme)
+    for lift in (0.01, states[1].dilation + 1e-5, states[1].dilation - 1e-5, -PRESSED):
+        add_stage(case, {"un": lift, "us": -ends[0]})
+    contact = pbem.run(case, tmp_path / "joint.h5").contact["mid"]
+    lifted = contact.internal["dilation"]
+    np.testing.assert_allclose(lifted[1:], states[1].dilation, rtol=1e-8)
+    assert [set(mode) for mode in contact.mode[2:].tolist()] == [{2}, {2}, {0}, {0}]
+    for step, lift in ((2, 0.01), (3, states[1].dilation + 1e-5)):
+        np.testing.assert_allclose(contact.opening[step], lift, rtol=1e-8)
+    for step, pressed in ((4, 1e-5), (5, PRESSED + states[1].dilation)):
+        np.testing.assert_allclose(contact.traction_n[step], -0.5 * YOUNG * pressed, rtol=1e-6)
+        np.testing.assert_allclose(contact.opening[step], lifted[1], rtol=1e-12)
+
+
+def test_a_joint_that_is_bolted_dilates_on_when_it_is_released(tmp_path: Path) -> None:
+    """Bonded as it lies, opening included; then it goes on as if nothing had been, also after it was held open."""
+    ends = (0.02, 0.03)
+    states = predict(PRESSED, ends, lambda stress: FRICTION * stress, climb_up_to(math.inf))
+    case = make_case(make_law(), PRESSED, ends[:1], states[:2])
+    held = YOUNG / 4 * (0.035 - states[1].slip)
+    add_stage(case, {"un": -PRESSED, "us": -0.035}, held, close=["mid"])
+    add_stage(case, {"un": -PRESSED, "us": -ends[1]}, states[2].shear, release=["mid"])
+    add_stage(case, {"un": 0.02, "us": -ends[1]}, open=["mid"])
+    add_stage(case, {"un": -PRESSED, "us": -ends[1]}, release=["mid"])
+    results = pbem.run(case, tmp_path / "joint.h5")
+    contact = results.contact["mid"]
+    dilation = [0.0, *[states[1].dilation] * 2, *[states[2].dilation] * 3]
+    for step, expected in enumerate(dilation):
+        np.testing.assert_allclose(contact.internal["dilation"][step], expected, rtol=1e-8)
+    np.testing.assert_allclose(contact.opening[2], contact.opening[1], rtol=1e-12)
+    np.testing.assert_allclose(np.abs(contact.traction_s[2]), held, rtol=1e-8)
+    np.testing.assert_allclose(contact.traction_n[3], -states[2].stress, rtol=1e-8)
+    np.testing.assert_allclose(contact.traction_n[5], -states[2].stress, rtol=1e-6)
+    energy = results.energy
+    left = energy.external - energy.elastic - energy.dissipated - energy.released - energy.removed
+    assert np.abs(left).max() < 1e-8 * np.abs(energy.external).max()
+
+
+def test_values_that_are_set_and_swept_reach_the_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each row of a sweep over the angle is the closed formula's, and so is a run with other values of keys."""
+    monkeypatch.chdir(tmp_path)
+    angles = [0.0, 4.0, 25.0]
+    table = pbem.sweep(make_crack(1.0, 2.0, 3.0), {"interfaces.crack.dilation_angle": angles},
+                       ["tips.crack.KI", "tips.crack.KII"], out="crack.csv")
+    assert table["status"].tolist() == ["finished"] * 3
+    climbs = np.tan(np.radians(angles))
+    drops = (3.0 - FRICTION * 2.0) / (1 + FRICTION * climbs) * math.sqrt(math.pi)
+    np.testing.assert_allclose(table["tips.crack.KI"], climbs * drops, rtol=1e-6)
+    np.testing.assert_allclose(np.abs(table["tips.crack.KII"]), drops, rtol=1e-6)
+    states = predict(PRESSED, ENDS[:2], find_rough_shear, climb_rough)
+    case = make_case(ROUGH | {"dilation_part": 0.9, "peak_slip": 1.0, "jrc": 3.0}, PRESSED, ENDS, states)
+    values = {f"interfaces.mid.{key}": ROUGH[key] for key in ("dilation_part", "peak_slip", "jrc")}
+    check(pbem.run(case, "joint.h5", set=values), states)

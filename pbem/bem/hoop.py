@@ -9,7 +9,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
-from pbem.mesh.interpolation import differentiate, differentiate_tips, locate_nodes, split_faces
+from pbem.mesh.interpolation import differentiate_at_nodes, differentiate_tips, locate_nodes, split_faces
 from pbem.mesh.mesh import Mesh, second_face_nodes
 
 # Directions that differ by less (radians) are one: rounding of places far from the origin.
@@ -107,7 +107,7 @@ def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Comple
     if mesh.order == 0:
         return _difference_neighbours(mesh, values)
     local = locate_nodes(mesh)
-    shapes = differentiate(local, local)
+    shapes = differentiate_at_nodes(local)
     tips = np.flatnonzero(mesh.tip)
     if with_tips and len(tips):
         shapes[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
@@ -134,7 +134,7 @@ def _differentiate_patches(mesh: Mesh, values: Complex) -> tuple[Integer, Comple
                              along[latter, :1] + length[inner, None]], axis=1) / length[inner, None]
     nodal = values.reshape(mesh.elements, -1)
     known = np.concatenate([nodal[former, -1:], nodal[inner], nodal[latter, :1]], axis=1)
-    shapes = differentiate(places - 0.5, places[:, 1:-1] - 0.5)
+    shapes = differentiate_at_nodes(places)[:, 1:-1]
     return inner, np.einsum("epj,ej->ep", shapes, known) / length[inner, None]
 
 

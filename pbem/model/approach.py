@@ -32,8 +32,8 @@ BEYOND = 2.0
 def find_closing(model: Model) -> frozenset[str]:
     """Contacts that do not touch at the start, and stop what the loads of a stage move otherwise freely."""
     apart = {name: one for name, one in model.contacts.items() if one.law.kind not in ("open", "bonded")}
-    motions = find_rigid_body_modes(model)
-    if not apart or not motions:
+    motions = find_rigid_body_modes(model) if apart else ()
+    if not motions:
         return frozenset()
     power = find_drive(model, motions)
     if power is None:

@@ -48,6 +48,7 @@ from pbem.model.rigid_body_modes import (
     find_least_stiffness,
     find_plane_translations,
     find_rigid_body_modes,
+    list_hold,
 )
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
@@ -130,7 +131,8 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
         return None, case, faults
     model, faults = _compose(case, roles, loading, topology, recall)
     model = replace(model, interior_points=interior)
-    faults += [*check_turning(case, model.curves), *check_facing(model)]
+    turning = recall.find("turning", (case.curves, model.curves), lambda: check_turning(case, model.curves))
+    faults += [*turning, *check_facing(model)]
     varying = [
         fault for name, interface in model.interfaces.items()
         for fault in check_along(("interfaces", name), interface.law, model.curves[name])
@@ -145,7 +147,7 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     model = move_to_own_origin(model, radii)
     if conditions_known and not varying:
         model = replace(model, closing=find_closing(model))
-        wrong, notes = _check_support(model)
+        wrong, notes = _check_support(model, recall)
         faults += wrong
         model = replace(model, notes=(*model.notes, *notes))
     return model, case, faults
@@ -337,15 +339,18 @@ def _check_hold(
     return faults, balanced
 
 
-def _check_support(model: Model) -> tuple[list[Fault], list[str]]:
+def _check_support(model: Model, recall: Recall) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
     faults: list[Fault] = []
     balanced: list[str] = []
     free: dict[str, RigidBodyMode] = {}
-    for stages in group_stages(model):
+    groups = group_stages(model)
+    free_of = recall.find("motions", list_hold(model), lambda: [
+        find_rigid_body_modes(arrange_model(model, stages[0])) for stages in groups
+    ])
+    for stages, motions in zip(groups, free_of, strict=True):
         number = stages[0]
         now = arrange_model(model, number)
-        motions = find_rigid_body_modes(now)
         wrong, resting = _check_hold(model, now, stages, motions, faults == [] and number > 0)
         faults += wrong
         balanced += resting

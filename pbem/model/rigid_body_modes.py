@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -73,6 +73,17 @@ def find_rigid_body_modes(model: Model, ties: Mapping[str, Tie | PairTie] | None
     all along it, or what single pairs of it hold; those that are not named hold what their law gives (`default_tie`).
     """
     return _find_motions(model, dict(ties or {}), plane_held=True)
+
+
+def list_hold(model: Model) -> Hashable:
+    """All that the rigid motions of `find_rigid_body_modes` depend on in any stage, to compare models by: where laws
+    differ by numbers alone, or loads do, it is equal."""
+    joints = [(joint.name, curve, first, second, default_tie(joint.law, _touches(model, joint)))
+              for joint, curve, first, second in _list_joints(model)]
+    conditions = [(name, each.frame, each.known, each.stiffness) for name, each in model.conditions.items()]
+    built = [(tuple(stage.construction.joints.items()), stage.construction.removed) for stage in model.stages]
+    return (tuple(model.curves.items()), model.regions, model.size, model.origin, tuple(model.rigid.items()),
+            model.closing, tuple(joints), tuple(conditions), tuple(built))
 
 
 def find_plane_translations(model: Model) -> tuple[RigidBodyMode, ...]:
@@ -180,17 +191,21 @@ def find_bounded(model: Model) -> dict[str, str]:
     return {side.curve: region.name for region in model.regions for loop in region.loops for side in loop.sides}
 
 
+def _list_joints(model: Model) -> list[tuple[Interface | Contact, str, str, str]]:
+    """Interfaces and contacts, each with the curve that its points are on, and the two regions."""
+    bounded = find_bounded(model)
+    return [
+        *((one, one.name, one.first, one.second) for one in model.interfaces.values() if one.second is not None),
+        *((one, one.first, bounded[one.first], bounded[one.second]) for one in model.contacts.values()),
+    ]
+
+
 def _link_regions(
     model: Model, names: list[str], ties: Mapping[str, Tie | PairTie], center: complex, scale: float
 ) -> Iterator[Link]:
     """What interfaces and contacts demand of the difference of two regions' motions, on the (first) curve's points."""
     numbers = {name: number for number, name in enumerate(names)}
-    bounded = find_bounded(model)
-    joints: list[tuple[Interface | Contact, str, str, str]] = [
-        (one, one.name, one.first, one.second) for one in model.interfaces.values() if one.second is not None
-    ]
-    joints += [(one, one.first, bounded[one.first], bounded[one.second]) for one in model.contacts.values()]
-    for joint, curve, first, second in joints:
+    for joint, curve, first, second in _list_joints(model):
         tie = ties.get(joint.name) or default_tie(joint.law, _touches(model, joint))
         if first == second or tie == "none":
             continue

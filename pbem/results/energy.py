@@ -154,10 +154,11 @@ class EnergyBalance:
         """The energies after the next step; `runaway` tells whether faces ran away in it (theory, 75)."""
         old, before, lost = self._state, self._reached, 0.0
         if step.stage != (0 if self._last is None else self._last.stage) or self._last is None:
-            held = self._add_stored(old)
+            held, before_it = self._add_stored(old), self._there
             self._arrange(step.stage)
-            old = self._describe_rest() if self._last is None else self._describe(self._last)
-            lost = held - self._add_stored(old)  # with the regions that are taken away
+            if before_it is not None or self._there is not None:
+                old = self._describe_rest() if self._last is None else self._describe(self._last)
+                lost = held - self._add_stored(old)  # with the regions that are taken away
         new, self._last = self._describe(step), step
         nodes = self._outer.node
         moved = (new.displacement - old.displacement)[nodes]

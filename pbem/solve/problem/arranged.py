@@ -46,7 +46,7 @@ def arrange_problem(problem: Problem, stage: int, factor: float, contact: Contac
     laws = arrangement.hold(problem.laws, find_rest(problem, contact, pressure))
     return replace(
         problem, model=arrange_model(problem.model, stage), laws=laws, arrangement=arrangement, carried=carried,
-        settled_motion=motion,
+        settled_motion=motion, supports={},
     )
 
 

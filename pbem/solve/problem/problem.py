@@ -102,7 +102,7 @@ class Problem:
     anchors: in the system, for good; anchored: the free motions for which they were made. arrangement: of a stage in
     which not all is as the laws say, whose problem it is (see pbem.solve.problem.arranged); carried (m, 2): traction of
     the pairs that open in it at its beginning; settled_motion: where supports had moved the bodies by
-    then.
+    then. supports: what was found to hold the bodies, by what interfaces hold.
     """
 
     comm: MPI.Intracomm
@@ -118,6 +118,7 @@ class Problem:
     arrangement: Arrangement | None = None
     carried: Real | None = None
     settled_motion: Motion = field(default_factory=dict)
+    supports: dict[str, FreeMotions] = field(default_factory=dict)
 
     @property
     def unknowns(self) -> int:
@@ -189,14 +190,13 @@ class Problem:
         def find(mode: bytes) -> FreeMotions:
             ties = find_ties(self.model, self.mesh, ModeState(np.frombuffer(mode, dtype=np.int8), sign))
             key = str(sorted(ties.items())) if all(isinstance(tie, str) for tie in ties.values()) else None
-            if key is None or key not in known:
+            if key is None or key not in self.supports:
                 support = find_free_motions(self.model, self.mesh, self.anchors, self.anchored, ties)
                 if key is None:
                     return support
-                known[key] = support
-            return known[key]
+                self.supports[key] = support
+            return self.supports[key]
 
-        known: dict[str, FreeMotions] = {}
         return lru_cache(maxsize=64)(find)
 
     @cached_property
@@ -241,11 +241,18 @@ class Problem:
         return pattern.tocsr(), functional.tocsr()
 
     def evaluate_load(self, stage: int, factor: float) -> Load:
-        """What acts at a fraction of a stage."""
-        load = evaluate_load(self.model, self.mesh, self.outer, stage, factor)
-        if self.arrangement is None or self.carried is None:
-            return load
-        return self.arrangement.adapt(load, self.mesh, self.outer, (1 - factor) * self.carried)
+        """What acts at a fraction of a stage; remembered, as the last one is asked for several times."""
+        return self._loads(stage, factor)
+
+    @cached_property
+    def _loads(self) -> Callable[[int, float], Load]:
+        def find(stage: int, factor: float) -> Load:
+            load = evaluate_load(self.model, self.mesh, self.outer, stage, factor)
+            if self.arrangement is None or self.carried is None:
+                return load
+            return self.arrangement.adapt(load, self.mesh, self.outer, (1 - factor) * self.carried)
+
+        return lru_cache(maxsize=1)(find)
 
     def measure(self, part: Real) -> float:
         """Norm of a vector spread over the ranks."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -146,24 +146,25 @@ def _advance(
     least = problem.model.solver.min_step
     if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
         raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
-    target, proportional = ceiling.choose(reached, planned, least), is_proportional(problem, memory, stage, reached)
-    tries, alike = 0, is_proportional_at_last(problem, memory, stage, reached)
+    target, tries = ceiling.choose(reached, planned, least), 0
+    proportional = cache(lambda: is_proportional(problem, memory, stage, reached))  # what a right guess never asks
     while True:
         reporter.start_step(stage, reached, target)
         refuse_without_value(problem, stage, reached, target)
-        # From rest nothing is gained by an early end.
-        refuse = _never if proportional else partial(refuse_load, problem, memory, stage, target)
         try:
             load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
             begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
             guessed = guess and guess(stage, target, begin, load.pressure)
             with note_place(stage, target):
                 solution = _solve_guessed(problem, tangent, begin, load, reporter, guessed)
-                solution = solution or solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
+                if solution is None:
+                    # From rest nothing is gained by an early end.
+                    refuse = _never if proportional() else partial(refuse_load, problem, memory, stage, target)
+                    solution = solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as error:
             balanced = find_balanced(problem, memory, stage, reached, target)
-            if proportional:
+            if proportional():
                 if balanced < target and error.reason != "free motion":
                     ceiling = ceiling.lower(target, balanced, error)
                     raise end_at_limit(problem, stage, reached, ceiling, error) from error
@@ -176,7 +177,8 @@ def _advance(
                 raise end_march(problem, memory, stage, reached, target, error) from error
             reporter.reject(error.reason, error.detail)
             tries += 1
-            target = reached + (least if alike and tries == TRIED_FROM_REST else half)
+            smallest = tries == TRIED_FROM_REST and is_proportional_at_last(problem, memory, stage, reached)
+            target = reached + (least if smallest else half)
 
 
 def _solve_guessed(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from pbem.contact.laws import PairLaws, collect_laws, find_linear
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
+from pbem.model.recall import Recall
+from pbem.model.rigid_body_modes import list_hold
 from pbem.model.support import find_anchored_motions
 from pbem.solve.petsc.session import PETSc
 from pbem.solve.problem.problem import Problem, System
@@ -35,11 +37,12 @@ MOST_BYTES = 1 << 28
 class _Kept:
     """The last problem of an operator, and its tangent operator once that is made. key, tangent_key: of `digest`.
 
-    histories: those that were finished, the last ones of them.
+    hold: what free motions depend on; histories: those that were finished, the last ones of them.
     """
 
     key: bytes
     problem: Problem
+    hold: Hashable
     tangent: TangentOperator | None = None
     tangent_key: bytes = b""
     histories: list[History] = field(default_factory=list)
@@ -61,12 +64,14 @@ class KeptProblems:
     def __init__(self, comm: MPI.Intracomm) -> None:
         self.comm = comm
         self.assembled = 0  # operators so far
+        self._recall = Recall()
         self._kept: list[_Kept] = []  # the last one used at the end
 
     def assemble(self, model: Model, mesh: Mesh) -> Problem:
         """As `assemble_problem`, with a kept operator if there is one. Raises ConvergenceError as it does."""
         outer, laws = collect_outer_nodes(model, mesh), collect_laws(model, mesh)
-        anchored = find_anchored_motions(model)
+        hold = list_hold(model)
+        anchored = self._recall.find("motions", hold, lambda: find_anchored_motions(model))
         anchors = anchor_motions(mesh, anchored)
         solver = model.solver
         key = digest((
@@ -85,8 +90,10 @@ class KeptProblems:
             system = found.problem.system
         problem = join_problem(self.comm, model, mesh, outer, laws, system, anchors, anchored)
         if found is None:
-            found = _Kept(key, problem)
-        found.problem = problem
+            found = _Kept(key, problem, hold)
+        elif found.hold == hold:
+            problem = replace(problem, supports=found.problem.supports)
+        found.problem, found.hold = problem, hold
         self._kept.append(found)
         return problem
 

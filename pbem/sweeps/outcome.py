@@ -81,7 +81,8 @@ def list_quantity_names(model: Model, mesh: Mesh) -> Names:
 class Outcome(SilentReporter):
     """The last step of a run and its energies. A reporter: a run tells `begin` and `accept`.
 
-    step: None as long as there is none; iterations: of Newton's method so far.
+    step: None as long as there is none; iterations: of Newton's method so far; notes: what was told from the first step
+    on, each once; what is said of a model before is seen by checking it.
     """
 
     model: Model
@@ -92,6 +93,8 @@ class Outcome(SilentReporter):
     def __init__(self) -> None:
         self.step: Step | None = None
         self.iterations = 0
+        self.started = False
+        self.notes: dict[str, None] = {}
 
     def begin(self, model: Model) -> None:
         """A run begins, or a further pass of one."""
@@ -99,8 +102,10 @@ class Outcome(SilentReporter):
 
     def expect(self, model: Model, mesh: Mesh) -> None:
         """The steps that follow are of this model and mesh."""
-        self.__dict__ = {"step": None, "iterations": self.iterations, "model": model, "mesh": mesh,
-                         "_balance": EnergyBalance(model, mesh, None, None), "energy": Energy(0.0, 0.0, 0.0)}
+        self.__dict__ = {
+            "step": None, "iterations": self.iterations, "started": self.started, "notes": self.notes, "model": model,
+            "mesh": mesh, "_balance": EnergyBalance(model, mesh, None, None), "energy": Energy(0.0, 0.0, 0.0),
+        }
 
     def accept(self, step: Step) -> None:
         """Take a converged step."""
@@ -108,6 +113,15 @@ class Outcome(SilentReporter):
         self.iterations += len(step.iterations)
         self.step = step
         self.__dict__.pop("_tips", None)
+
+    def start_step(self, stage: int, reached: float, target: float) -> None:
+        """A step begins."""
+        self.started = True
+
+    def note(self, text: str) -> None:
+        """Keep it if it is of the steps."""
+        if self.started:
+            self.notes[text] = None
 
     @property
     def last(self) -> Step:

@@ -109,7 +109,8 @@ def sweep(
     label, option: how messages name values, quantities.
 
     A case that does not converge is a row with the status "failed" and the reason, a combination of values that makes
-    no case one with the status "refused"; neither has quantities, but for those of steps.
+    no case one with the status "refused"; neither has quantities, but for those of steps. The reason of a row that is
+    finished tells what was noted of its steps.
 
     Raises CaseError with all that is wrong with the case, with any value by itself, and with the quantities;
     ResultFileError (a table that is another one's, a folder that cannot be written); LaunchError; StorageError;
@@ -322,7 +323,8 @@ def compute_case(
             except AbsentNameError as error:
                 absent.append(f"{each.title}: {error}")
         found.append(value)
-    reason = "; ".join([*([reason] if reason else []), *absent])
+    notes = [each.rstrip(".") for each in outcome.notes]
+    reason = "; ".join([*([reason] if reason else []), *absent, *notes])
     return Row(_cells(values), tuple(found), status, outcome.iterations, time.perf_counter() - begun, reason)
 
 

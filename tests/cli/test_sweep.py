@@ -15,6 +15,7 @@ import pbem
 from pbem.cli import main
 from pbem.errors import CaseError, ResultFileError
 from pbem.results.reader import open_results
+from pbem.solve.problem.step import SilentReporter
 from pbem.sweeps.files import name_results
 from pbem.sweeps.outcome import AbsentNameError, Names, Outcome
 from pbem.sweeps.sharing import sort_cases
@@ -50,6 +51,17 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "cracked.toml").write_text(CRACKED)
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+class Notes(SilentReporter):
+    """Keeps what is noted."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Keep it."""
+        self.texts.append(text)
 
 
 def read(path: str) -> list[dict[str, str]]:
@@ -140,6 +152,20 @@ def test_a_case_that_does_not_converge_is_a_row(folder: Path, capsys: Capture) -
     assert failed["reason"].startswith(("limit load", "free motion"))
     assert main(["sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.3,0.05", "-o", "t.csv"]) == 0
     assert "1 failed" in capsys.readouterr().out and read("t.csv")[1]["status"] == "failed"
+
+
+def test_a_row_tells_what_its_run_has_noted(folder: Path) -> None:
+    """Strains beyond linear theory are told, but not what is said of the model."""
+    Path("blocks.toml").write_text(BLOCKS + "[materials.spare]\nyoung = 1.0\npoisson = 0.2\n")
+    key = "stages.shear.boundary.top.uy"
+    results = pbem.run("blocks.toml", "x.h5", set={key: -0.6}, reporter=(told := Notes()))
+    strains = [each for each in told.texts if "strains of" in each]
+    assert results.status == "finished" and strains and any("spare" in each for each in told.texts)
+    for keep in (None, "kept"):
+        table = pbem.sweep("blocks.toml", {key: [-0.01, -0.6]}, ["contact.slip.largest"], keep=keep)
+        mild, strong = table["reason"]
+        assert table["status"].tolist() == ["finished", "finished"]
+        assert mild == "" and "spare" not in strong and all(each.rstrip(".") in strong for each in strains)
 
 
 def test_files_are_kept_where_they_are_asked_for(folder: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.interpolation import differentiate_at_nodes
 from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 from pbem.model.model import Model
@@ -307,3 +308,14 @@ def test_dbem_exchanges_the_sides_of_an_inclusion_that_is_listed_first() -> None
     body = make_blocks(scheme="DBEM")
     _, mesh = mesh_body(replace(body, regions={name: body.regions[name] for name in ("grain", "lower", "upper")}))
     assert len(mesh.notes) == 1 and "rim" in mesh.notes[0]
+
+
+def test_derivatives_at_nodes_are_those_of_polynomials() -> None:
+    """Exact for every degree below the number of nodes, wherever these lie."""
+    chance = np.random.default_rng(4)
+    for count in range(1, 7):
+        local = np.sort(chance.uniform(-1, 1, (9, count)), axis=1) + np.linspace(0, 0.2, count)
+        factors = chance.normal(size=count)
+        found = np.einsum("epj,ej->ep", differentiate_at_nodes(local), np.polyval(factors, local))
+        expected = np.polyval(np.polyder(factors), local)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * max(1.0, np.abs(expected).max()))

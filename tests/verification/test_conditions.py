@@ -26,6 +26,12 @@ def test_conditions_give_their_exact_answers(
     assert cell.word in ("ok", "refused"), cell
 
 
+@pytest.mark.parametrize("name", ["pin along an axis, with friction", "pin of many elements along a node"])
+def test_a_pin_under_a_force_along_the_axis_of_its_mesh(name: str, tmp_path: Path) -> None:
+    """Friction of both senses is in balance, and the place where it changes lies between two pairs."""
+    assert judge(name, make_setting("SST", "dense", 2, 0), tmp_path).word == "ok"
+
+
 def test_faults_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """A figure that is off, one that is no number, a message that is not the one, and a case that should be refused."""
     name = next(iter(CONDITIONS))

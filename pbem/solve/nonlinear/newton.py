@@ -147,10 +147,10 @@ def _search_modes(
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_IF_LOOSE if loosely else PLAIN
-            outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
+            outcome = _judge(hold, modes, memory, load, law, solved, search.globalisation)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)
-                outcome = _judge(problem, modes, memory, load, law, solved, search.globalisation)
+                outcome = _judge(hold, modes, memory, load, law, solved, search.globalisation)
                 if loosely and not outcome.settled:
                     forcing.tighten()
         except ConvergenceError:
@@ -166,7 +166,7 @@ def _search_modes(
                 min(search.most_pivoted, MOST_PIVOTED),
             )
             memory = memory.lose(cascade.broken)
-            proposal = _judge(problem, modes, memory, load, law, solved, search.globalisation).proposal
+            proposal = _judge(hold, modes, memory, load, law, solved, search.globalisation).proposal
             search.restart()
         iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin, problem, products))
         products = problem.system.products
@@ -332,15 +332,16 @@ class _Outcome:
 
 
 def _judge(
-    problem: Problem, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved,
+    hold: Hold, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved,
     globalisation: Globalisation,
 ) -> _Outcome:
-    laws = problem.laws
+    problem, laws = hold.problem, hold.problem.laws
 
     def judge() -> _Outcome:
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
         floor = _find_floor(problem, solved)
         proposal = _make_judge(problem, solved, globalisation)(laws, modes, pairs, memory, load.pressure)
+        proposal = hold.excuse(modes, pairs, proposal)
         law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
         failing = find_failures(laws, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance

@@ -72,11 +72,12 @@ setup(
                   "pbem.pages": ["*.md"]},
     ext_modules=[
         Extension(
-            "pbem.bem._kernels",
-            sources=["pbem/bem/_kernels.c"],
+            f"pbem.bem.{name}",
+            sources=[f"pbem/bem/{name}.c"],
             depends=sorted(glob.glob("pbem/bem/*.h")),
             extra_compile_args=["-O3", *select_processor_flags(), *MATH_FLAGS],
             libraries=["m"],
         )
+        for name in ("_kernels", "_expansions")
     ],
 )

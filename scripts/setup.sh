@@ -91,7 +91,7 @@ is_up_to_date() {
 
 # Everything that a run imports; what is wrong is told on standard error.
 is_importable() {
-    (cd / && "$venv/bin/python" -c 'import pydantic, tqdm, scipy, matplotlib, h5py, pbem.bem._kernels, pbem.cli')
+    (cd / && "$venv/bin/python" -c 'import pydantic, tqdm, scipy, matplotlib, h5py, pbem.bem._kernels, pbem.bem._expansions, pbem.cli')
 }
 
 # Packages that are found elsewhere than in the distribution: those in .venv hide its own.

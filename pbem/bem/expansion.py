@@ -8,32 +8,35 @@ Outside of a circle of radius r about c the field of the sources in it is that o
 (Kolosov-Muskhelishvili, psi about c: moving c by d adds conj(d) phi' to it); inside a circle that of sources
 far away is phi = sum a_l ((z - c)/r)^l. The truncation error falls like (radius/distance)^p. Both kinds are
 moved from cluster to cluster as those of the logarithm are: L. Greengard, V. Rokhlin, J. Comput. Phys. 73 (1987);
-for elastic fields: Y. J. Liu, Fast Multipole Boundary Element Method (2009), chapter 4.
+for elastic fields: Y. J. Liu, Fast Multipole Boundary Element Method (2009), chapter 4. The functions follow from the
+Cauchy integrals of the kernels: N. I. Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity
+(1953), chapters 5 and 19. The arithmetic is compiled: pbem/bem/ends.h, pbem/bem/series.h.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from scipy.special import comb
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem import _expansions
+from pbem.bem.tree import Forest
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.shape_functions import interpolate_shapes, tip_shapes
+
+# Integration points come in multiples of so many: the lanes of the vectors of all processors.
+LANES = 4
 
 
 @cache
-def _binomials(terms: int) -> Real:
-    """binom(m, k) for m, k = 0 .. terms."""
-    number = np.arange(terms + 1)
-    result: Real = comb(number[:, None], number[None, :])
-    return result
-
-
-@cache
-def _far_weights(terms: int) -> Real:
+def far_weights(terms: int) -> Real:
     """Coefficient l of a field around a far centre from coefficient k about the sources, in units of the distance.
 
-    (-1)^l binom(k + l - 1, l) for k >= 1; from the logarithm, k = 0, -(-1)^l/l, and nothing in l = 0, which is apart.
+    (p + 1, p + 1): (-1)^l binom(k + l - 1, l) for k >= 1; from the logarithm, k = 0, -(-1)^l/l, and nothing in l = 0,
+    which is apart (theory, 40).
     """
     number = np.arange(terms + 1)
     weights = comb(number[None, :] + number[:, None] - 1, number[:, None])
@@ -43,62 +46,150 @@ def _far_weights(terms: int) -> Real:
     return result
 
 
-def shift_matrices(offset: Complex, inner: Real, outer: Real, terms: int) -> Complex:
-    """binom(m, k) (d/R)^(m - k) (r/R)^k, (n, p + 1, p + 1); circles of radius r = inner lie at d = offset in those of
-    radius R = outer.
-    (theory, 39)
+@cache
+def _pad_weights(terms: int) -> Real:
+    """The same with a row of zeros."""
+    return np.concatenate([far_weights(terms), np.zeros((1, terms + 1))])
+
+
+@dataclass(frozen=True)
+class Densities:
+    """Elements (m,) in the order of their clusters, with their integration points, all one after the other (q,).
+
+    number (m,): in the mesh; begin, points (m,): where those of each begin, and how many there are. place, slope (q,):
+    complex, the slope times the weight. weight, shape: of the rules, each with its points, and of all nodes of an
+    element, node after node; shapes (m,): where those of an element's rule begin. length (m,): per unit of s in the
+    middle of the element; crowd (m, nodes): by which its tractions are divided (theory, 18).
     """
-    number = np.arange(terms + 1)
-    step = (offset / outer)[:, None] ** number
-    gap = number[:, None] - number[None, :]
-    scaled = (inner / outer)[:, None] ** number
-    moved = np.where(gap >= 0, step[:, np.maximum(gap, 0)], 0)
-    return moved * _binomials(terms) * scaled[:, None, :]
+
+    number: Integer
+    family: Integer
+    begin: Integer
+    points: Integer
+    shapes: Integer
+    place: tuple[Real, Real]
+    slope: tuple[Real, Real]
+    weight: Real
+    shape: Real
+    length: Real
+    crowd: Real
+
+    def sum_up(
+        self, v: Real, first: Integer, center: Complex, radius: Real, kappa: Real, shear_modulus: Real, terms: int
+    ) -> Complex:
+        """Coefficients (k, 2, p + 1) of clusters (k,) for v = (u, t) of all nodes; their elements are those from
+        first[j] to first[j + 1] (theory, 35, 37, 38)."""
+        out = np.zeros((len(center), 2, terms + 1), dtype=complex)
+        _expansions.sum_moments(
+            self.begin, self.points, self.shapes, self.number, self.family, *self.place, *self.slope, self.weight,
+            self.shape, self.length, self.crowd, first, center, radius, kappa, shear_modulus,
+            np.ascontiguousarray(v, dtype=float), out, self.crowd.shape[1], terms,
+        )  # fmt: skip
+        return out
 
 
-def apply_m2m(moments: Complex, shift: Complex, offset: Complex, inner: Real, outer: Real) -> Complex:
-    """What children's coefficients (n, 2, p + 1) are about their parents' centres; offset: from parent to child.
+@cache
+def _gauss_points(count: int) -> tuple[Real, Real]:
+    return np.polynomial.legendre.leggauss(count)
 
-    (theory, 39)
+
+def _choose_points(terms: int, order: int) -> tuple[int, int]:
+    """Numbers of integration points: exact for polynomials on straight elements; of all others, where the shapes at
+    tips are exact, too, and arcs less than the reach of the expansion."""
+    few, many = (terms + order + 2) // 2, terms + 4
+    return -(-few // LANES) * LANES, -(-many // LANES) * LANES
+
+
+def place_densities(mesh: Mesh, elements: Integer, terms: int) -> Densities:
+    """Integration points of elements (m,), as many as an expansion with so many terms needs.
+
+    At a tip they are those of the square root of the distance, in which its shapes are polynomials.
     """
-    p = moments.shape[-1] - 1
-    number = np.arange(1, p + 1)
-    result = np.zeros_like(moments)
-    result[:, :, 0] = moments[:, :, 0]
-    result[:, :, 1:] = (moments[:, :, 1:] @ shift[:, :p, :p].transpose(0, 2, 1)) * (inner / outer)[:, None, None]
-    result[:, :, 1:] -= moments[:, :, :1] * (shift[:, None, 1:, 0] / number)
-    # psi about the parent's centre: less conj(offset) phi'
-    turned = (np.conj(offset) / outer)[:, None]
-    result[:, 1, 1:2] -= turned * result[:, 0, :1]
-    result[:, 1, 2:] += turned * number[:-1] * result[:, 0, 1:-1]
-    return result
+    order, family = mesh.order, mesh.family[elements]
+    few, many = _choose_points(terms, order)
+    tips = tip_shapes(tuple(mesh.crack_local))
+    power = np.arange(order + 1)
+    rules: list[tuple[Real, Real, Real]] = []  # by family, with few and with many points: s, weights, shapes
+    for count in (few, many):
+        s, weight = _gauss_points(count)
+        root, half = 0.5 * (1 + s), 0.5 * weight  # t = root^2 from the tip
+        rooted = root[:, None] ** (2 * power + 1)
+        rules += [
+            (s, weight, s[:, None] ** power @ interpolate_shapes(mesh.local)),
+            (2 * root**2 - 1, 4 * root * half, rooted @ tips[0]),
+            (1 - 2 * root**2, 4 * root * half, rooted @ tips[1]),
+            (s, weight, s[:, None] ** power @ interpolate_shapes(mesh.crack_local)),
+        ]
+    geometry = mesh.geometry.select(elements)
+    simple = (geometry.rises() == 0) & ((family == 0) | (family == 3))
+    rule = np.where(simple, 0, 4) + family
+    points = np.where(simple, few, many)
+    begin = np.cumsum(points) - points
+    place, slope = (np.zeros(int(points.sum()), dtype=complex) for _ in range(2))
+    for number in np.unique(rule):
+        chosen = np.flatnonzero(rule == number)
+        s, weight, _ = rules[number]
+        own, local = geometry.select(chosen), np.tile(s, (len(chosen), 1))
+        at = begin[chosen, None] + np.arange(len(s))
+        place[at], slope[at] = own.place(local), own.slope(local) * weight
+    starts = np.cumsum([0, *(len(weight) for _, weight, _ in rules)])
+    nodes = np.tile(mesh.local, (len(elements), 1))
+    return Densities(
+        number=np.ascontiguousarray(elements, dtype=np.int64), family=family.astype(np.int8), begin=begin,
+        points=points, shapes=(order + 1) * starts[rule], place=_split(place), slope=_split(slope),
+        weight=np.concatenate([weight for _, weight, _ in rules]),
+        shape=np.concatenate([shape.T.ravel() for _, _, shape in rules]),
+        length=np.ascontiguousarray(geometry.stretch(np.zeros((len(elements), 1)))[:, 0]),
+        crowd=np.ascontiguousarray(geometry.crowding(nodes)),
+    )  # fmt: skip
 
 
-def apply_l2l(fields: Complex, shift: Complex, offset: Complex, outer: Real) -> Complex:
-    """What the parents' fields (n, 2, p + 1) are about their children's centres; offset: from parent to child.
+def _split(values: Complex) -> tuple[Real, Real]:
+    return np.ascontiguousarray(values.real), np.ascontiguousarray(values.imag)
 
-    (theory, 41)
+
+@dataclass(frozen=True)
+class FieldPoints:
+    """Points (n,) in clusters (k,), those of a cluster after each other from first[j] to first[j + 1]; normal (n,): 0
+    where the displacement is asked for, else the traction on it; kappa, shear_modulus (k,)."""
+
+    cluster: Integer
+    first: Integer
+    point: Complex
+    normal: Complex
+    kappa: Real
+    shear_modulus: Real
+
+    def evaluate(self, fields: Complex, forest: Forest) -> Complex:
+        """Displacements or tractions (n,) of the fields (clusters, 2, p + 1) of a forest (theory, 2, 4, 36)."""
+        out = np.zeros(len(self.point), dtype=complex)
+        _expansions.evaluate(
+            self.cluster, self.first, self.point, self.normal, forest.center, forest.radius, self.kappa,
+            self.shear_modulus, fields, out, fields.shape[2] - 1,
+        )  # fmt: skip
+        return out
+
+
+def lift(forest: Forest, moments: Complex) -> None:
+    """Add coefficients (k, 2, p + 1) of clusters to those of their parents, all the way up (theory, 39)."""
+    _expansions.lift(forest.parent, forest.center, forest.radius, moments, moments.shape[2] - 1)
+
+
+def carry(
+    targets: Forest, length: Real, target: Integer, sources: Forest, source: Integer, moments: Complex, fields: Complex
+) -> None:
+    """Add to the fields of targets what the coefficients of sources that are far from them make there (theory, 40).
+
+    target, source (n,): pairs of clusters; length (targets,): unit of the logarithm.
     """
-    number = np.arange(1, fields.shape[-1])
-    fields = fields.copy()
-    turned = (np.conj(offset) / outer)[:, None]
-    fields[:, 1, :-1] += turned * number * fields[:, 0, 1:]
-    result: Complex = fields @ shift
-    return result
+    terms = moments.shape[2] - 1
+    _expansions.carry(
+        target, source, targets.center, targets.radius, length, sources.center, sources.radius, _pad_weights(terms),
+        moments, fields, terms,
+    )  # fmt: skip
 
 
-def apply_m2l(moments: Complex, distance: Complex, source: Real, target: Real, length: Real) -> Complex:
-    """Fields (n, 2, p + 1) about targets from coefficients of sources; distance: from source to target centre.
-
-    source, target: radii of the circles; length: unit of the logarithm.
-    (theory, 40)
+def lower(forest: Forest, wanted: Bool, fields: Complex) -> None:
+    """Add the fields of clusters to those of their children, as far as these are wanted, all the way down (theory, 41).
     """
-    terms = moments.shape[-1] - 1
-    number = np.arange(terms + 1)
-    seen = moments * ((source / distance)[:, None] ** number)[:, None, :]
-    ratio = target / distance
-    result = (seen.reshape(-1, terms + 1) @ _far_weights(terms).T.astype(complex)).reshape(moments.shape)
-    result[:, :, 0] += np.log(distance / length)[:, None] * moments[:, :, 0]
-    # psi about the target: plus conj(distance) phi'; coefficients are still in units of the distance here
-    result[:, 1, :-1] += (np.conj(distance) / distance)[:, None] * number[1:] * result[:, 0, 1:]
-    return result * (ratio[:, None] ** number)[:, None, :]
+    _expansions.lower(forest.parent, wanted, forest.center, forest.radius, fields, fields.shape[2] - 1)

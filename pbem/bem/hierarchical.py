@@ -14,8 +14,9 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.farfield import LeafSources, SourceTree, TargetTree, mark_ancestors, prepare_shifts
-from pbem.bem.leaf import Medium, form_l2p, form_p2m
+from pbem.bem.expansion import FieldPoints, place_densities
+from pbem.bem.farfield import SourceTree, TargetTree, mark_ancestors
+from pbem.bem.near import LeafRows, pack_rows
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions, take_off_rigid_motions
 from pbem.bem.rigid_region import form_rigid_rows
@@ -26,7 +27,7 @@ from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 
 # Elements in a leaf at most: fewer make more work of the expansions, more make more of the near elements.
-LEAF_ELEMENTS = 16
+LEAF_ELEMENTS = 8
 # A region of so few elements is one leaf: what is near is all of it.
 SMALL_REGION = 48
 # By this factor at least the errors of expansions fall from term to term.
@@ -34,17 +35,12 @@ RATIO = 0.55
 
 
 @dataclass(frozen=True)
-class LeafRows:
-    """Rows of one leaf's nodes: near (r, columns) on v[columns], far (r, 4 (p + 1)) on the leaf's field coefficients.
+class FarRows:
+    """What rows of nodes (n,) are of the fields in their leaves: numbers of the rows (n, 2), and factors (n,)."""
 
-    rows: from this rank's first row on.
-    """
-
-    leaf: int
+    points: FieldPoints
     rows: Integer
-    columns: Integer
-    near: Real
-    far: Real
+    factor: Real
 
 
 @dataclass(frozen=True)
@@ -108,16 +104,21 @@ def prepare_sources(
 ) -> SourceTree:
     """The coefficients' matrices of the given leaves, this rank's share."""
     forest, mesh = parts.forest, parts.mesh
-    made = []
-    for leaf in leaves:
-        elements = forest.items(leaf)
-        region = int(forest.region[leaf])
-        chosen = parts.sources[region].select(elements - parts.first_element[region])
-        matrix = form_p2m(chosen, forest.center[leaf], forest.radius[leaf], parts.terms)
-        columns = list_columns(mesh, list_nodes(mesh, elements), matrix.shape[1])
-        kept = needed[columns]
-        made.append(LeafSources(int(leaf), columns[kept], np.ascontiguousarray(matrix[:, kept])))
-    return SourceTree(forest, parts.terms, tuple(made), prepare_shifts(forest, parts.terms), add_up)
+    own = [forest.items(leaf) for leaf in leaves]
+    elements = np.concatenate([np.zeros(0, dtype=np.int64), *own])
+    first = np.cumsum([0, *(len(each) for each in own)])
+    kappa, modulus = name_media(parts, forest.region[leaves])
+    return SourceTree(
+        forest, parts.terms, np.asarray(leaves), place_densities(mesh, elements, parts.terms), first, kappa, modulus,
+        None if needed.all() else needed, add_up,
+    )  # fmt: skip
+
+
+def name_media(parts: Sorted, region: Integer) -> tuple[Real, Real]:
+    """kappa and shear modulus of regions (k,)."""
+    kappa = np.array([material.kappa for material in parts.materials], dtype=float)
+    modulus = np.array([material.shear_modulus for material in parts.materials], dtype=float)
+    return kappa[region], modulus[region]
 
 
 def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
@@ -138,6 +139,7 @@ class HierarchicalOperator:
     sources: SourceTree
     targets: TargetTree
     leaves: list[LeafRows]
+    far: FarRows
     free: sparse.csr_matrix
     needed: Bool
     anchorings: tuple[Anchoring, ...] = ()
@@ -155,10 +157,11 @@ class HierarchicalOperator:
         """This rank's rows of B v, lengths, for v of shape (4 nodes,); all ranks call this together."""
         strained = take_off_rigid_motions(v, self.rigid)
         fields = self.targets.spread(self.sources.collect(strained), self.sources.forest)
-        far = np.ascontiguousarray(fields).view(float).reshape(len(fields), -1)
         result: Real = self.free @ strained
+        values = self.far.factor * self.far.points.evaluate(fields, self.targets.forest)
+        result[self.far.rows] += np.stack([values.real, values.imag], axis=1)
         for each in self.leaves:
-            result[each.rows] += each.near @ strained[each.columns] + each.far @ far[each.leaf]
+            result[each.rows] += each.apply(strained)
         for anchoring in self.anchorings:
             result[anchoring.rows] += anchoring.pattern * (anchoring.functional @ v[anchoring.columns])
         return result
@@ -179,11 +182,12 @@ def anchor_rows(
 
 
 def assemble_hierarchical(
-    parts: Sorted, sources: SourceTree, nodes: Integer, needed: Bool, length: float, finite: Sequence[int] = ()
+    parts: Sorted, sources: SourceTree, nodes: Integer, needed: Bool, length: float, finite: Sequence[int] = (),
+    weak: float = 0.0,
 ) -> HierarchicalOperator:
     """Rows of B of the given nodes (k,); needed (4 nodes,), length: as of pbem.bem.operator.assemble_rows.
 
-    finite: numbers of regions that have an outer boundary.
+    finite: numbers of regions that have an outer boundary. weak: see pbem.bem.near.choose_weak.
     """
     mesh, forest, terms = parts.mesh, parts.forest, parts.terms
     row_of_node = np.full(mesh.nodes, -1)
@@ -192,21 +196,23 @@ def assemble_hierarchical(
     wanted = mark_ancestors(forest, owned)
     met = find_interactions(forest, forest, RATIO, wanted)
     targets = TargetTree(
-        forest, terms, sources.shifts, wanted, log_lengths(parts, forest), met.far_target, met.far_source
+        forest, terms, wanted, log_lengths(parts, forest), met.far_target, met.far_source
     )
     scale = scale_equations(mesh, parts.materials, length)
     begin, end = np.searchsorted(met.near_target, owned), np.searchsorted(met.near_target, owned, side="right")
-    leaves = []
+    leaves: list[LeafRows] = []
+    seen: list[tuple[int, Integer]] = []
     for leaf, low, high in zip(owned, begin, end, strict=True):
         at = list_nodes(mesh, forest.items(leaf))
         at = at[row_of_node[at] >= 0]
         elements = np.sort(np.concatenate([forest.items(source) for source in met.near_source[low:high]]))
-        columns, near, far = _evaluate_leaf(parts, int(leaf), at, elements, needed)
-        factor = -np.repeat(scale[at], 2)[:, None]
-        near *= factor
-        far *= factor
-        rows = number_components(row_of_node[at])
-        leaves.append(LeafRows(int(leaf), rows, columns, near, far))
+        columns, near = _evaluate_leaf(parts, int(leaf), at, elements, needed)
+        near *= -np.repeat(scale[at], 2)[:, None]
+        elastic = parts.materials[int(forest.region[leaf])].rigid is None
+        rows, width = number_components(row_of_node[at]), 2 * (mesh.order + 1)
+        leaves.append(pack_rows(rows, columns, near, width, 2 * mesh.nodes, weak if elastic else 0.0))
+        if elastic:
+            seen.append((int(leaf), at))
     free = collect_free_terms(mesh, nodes, scale)
     # Expansions of the parts of a rigid motion cancel only up to their error, which would be felt where a body moves by
     # much more than it is strained: what fits best is taken off before. Small regions have no expansions.
@@ -214,13 +220,27 @@ def assemble_hierarchical(
         motions for motions in find_rigid_motions(mesh, finite, needed)
         if motions.interpolated or len(motions.columns) > 2 * SMALL_REGION * (mesh.order + 1)
     )
-    return HierarchicalOperator(parts, nodes, sources, targets, leaves, free, needed, rigid=rigid)
+    far = _place_far_rows(parts, seen, row_of_node, scale)
+    return HierarchicalOperator(parts, nodes, sources, targets, leaves, far, free, needed, rigid=rigid)
+
+
+def _place_far_rows(parts: Sorted, seen: list[tuple[int, Integer]], row_of_node: Integer, scale: Real) -> FarRows:
+    """The rows of nodes in leaves, pairs (leaf, nodes), on the fields there."""
+    mesh = parts.mesh
+    leaves = np.array([leaf for leaf, _ in seen], dtype=np.int64)
+    nodes = np.concatenate([np.zeros(0, dtype=np.int64), *(at for _, at in seen)])
+    kappa, modulus = name_media(parts, parts.forest.region[leaves])
+    points = FieldPoints(
+        leaves, np.cumsum([0, *(len(at) for _, at in seen)]), mesh.position[nodes],
+        np.where(mesh.traction_equation[nodes], mesh.normal[nodes], 0.0), kappa, modulus,
+    )  # fmt: skip
+    return FarRows(points, number_components(row_of_node[nodes]).reshape(-1, 2), -scale[nodes])
 
 
 def _evaluate_leaf(
     parts: Sorted, leaf: int, nodes: Integer, elements: Integer, needed: Bool
-) -> tuple[Integer, Real, Real]:
-    """Columns of v, the near rows of a leaf's nodes on them, and the far rows on the leaf's field."""
+) -> tuple[Integer, Real]:
+    """Columns of v, and the near rows of a leaf's nodes on them."""
     mesh, forest = parts.mesh, parts.forest
     region = int(forest.region[leaf])
     chosen = parts.sources[region].select(elements - parts.first_element[region])
@@ -231,23 +251,17 @@ def _evaluate_leaf(
     columns = list_columns(mesh, list_nodes(mesh, elements), 2 * width if bounded else width)
     kept = needed[columns]
     near = np.empty((2 * len(nodes), int(kept.sum())))
-    far = np.zeros((2 * len(nodes), 4 * (parts.terms + 1)))
     if material.rigid is not None:
         first = list_nodes(mesh, elements)[0]
         near[:] = -form_rigid_rows(mesh, region, material)[number_components(nodes - first)][:, kept]
-        return columns[kept], near, far
+        return columns[kept], near
     for traction in (False, True):
         at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
         if len(at) == 0:
             continue
         own = nodes[at]
-        where = number_components(at)
         normal = mesh.normal[own] if traction else None
         values = evaluate_rows(chosen, mesh.position[own], on[at], normal, bounded, parts.node_local[own])
         whole = np.concatenate([value for value in values if value is not None], axis=1)
-        near[where] = whole[:, kept]
-        far[where] = form_l2p(
-            mesh.position[own], normal, Medium(material.kappa, material.shear_modulus),
-            forest.center[leaf], forest.radius[leaf], parts.terms,
-        )  # fmt: skip
-    return columns[kept], near, far
+        near[number_components(at)] = whole[:, kept]
+    return columns[kept], near

@@ -41,13 +41,13 @@ APART void take_batch_of_arguments(double *y, const double *x)
     for (int j = 0; j < FUNCTION_BATCH; j++) y[j] = atan2(y[j], x[j]);
 }
 
-static void take_logarithms(double *values, int count)
+static inline void take_logarithms(double *values, int count)
 {
     for (int p = 0; p < count; p += FUNCTION_BATCH) take_batch_of_logarithms(values + p);
 }
 
 /* Arguments of x + iy, into y. */
-static void take_arguments(double *y, const double *x, int count)
+static inline void take_arguments(double *y, const double *x, int count)
 {
     for (int p = 0; p < count; p += FUNCTION_BATCH) take_batch_of_arguments(y + p, x + p);
 }

@@ -8,18 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.bem.farfield import SourceTree, TargetTree, prepare_shifts
+from pbem.bem.expansion import FieldPoints
+from pbem.bem.farfield import SourceTree, TargetTree
 from pbem.bem.hierarchical import (
     RATIO,
     HierarchicalOperator,
     Sorted,
     list_columns,
     log_lengths,
+    name_media,
     prepare_sources,
     sort_elements,
 )
 from pbem.bem.interior import Values
-from pbem.bem.leaf import Medium, form_l2p
 from pbem.bem.location import Location
 from pbem.bem.rigid_motions import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
@@ -64,41 +65,52 @@ class PointRows:
         """
         far = [self._carry(each) for each in v.T]
         far_strained = far if strained is v else [self._carry(each) for each in strained.T]
+        shape = (len(self.point), v.shape[1])
+        values = np.zeros((3, *shape), dtype=complex)
+        for k, normal in enumerate((None, 1.0, 1j)):
+            fields = far if normal is None else far_strained
+            values[k] = np.stack([self._evaluate_far(each, normal) for each in fields], axis=1)
         forest = self.targets.forest
         leaves = forest.leaves
         begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
-        shape = (len(self.point), v.shape[1])
-        values = np.zeros((3, *shape), dtype=complex)
         for leaf, low, high in zip(leaves, begin, end, strict=True):
             chosen = forest.items(leaf)
             near = self.met.near_source[low:high]
             for k, normal in enumerate((None, 1.0, 1j)):
-                density, fields = (v, far) if normal is None else (strained, far_strained)
-                value = self._add_near(int(leaf), chosen, near, normal, density)
-                matrix = self._form_l2p(int(leaf), chosen, normal)
-                value += matrix @ np.stack([each[leaf] for each in fields], axis=1)
-                values[k, chosen] = value[0::2] + 1j * value[1::2]
+                value = self._add_near(int(leaf), chosen, near, normal, v if normal is None else strained)
+                values[k, chosen] += value[0::2] + 1j * value[1::2]
         moved, along_x, along_y = values
         return moved, np.stack([along_x.real, along_y.imag, 0.5 * (along_x.imag + along_y.real)], axis=-1)
 
-    def _carry(self, v: Real) -> Real:
-        """Coefficients of the far field in all clusters of points, as rows of real numbers."""
-        fields = self.targets.spread(self.sources.collect(v), self.sources.forest)
-        return np.ascontiguousarray(fields).view(float).reshape(len(fields), 4 * (self.parts.terms + 1))
+    def _carry(self, v: Real) -> Complex:
+        """Coefficients of the far field in all clusters of points (k, 2, p + 1)."""
+        return self.targets.spread(self.sources.collect(v), self.sources.forest)
+
+    def _evaluate_far(self, fields: Complex, normal: complex | None) -> Complex:
+        """The far field at all points: displacement, or traction on the normal."""
+        forest = self.targets.forest
+        leaves = forest.leaves
+        kappa, modulus = name_media(self.parts, forest.region[leaves])
+        at = FieldPoints(
+            leaves, np.append(forest.first[leaves], len(self.point)), self.point[forest.order],
+            np.full(len(self.point), normal or 0.0, dtype=complex), kappa, modulus,
+        )  # fmt: skip
+        result = np.empty(len(self.point), dtype=complex)
+        result[forest.order] = at.evaluate(fields, forest)
+        return result
 
     def _evaluate(self, v: Real, normals: tuple[complex | None, ...]) -> Complex:
         far = self._carry(v)
         forest = self.targets.forest
         leaves = forest.leaves
         begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
-        result = np.zeros((len(self.point), len(normals)), dtype=complex)
+        result = np.stack([self._evaluate_far(far, normal) for normal in normals], axis=1)
         for leaf, low, high in zip(leaves, begin, end, strict=True):
             chosen = forest.items(leaf)
             near = self.met.near_source[low:high]
             for k, normal in enumerate(normals):
                 value = self._add_near(int(leaf), chosen, near, normal, v)
-                value += self._add_far(int(leaf), chosen, normal, far)
-                result[chosen, k] = value[0::2] + 1j * value[1::2]
+                result[chosen, k] += value[0::2] + 1j * value[1::2]
         return result
 
     def _add_near(self, leaf: int, chosen: Integer, near: Integer, normal: complex | None, v: Real) -> Real:
@@ -118,19 +130,6 @@ class PointRows:
         total: Real = whole[0] @ v[columns[:width]]
         return total if len(whole) == 1 else total + whole[1] @ v[columns[width:]]
 
-    def _add_far(self, leaf: int, chosen: Integer, normal: complex | None, far: Real) -> Real:
-        result: Real = self._form_l2p(leaf, chosen, normal) @ far[leaf]
-        return result
-
-    def _form_l2p(self, leaf: int, chosen: Integer, normal: complex | None) -> Real:
-        forest = self.targets.forest
-        material = self.parts.materials[int(forest.region[leaf])]
-        normals = None if normal is None else np.full(len(chosen), normal, dtype=complex)
-        return form_l2p(
-            self.point[chosen], normals, Medium(material.kappa, material.shear_modulus),
-            forest.center[leaf], forest.radius[leaf], self.parts.terms,
-        )  # fmt: skip
-
 
 def place_points(
     parts: Sorted, sources: SourceTree, point: Complex, region: Integer, on: Integer, local: Real
@@ -142,8 +141,8 @@ def place_points(
     forest = forest.widen(least)
     met = find_interactions(forest, parts.forest, RATIO)
     targets = TargetTree(
-        forest, parts.terms, prepare_shifts(forest, parts.terms), np.ones(forest.clusters, dtype=bool),
-        log_lengths(parts, forest), met.far_target, met.far_source,
+        forest, parts.terms, np.ones(forest.clusters, dtype=bool), log_lengths(parts, forest), met.far_target,
+        met.far_source,
     )  # fmt: skip
     return PointRows(parts, sources, targets, met, point, on, local)
 

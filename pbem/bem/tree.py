@@ -82,15 +82,15 @@ def build_forest(start: Complex, end: Complex, bulge: Real, region: Integer, mos
             count += 1
         level, depth = following, depth + 1
     table = np.array(made, dtype=np.int64).reshape(-1, 5)
-    center, radius = _enclose(order, table[:, 3], table[:, 4], start, end, middle, bulge)
-    above = table[:, 2]
+    owner, depths, above, first, last = np.ascontiguousarray(table.T)
+    center, radius = _enclose(order, first, last, start, end, middle, bulge)
     children = np.bincount(above[above >= 0], minlength=count)
     child = np.full(count, -1)
     below = np.flatnonzero(above >= 0)[::-1]
     child[above[below]] = below  # the first child is written last
     return Forest(
-        order=order, first=table[:, 3], last=table[:, 4], center=center, radius=radius, region=table[:, 0],
-        level=table[:, 1], parent=above, child=child, children=children,
+        order=order, first=first, last=last, center=center, radius=radius, region=owner, level=depths, parent=above,
+        child=child, children=children,
     )  # fmt: skip
 
 

@@ -81,7 +81,7 @@ def _count_dense(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[float, f
 
 
 def _count_hierarchical(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[float, float]:
-    """Entries of near blocks and coefficients, and of the groups' inverses (about those of the near blocks)."""
+    """Entries of near blocks, and of the groups' inverses (about as many)."""
     terms = choose_terms(model.solver.tolerance)
     parts = sort_elements(mesh, [region.material for region in model.regions], terms)
     forest = parts.forest
@@ -92,9 +92,7 @@ def _count_hierarchical(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[f
     sums = np.array([of_element[forest.items(cluster)].sum() for cluster in range(forest.clusters)], dtype=float)
     rows = 2.0 * width * (forest.last - forest.first)
     near = float((rows[met.near_target] * sums[met.near_source]).sum())
-    leaves = forest.leaves
-    ends = float((4 * (terms + 1) * (rows + sums)[leaves]).sum())
-    return near + ends + 2.0 * forest.clusters * (terms + 1) ** 2, near
+    return near, near
 
 
 def _count_sparse(model: Model, mesh: Mesh, outer: OuterNodes, laws: PairLaws) -> tuple[float, float, float]:

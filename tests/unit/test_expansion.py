@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.bem.expansion import apply_l2l, apply_m2l, apply_m2m, shift_matrices
-from pbem.bem.leaf import Medium, form_l2p, form_p2m
 from pbem.bem.rows import Sources, evaluate_rows
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
+from tests.unit.series_twin import Medium, apply_l2l, apply_m2l, apply_m2m, form_l2p, form_p2m, shift_matrices
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

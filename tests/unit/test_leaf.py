@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.bem.leaf import Medium, form_l2p, form_p2m
+from tests.unit.series_twin import Medium, form_l2p, form_p2m
 from tests.unit.test_expansion import FAMILIES, KAPPA, MODULUS, make_elements
 
 

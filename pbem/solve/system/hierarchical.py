@@ -18,6 +18,7 @@ from pbem.bem.hierarchical import (
     sort_elements,
 )
 from pbem.bem.location import Location
+from pbem.bem.near import choose_weak
 from pbem.bem.pointwise import PointRows, TreeRows, place_points
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -101,7 +102,7 @@ class HierarchicalSystem:
     @property
     def stored(self) -> int:
         """See System."""
-        return sum(leaf.near.nbytes + leaf.far.nbytes for leaf in self.operator.leaves)
+        return sum(leaf.nbytes for leaf in self.operator.leaves)
 
     def apply(self, v: Real) -> Real:
         """See System."""
@@ -157,12 +158,12 @@ def _reach_tolerance(
     # Rigid motions are taken off from all displacements, also from those that are zero.
     needed = needed.copy()
     needed[: 2 * mesh.nodes] |= np.repeat(np.isin(mesh.node_region, finite), 2)
-    terms = choose_terms(tolerance)
+    terms, weak = choose_terms(tolerance), choose_weak(tolerance, 2 * mesh.nodes)
     while True:
         parts = sort_elements(mesh, materials, terms)
         own = cut_equally(parts.forest.leaves, comm)
         sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
-        operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite)
+        operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite, weak)
         error = measure_product_error(comm, operator, model.size)
         if error <= tolerance:
             return operator, error
@@ -172,6 +173,7 @@ def _reach_tolerance(
                 f"products of the hierarchical operator have a relative error of {error:.1e} (asked: solver.tolerance "
                 f'= {tolerance:g}); ask for less, or for operator = "dense"',
             )
+        weak = 0.0
         terms = min(MOST_TERMS, max(terms + 2, choose_terms(tolerance**2 / error)))
 
 

@@ -1,7 +1,6 @@
-"""The two ends of an expansion: from the densities on elements to coefficients, from coefficients to values at points.
+"""The formulas of the expansions in NumPy, matrix by matrix: what the compiled passes are compared with.
 
-The functions phi and psi are those of pbem.bem.expansion; they follow from the Cauchy integrals of the kernels:
-N. I. Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity (1953), chapters 5 and 19.
+From densities to coefficients, from cluster to cluster, to values at points; see pbem.bem.expansion.
 """
 
 from __future__ import annotations
@@ -10,8 +9,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.special import comb
 
 from pbem.arrays import Complex, Real
+from pbem.bem.expansion import far_weights
 from pbem.bem.rows import Sources
 
 
@@ -146,3 +147,72 @@ def form_l2p(
         for k, value in enumerate((first, second)):
             out[:, 0, k, :, part], out[:, 1, k, :, part] = value.real, value.imag
     return scale * out.reshape(2 * len(point), -1)
+
+
+@cache
+def _binomials(terms: int) -> Real:
+    """binom(m, k) for m, k = 0 .. terms."""
+    number = np.arange(terms + 1)
+    result: Real = comb(number[:, None], number[None, :])
+    return result
+
+
+def shift_matrices(offset: Complex, inner: Real, outer: Real, terms: int) -> Complex:
+    """binom(m, k) (d/R)^(m - k) (r/R)^k, (n, p + 1, p + 1); circles of radius r = inner lie at d = offset in those of
+    radius R = outer.
+    (theory, 39)
+    """
+    number = np.arange(terms + 1)
+    step = (offset / outer)[:, None] ** number
+    gap = number[:, None] - number[None, :]
+    scaled = (inner / outer)[:, None] ** number
+    moved = np.where(gap >= 0, step[:, np.maximum(gap, 0)], 0)
+    return moved * _binomials(terms) * scaled[:, None, :]
+
+
+def apply_m2m(moments: Complex, shift: Complex, offset: Complex, inner: Real, outer: Real) -> Complex:
+    """What children's coefficients (n, 2, p + 1) are about their parents' centres; offset: from parent to child.
+
+    (theory, 39)
+    """
+    p = moments.shape[-1] - 1
+    number = np.arange(1, p + 1)
+    result = np.zeros_like(moments)
+    result[:, :, 0] = moments[:, :, 0]
+    result[:, :, 1:] = (moments[:, :, 1:] @ shift[:, :p, :p].transpose(0, 2, 1)) * (inner / outer)[:, None, None]
+    result[:, :, 1:] -= moments[:, :, :1] * (shift[:, None, 1:, 0] / number)
+    # psi about the parent's centre: less conj(offset) phi'
+    turned = (np.conj(offset) / outer)[:, None]
+    result[:, 1, 1:2] -= turned * result[:, 0, :1]
+    result[:, 1, 2:] += turned * number[:-1] * result[:, 0, 1:-1]
+    return result
+
+
+def apply_l2l(fields: Complex, shift: Complex, offset: Complex, outer: Real) -> Complex:
+    """What the parents' fields (n, 2, p + 1) are about their children's centres; offset: from parent to child.
+
+    (theory, 41)
+    """
+    number = np.arange(1, fields.shape[-1])
+    fields = fields.copy()
+    turned = (np.conj(offset) / outer)[:, None]
+    fields[:, 1, :-1] += turned * number * fields[:, 0, 1:]
+    result: Complex = fields @ shift
+    return result
+
+
+def apply_m2l(moments: Complex, distance: Complex, source: Real, target: Real, length: Real) -> Complex:
+    """Fields (n, 2, p + 1) about targets from coefficients of sources; distance: from source to target centre.
+
+    source, target: radii of the circles; length: unit of the logarithm.
+    (theory, 40)
+    """
+    terms = moments.shape[-1] - 1
+    number = np.arange(terms + 1)
+    seen = moments * ((source / distance)[:, None] ** number)[:, None, :]
+    ratio = target / distance
+    result = (seen.reshape(-1, terms + 1) @ far_weights(terms).T.astype(complex)).reshape(moments.shape)
+    result[:, :, 0] += np.log(distance / length)[:, None] * moments[:, :, 0]
+    # psi about the target: plus conj(distance) phi'; coefficients are still in units of the distance here
+    result[:, 1, :-1] += (np.conj(distance) / distance)[:, None] * number[1:] * result[:, 0, 1:]
+    return result * (ratio[:, None] ** number)[:, None, :]

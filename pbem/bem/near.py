@@ -1,0 +1,96 @@
+"""Rows of near elements: in full where entries are large, in whole numbers of a unit where they are small.
+
+Most elements of a near cluster are several of their lengths away, and act on a row by less than a hundredth of what the
+row's own element does. As multiples of their largest one's 2^-31 such entries take half the memory, and what they lose
+is less than a part in 10^10 of the row's largest entry: less than the expansions do. Numbers in single precision would
+lose a hundred times more, which smooth jumps would show, of which the entries of a row all but cancel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbem.arrays import Bool, Integer, Real
+from pbem.bem import _expansions
+
+# Elements all of whose entries are less than this part of the largest in their row are weak; at most, and for each part
+# of the tolerance.
+WEAK, WEAK_BY_TOLERANCE = 0.03, 1e6
+# Models of fewer unknowns keep all entries in full.
+LARGE = 20_000
+LARGEST = 2.0**31 - 1
+
+
+@dataclass(frozen=True)
+class WeakRows:
+    """Entries (r, n) of rows in the columns (n,) of v: number times the unit of each row (r,)."""
+
+    columns: Integer
+    number: NDArray[np.int32]
+    unit: Real
+
+
+@dataclass(frozen=True)
+class LeafRows:
+    """Rows of one leaf's nodes: near (r, columns) on v[columns], and what is weak beside it.
+
+    rows: from this rank's first row on.
+    """
+
+    rows: Integer
+    columns: Integer
+    near: Real
+    weak: tuple[WeakRows, ...] = ()
+
+    @property
+    def nbytes(self) -> int:
+        return self.near.nbytes + sum(each.number.nbytes for each in self.weak)
+
+    def apply(self, v: Real) -> Real:
+        """Their product with v."""
+        result = np.ascontiguousarray(self.near @ v[self.columns])
+        for each in self.weak:
+            _expansions.add_whole_rows(each.number, each.unit, v[each.columns], result)
+        return result
+
+
+def choose_weak(tolerance: float, unknowns: int) -> float:
+    """The part of a row's largest entry below which entries are weak, for a relative error of products; 0: none are."""
+    return min(WEAK, WEAK_BY_TOLERANCE * tolerance) if unknowns >= LARGE else 0.0
+
+
+def pack_rows(rows: Integer, columns: Integer, near: Real, width: int, displacements: int, weak: float) -> LeafRows:
+    """The rows near (r, columns), with what is weak apart.
+
+    width: columns of an element, of its displacements or of its tractions; displacements: columns from this one on are
+    of tractions, whose units are others. The largest entries of a row are told apart by this, too.
+    """
+    if not weak or not near.size:
+        return LeafRows(rows, columns, near)
+    size = np.abs(near)
+    packed, strong = [], np.ones(len(columns), dtype=bool)
+    for own in (columns < displacements, columns >= displacements):
+        chosen = _find_weak(size, columns, own, width, weak)
+        if not len(chosen):
+            continue
+        unit = np.maximum(size[:, chosen].max(axis=1) / LARGEST, np.finfo(float).tiny)
+        number = np.ascontiguousarray(np.rint(near[:, chosen] / unit[:, None]), dtype=np.int32)
+        packed.append(WeakRows(columns[chosen], number, unit))
+        strong[chosen] = False
+    return LeafRows(rows, columns[strong], np.ascontiguousarray(near[:, strong]), tuple(packed))
+
+
+def _find_weak(size: Real, columns: Integer, own: Bool, width: int, weak: float) -> Integer:
+    """Numbers of the columns among some of whose elements all entries are weak in all rows."""
+    at = np.flatnonzero(own)
+    if not len(at):
+        return at
+    largest = size[:, at].max(axis=1)
+    part = (size[:, at] / np.where(largest > 0, largest, 1.0)[:, None]).max(axis=0)
+    element = columns[at] // width
+    begin = np.flatnonzero(np.diff(element, prepend=-1))
+    of_element = np.maximum.reduceat(part, begin)
+    return at[np.repeat(of_element, np.diff(np.append(begin, len(at)))) < weak]

@@ -1,0 +1,207 @@
+"""The compiled passes: against their formulas in NumPy, and against the rows of the elements, which know no series."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbem.bem.expansion import FieldPoints, carry, lift, lower, place_densities
+from pbem.bem.hierarchical import assemble_hierarchical, choose_terms, name_media, prepare_sources, sort_elements
+from pbem.bem.near import LeafRows, choose_weak, pack_rows
+from pbem.bem.operator import assemble_rows
+from pbem.bem.tree import build_forest, find_interactions
+from pbem.case.build import parse_model
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.mesh.numbering import list_nodes
+from pbem.model.material import Material
+from tests.unit.far_sample import TEXTS, list_vectors, make_sample, shrink_leaves
+from tests.unit.series_twin import Medium, apply_l2l, apply_m2l, apply_m2m, form_l2p, form_p2m, shift_matrices
+
+orders = pytest.mark.parametrize("order", [1, 2, 3])
+each_model = pytest.mark.parametrize("name", ["inclusions", "cracks", "infinite"])
+
+
+@pytest.fixture(autouse=True)
+def small_leaves(monkeypatch: pytest.MonkeyPatch) -> None:
+    shrink_leaves(monkeypatch)
+
+
+def make_mesh(name: str, order: int) -> tuple[Mesh, list[Material], float]:
+    """One of the models with elements of an order, its materials and its size."""
+    text = TEXTS[name]().replace("[analysis]", f"[analysis]\norder = {order}")
+    model = parse_model(text)[1]
+    return generate_mesh(model), [region.material for region in model.regions], model.size
+
+
+def make_values(mesh: Mesh) -> np.ndarray:
+    return np.random.default_rng(1).standard_normal(4 * mesh.nodes)
+
+
+@orders
+@each_model
+def test_coefficients_are_those_of_the_formulas(name: str, order: int) -> None:
+    mesh, materials, _ = make_mesh(name, order)
+    parts = sort_elements(mesh, materials, 27)
+    v, forest, leaves = make_values(mesh), parts.forest, parts.forest.leaves
+    everything = np.ones(4 * mesh.nodes, dtype=bool)
+    found = prepare_sources(parts, everything, leaves, lambda part: part).collect(v)
+    for leaf in leaves:
+        elements, region = forest.items(leaf), int(forest.region[leaf])
+        chosen = parts.sources[region].select(elements - parts.first_element[region])
+        matrix = form_p2m(chosen, forest.center[leaf], forest.radius[leaf], 27)
+        at = (2 * list_nodes(mesh, elements)[:, None] + np.arange(2)).ravel()
+        columns = np.concatenate([at, 2 * mesh.nodes + at])[: matrix.shape[1]]
+        exact = (matrix @ v[columns]).view(complex).reshape(2, 28)
+        # Of arcs a few integration points less bring less than the expansion does.
+        curved = parts.sources[region].geometry.sweep.any()
+        np.testing.assert_allclose(found[leaf], exact, rtol=0, atol=(1e-8 if curved else 1e-12) * np.abs(exact).max())
+
+
+def make_trees(random: np.random.Generator) -> tuple:
+    """Two trees over points, and pairs of their clusters that are well apart."""
+    own, other = (random.uniform(-1, 1, (90, 2)) @ (1, 1j) + place for place in (0, 0.7 + 0.4j))
+    most, region = np.array([4]), np.zeros(90, dtype=np.int64)
+    targets, sources = (build_forest(at - 1e-3, at + 1e-3, np.zeros(90), region, most) for at in (own, other))
+    return targets, sources, find_interactions(targets, sources, 0.55)
+
+
+@pytest.mark.parametrize("terms", [1, 2, 9, 30, 60])
+def test_passes_between_clusters_are_those_of_the_formulas(terms: int) -> None:
+    random = np.random.default_rng(terms)
+    targets, sources, met = make_trees(random)
+    shape = (2, terms + 1)
+    moments = random.normal(size=(sources.clusters, *shape)) + 1j * random.normal(size=(sources.clusters, *shape))
+    lifted, expected = moments.copy(), moments.copy()
+    lift(sources, lifted)
+    for child in range(sources.clusters - 1, 0, -1):
+        parent = sources.parent[child]
+        step = np.array([sources.center[child] - sources.center[parent]])
+        small, large = sources.radius[[child]], sources.radius[[parent]]
+        shift = shift_matrices(step, small, large, terms)
+        expected[parent] += apply_m2m(expected[[child]], shift, step, small, large)[0]
+    np.testing.assert_allclose(lifted, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    length = np.full(targets.clusters, 7.0)
+    fields = np.zeros((targets.clusters, *shape), dtype=complex)
+    carry(targets, length, met.far_target, sources, met.far_source, moments, fields)
+    expected = np.zeros_like(fields)
+    np.add.at(expected, met.far_target, apply_m2l(
+        moments[met.far_source], targets.center[met.far_target] - sources.center[met.far_source],
+        sources.radius[met.far_source], targets.radius[met.far_target], length[met.far_target],
+    ))  # fmt: skip
+    np.testing.assert_allclose(fields, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    wanted = np.arange(targets.clusters) % 5 > 0
+    moved = fields.copy()
+    lower(targets, wanted, moved)
+    expected = fields.copy()
+    for child in range(1, targets.clusters):
+        parent = targets.parent[child]
+        step = np.array([targets.center[child] - targets.center[parent]])
+        matrix = shift_matrices(step, targets.radius[[child]], targets.radius[[parent]], terms)
+        if wanted[child]:
+            expected[child] += apply_l2l(expected[[parent]], matrix, step, targets.radius[[parent]])[0]
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 9])
+def test_values_at_points_are_those_of_the_formulas(count: int) -> None:
+    random = np.random.default_rng(count)
+    targets, _, _ = make_trees(random)
+    fields = random.normal(size=(targets.clusters, 2, 13)) + 1j * random.normal(size=(targets.clusters, 2, 13))
+    cluster = np.array([3, 0, 5])
+    first = np.array([0, count, count, 3 * count])
+    owner = np.repeat(cluster, np.diff(first))
+    point = targets.center[owner] + 0.6 * targets.radius[owner] * np.exp(1j * np.arange(3 * count))
+    normal = np.where(np.arange(3 * count) % 2, np.exp(0.4j * np.arange(3 * count)), 0)
+    kappa, modulus = np.array([1.6, 2.0, 2.4]), np.array([3e4, 1.0, 1e-3])
+    found = FieldPoints(cluster, first, point, normal, kappa, modulus).evaluate(fields, targets)
+    for k in range(3 * count):
+        j = int(np.searchsorted(first, k, side="right")) - 1
+        n = None if normal[k] == 0 else normal[[k]]
+        matrix = form_l2p(point[[k]], n, Medium(kappa[j], modulus[j]), targets.center[cluster[j]],
+                          targets.radius[cluster[j]], 12)  # fmt: skip
+        exact = matrix @ fields[cluster[j]].view(float).ravel()
+        limit = 1e-11 * np.abs(matrix).max()
+        np.testing.assert_allclose([found[k].real, found[k].imag], exact, rtol=0, atol=limit)
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e7 - 2e7j])
+@orders
+@each_model
+def test_products_are_those_of_the_rows_wherever_the_model_lies(name: str, order: int, shift: complex) -> None:
+    mesh, materials, size = make_mesh(name, order)
+    mesh = replace(mesh, **{key: getattr(mesh, key) + shift for key in ("start", "end", "center", "position")})
+    everything = np.ones(4 * mesh.nodes, dtype=bool)
+    parts = sort_elements(mesh, materials, choose_terms(1e-8))
+    sources = prepare_sources(parts, everything, parts.forest.leaves, lambda part: part)
+    operator = assemble_hierarchical(parts, sources, np.arange(mesh.nodes), everything, size)
+    assert len(operator.targets.target) > mesh.elements
+    v = make_values(mesh)
+    v[2 * mesh.nodes :] *= materials[0].shear_modulus / size
+    exact = assemble_rows(mesh, materials, 0, mesh.nodes, everything, size).apply(v)
+    # So far away places are known to 4e-9.
+    assert np.linalg.norm(operator.apply(v) - exact) <= (1e-8 if shift == 0 else 1e-6) * np.linalg.norm(exact)
+
+
+def test_arguments_of_wrong_lengths_are_refused() -> None:
+    targets, sources, met = make_trees(np.random.default_rng(0))
+    moments = np.zeros((sources.clusters, 2, 8), dtype=complex)
+    with pytest.raises(ValueError, match="bytes, expected"):
+        carry(targets, np.ones(3), met.far_target, sources, met.far_source, moments, np.zeros_like(moments))
+    with pytest.raises(ValueError, match="terms; expected 1 to"):
+        lift(sources, np.zeros((sources.clusters, 2, 200), dtype=complex))
+    mesh, materials, _ = make_mesh("cracks", 2)
+    densities = place_densities(mesh, np.arange(3), 5)
+    kappa, modulus = name_media(sort_elements(mesh, materials, 5), np.zeros(1, dtype=np.int64))
+    with pytest.raises(ValueError, match="bytes, expected"):
+        first, center = np.array([0, 2, 3]), np.zeros(1, dtype=complex)
+        densities.sum_up(make_values(mesh), first, center, np.ones(1), kappa, modulus, 5)
+
+
+def test_weak_entries_lose_less_than_a_part_in_ten_billion_of_the_largest() -> None:
+    random = np.random.default_rng(5)
+    rows, elements, width = 10, 30, 6
+    fall = 10.0 ** -random.uniform(0, 4, elements)
+    near = random.normal(size=(rows, 2 * elements * width)) * np.repeat(np.tile(fall, 2), width)
+    # Tractions act by numbers of another unit, and rows of small elements are large.
+    near[:, elements * width :] *= 1e-12
+    near *= 10.0 ** random.uniform(-3, 3, rows)[:, None]
+    columns = np.concatenate([np.arange(elements * width), 5000 + np.arange(elements * width)])
+    packed = pack_rows(np.arange(rows), columns, near, width, 5000, 0.05)
+    assert len(packed.weak) == 2 and packed.nbytes < 0.8 * near.nbytes
+    assert sum(each.number.size for each in packed.weak) + packed.near.size == near.size
+    v = np.zeros(5000 + elements * width)
+    for k, column in enumerate(columns):
+        v[column] = 1.0
+        largest = np.abs(near[:, columns >= 5000 if column >= 5000 else columns < 5000]).max(axis=1)
+        error = np.abs(packed.apply(v) - near[:, k])
+        assert (error <= 0.05 * largest * 2.0**-31).all()
+        v[column] = 0.0
+    assert (packed.apply(np.ones(len(v))) - near.sum(axis=1) != 0).any(), "they are weak"
+
+
+def test_small_models_and_weights_of_nothing_keep_all_entries() -> None:
+    assert choose_weak(1e-8, 19_999) == 0.0 < choose_weak(1e-10, 20_000) < choose_weak(1e-8, 10**6) < 0.05
+    near = np.random.default_rng(6).normal(size=(4, 12))
+    near[:, :6] = 0.0
+    for weak in (0.0, 0.01):
+        packed = pack_rows(np.arange(4), np.arange(12), near, 6, 12, weak)
+        v = np.random.default_rng(7).normal(size=12)
+        assert isinstance(packed, LeafRows)
+        np.testing.assert_allclose(packed.apply(v), near @ v, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["cracks", "inclusions", "blocks HST"])
+def test_products_with_weak_entries_are_those_of_the_rows(name: str) -> None:
+    sample = make_sample(name)
+    parts, sources = sample.sort(1e-10)
+    nodes = np.arange(sample.mesh.nodes)
+    operator = assemble_hierarchical(parts, sources, nodes, sample.needed, sample.model.size, (), 0.03)
+    assert sum(len(leaf.weak) for leaf in operator.leaves) > 10
+    for kind, v in list_vectors(sample).items():
+        exact = sample.dense.apply(v)
+        # Those of a rigid motion cancel.
+        scale = np.linalg.norm(exact - sample.dense.free @ v)
+        assert np.linalg.norm(operator.apply(v) - exact) <= 1e-9 * scale, kind

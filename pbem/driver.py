@@ -6,7 +6,6 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import count
 from pathlib import Path
 from typing import Any, get_args
 
@@ -19,7 +18,7 @@ from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
-from pbem.model.refinement import bisect_elements, impose_fractions
+from pbem.model.refinement import Fractions, bisect_elements, impose_fractions
 from pbem.parallel import (
     Comm,
     StopSignals,
@@ -30,6 +29,7 @@ from pbem.parallel import (
     lacks_memory,
     world,
 )
+from pbem.passes import Target, blame_pass, blame_tries, plan_finer
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.doubts import find_smooth
 from pbem.results.estimator import Estimator
@@ -115,7 +115,7 @@ def run(
             options = {**model.solver.petsc, **(petsc or {})}
             log.obey(name, options)
             with petsc_options(options):
-                _refine_and_solve(model, _Target(target, resume, force), options, watch, signals, placement, kept)
+                _refine_and_solve(model, Target(target, resume, force), options, watch, signals, placement, kept)
             with clock.piece("writing"):
                 results = open_results(target)
                 for note in compare_release(results) if comm.rank == 0 else ():
@@ -125,15 +125,6 @@ def run(
         if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
             raise KeyboardInterrupt from error
         raise
-
-
-@dataclass(frozen=True)
-class _Target:
-    """The result file, and whether to go on with it or to replace it."""
-
-    path: Path
-    resume: bool
-    force: bool
 
 
 def _make_model(
@@ -153,36 +144,52 @@ def impose_operator(model: Model, name: str, operator: Operator | None) -> Model
 
 
 def _refine_and_solve(
-    model: Model, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
+    model: Model, target: Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
     placement: Sequence[str], kept: KeptProblems | None,
 ) -> None:
-    """Solve, and where `analysis.accuracy` asks for it refine and solve again, from rest, until it is met.
+    """Solve, and where `analysis.accuracy` asks for it, or contacts do not settle, refine and solve again, from rest.
 
     Raises ConvergenceError ("accuracy") when passes or unknowns run out; the file then holds the last pass. Of a pass
-    that fails otherwise the former one is kept.
+    that fails otherwise the former one is kept, but for those after contacts that did not settle.
     """
     one = Pass(1, 0)
-    if target.resume and model.analysis.accuracy is not None:
+    if target.resume:
         read = do_on_first(watch.comm, PbemError, lambda: read_refinement(target.path))
-        model, one = (model, one) if read is None else (impose_fractions(model, read.fractions), read.one)
+        model, one = (model, one) if read is None else (_recall_mesh(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
-    for number in count(one.number):
+    first, tries, begun = model, 0, one.number
+    while True:
         with clock.piece("reading"):
             mesh = generate_mesh(model)
             check_shares(model, mesh, watch.comm.size)
             remarks = check_memory(watch.comm, model, mesh)
         watch.begin(model)
-        for line in (*describe_start(watch.comm), describe_size(model, mesh)) if number == one.number else ():
+        anew = one.number == begun and not tries
+        for line in (*describe_start(watch.comm), describe_size(model, mesh)) if anew else ():
             watch.tell(line)
-        for note in (*notes, *mesh.notes, *placement, *remarks) if number == one.number else ():
+        for note in (*notes, *mesh.notes, *placement, *remarks) if anew else ():
             watch.note(note)
-        now = Pass(number, one.first_unknowns or 2 * mesh.nodes)
-        decision = _solve(model, mesh, target, options, watch, signals, now, kept)
+        now = Pass(one.number, one.first_unknowns or 2 * mesh.nodes)
+        try:
+            decision = _solve(model, mesh, target, options, watch, signals, now, kept)
+        except ConvergenceError as error:
+            # What was gone on with, and what is kept for other runs, stays on its mesh.
+            finer = None if target.resume or kept else plan_finer(first, model, 2 * mesh.nodes, tries, error)
+            if finer is None:
+                raise blame_tries(error, tries, 2 * mesh.nodes) from error
+            watch.note(finer.note)
+            model, target, tries = finer.model, Target(target.path, False, True), tries + 1
+            continue
         if decision.marked is None:
             return
         # The next pass takes the place of this one in the file.
-        one = replace(one, first_unknowns=now.first_unknowns)
-        model, target = bisect_elements(model, decision.marked, decision.gently), _Target(target.path, False, True)
+        one = Pass(one.number + 1, now.first_unknowns)
+        model, target = bisect_elements(model, decision.marked, decision.gently), Target(target.path, False, True)
+
+
+def _recall_mesh(model: Model, fractions: Fractions) -> Model:
+    """The model with the element ends of a file that is gone on with."""
+    return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None)
 
 
 @dataclass(frozen=True)
@@ -194,7 +201,7 @@ class _Output:
 
 
 def _solve(
-    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
+    model: Model, mesh: Mesh, target: Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
     one: Pass, kept: KeptProblems | None,
 ) -> Decision:
     """March through the load history; the first rank writes. Returns what follows."""
@@ -211,7 +218,7 @@ def _solve(
     try:  # from here on whatever happens has to leave a closed file
         decision = _fill(output.writer, model, mesh, interior, watch, signals, one, kept)
     except BaseException as error:
-        told = _blame_pass(error, one, 2 * mesh.nodes) if one.number > 1 and not target.resume else error
+        told = blame_pass(error, one, 2 * mesh.nodes) if one.number > 1 and not target.resume else error
         if output.writer:
             _end_badly(output.writer, told, output.former)
         if told is error:
@@ -225,7 +232,7 @@ def _solve(
 
 
 def _open(
-    model: Model, mesh: Mesh, target: _Target, options: Mapping[str, str], region: Integer | None, one: Pass,
+    model: Model, mesh: Mesh, target: Target, options: Mapping[str, str], region: Integer | None, one: Pass,
     ranks: int,
 ) -> _Output:
     """The result file to go on with, or a new one beside which the former pass is kept."""
@@ -300,17 +307,6 @@ def _conclude(
     with clock.piece("writing"):
         do_on_first(watch.comm, PbemError, lambda: _end_pass(_check(writer), decision))
     return decision
-
-
-def _blame_pass(error: BaseException, one: Pass, unknowns: int) -> BaseException:
-    """Says which pass it was that did not converge, and what the file holds."""
-    if not isinstance(error, ConvergenceError) or error.reason == "accuracy":
-        return error
-    return ConvergenceError(
-        error.reason,
-        f"with the mesh refined for analysis.accuracy, pass {one.number} of {unknowns} unknowns, {error.detail}; the "
-        f"file holds pass {one.number - 1}, which was solved, but is not as accurate as was asked for",
-    )
 
 
 def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | None) -> None:

@@ -86,12 +86,14 @@ class ConvergenceError(PbemError):
     """A load step did not converge at the smallest step.
 
     reason: a short name, e.g. "mode cycle", "singular tangent", "iteration limit", "linear solver"
-    detail: where and what to try, in sentences.
+    detail: where and what to try, in sentences. places: points (in the coordinates of the model) of the pairs whose
+    contact did not settle, where shorter elements may help; none if they would not, or if there are too many.
     """
 
-    def __init__(self, reason: str, detail: str) -> None:
+    def __init__(self, reason: str, detail: str, places: tuple[complex, ...] = ()) -> None:
         self.reason = reason
         self.detail = detail
+        self.places = places
         super().__init__(f"{reason}: {detail}")
 
 

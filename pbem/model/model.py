@@ -235,6 +235,7 @@ class Model:
     were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
     point_loads: where forces act at single points. point_supports: where points of free bodies are.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
+    refined: elements were halved after the case was read, where contacts did not settle.
     """
 
     title: str
@@ -266,6 +267,7 @@ class Model:
     origin: complex = 0j
     point_loads: Mapping[str, PointLoad] = field(default_factory=dict)
     point_supports: Mapping[str, PointSupport] = field(default_factory=dict)
+    refined: bool = False
 
     @cached_property
     def timed(self) -> bool:

@@ -118,6 +118,23 @@ def bisect_elements(model: Model, marked: Mapping[str, Bool], gently: bool = Fal
     return replace(model, curves=curves)
 
 
+def mark_near(model: Model, places: Sequence[complex]) -> dict[str, Bool]:
+    """Per curve the elements (along all its legs) that lie no farther from one of the places than they are long.
+
+    Those that a place lies on are among them, and longer neighbours, but not the short ones around.
+    """
+    at = np.array(places, dtype=complex)
+    marked = {}
+    for name, curve in model.curves.items():
+        ends, lengths = divide_ends(curve)
+        start, end = np.array(ends, dtype=complex).T
+        along = end - start
+        part = np.real((at[:, None] - start) * along.conj()) / np.abs(along) ** 2
+        distance = np.abs(at[:, None] - start - np.clip(part, 0.0, 1.0) * along)
+        marked[name] = (distance <= lengths * (1 + 1e-9)).any(axis=0)
+    return marked
+
+
 def _mark_tips(model: Model) -> Bool:
     """Whether an element, of all curves together, is among the few next to the tip of a crack."""
     marks = []

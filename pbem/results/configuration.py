@@ -14,8 +14,8 @@ from pbem.wording import show
 
 
 def dump_configuration(model: Model) -> str:
-    """JSON text of the model without the texts that it was read from; complex points as [x, y]."""
-    texts = ("source", "notes", "law_texts", "overrides")
+    """JSON text of the model without the texts that it was read from and how it was made; complex points as [x, y]."""
+    texts = ("source", "notes", "law_texts", "overrides", "refined")
     return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 
@@ -55,7 +55,7 @@ def find_change(stored: str, model: Model) -> str:
     for each in (before, now):
         for name in MAY_CHANGE:
             each.pop(name, None)
-        if model.analysis.accuracy is not None:
+        if model.analysis.accuracy is not None or model.refined:
             _drop_fractions(each)  # of a mesh that may have been refined; the places of its nodes are compared
     had, has = before.get("stages"), now.get("stages")
     if not isinstance(had, list) or len(had) > len(has):

@@ -47,6 +47,8 @@ def describe_results(results: Results, traces: int = 10) -> str:
         ("steps stored", _describe_steps(results)),
         ("iterations", _describe_iterations(results)),
     ]
+    if results.fractions is not None:
+        lines.insert(5, ("mesh", "may have been refined by the run; pbem plot FILE.h5 --mesh shows where"))
     if results.overrides:
         lines.insert(1, ("values set", ", ".join(results.overrides.splitlines())))
     parts = ["\n".join(f"{key + ':':14s}{value}" for key, value in lines)]

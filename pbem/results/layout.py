@@ -103,7 +103,7 @@ def write_header(file: h5py.File, model: Model, mesh: Mesh, interior_region: Int
     create_linearity(file, mesh)
     create_rigid(file, model)
     _write_estimates(file.create_group("estimates"), model, mesh)
-    if model.analysis.accuracy is not None:
+    if model.analysis.accuracy is not None or model.refined:
         _write_fractions(file.create_group("mesh"), model)
     if model.interior_points:
         interior = file.create_group("interior")

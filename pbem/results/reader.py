@@ -101,7 +101,7 @@ class Results:
 
     @cached_property
     def fractions(self) -> Fractions | None:
-        """Where the elements of each curve's legs end, if the mesh may have been refined (`analysis.accuracy`)."""
+        """Where the elements of each curve's legs end, if the mesh may have been refined."""
         with open_quietly(self.path) as file:
             return read_fractions(file)
 

@@ -23,10 +23,11 @@ from pbem.results.reader import Results
 def read_refined(results: Results) -> tuple[Model, Mesh, Integer]:
     """The model and the mesh that a result file was computed with, and how often each element (e,) was halved.
 
-    Raises ResultFileError if the file is of a run without `analysis.accuracy`.
+    Raises ResultFileError if the file is of a run that refines nothing.
     """
     if results.fractions is None:
-        raise ResultFileError(str(results.path), "was not refined: analysis.accuracy is not in its case")
+        why = "analysis.accuracy is not in its case, and contacts settled on its first mesh"
+        raise ResultFileError(str(results.path), f"was not refined: {why}")
     first = parse_model(results.case, str(results.path), results.overrides)[1]
     model = impose_fractions(first, results.fractions)
     mesh = generate_mesh(model)

@@ -13,7 +13,7 @@ from pathlib import Path
 # The package itself comes last: it offers what they define.
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "importing", "solve", "results",
-    "progress", "driver", "sweeps", "bundled", "terminal", "make_command", "import_command", "check_command",
+    "progress", "passes", "driver", "sweeps", "bundled", "terminal", "make_command", "import_command", "check_command",
     "run_command", "sweep_command", "export_command", "info_command", "plot_command", "pages", "cli", "__main__",
     "__init__",
 )

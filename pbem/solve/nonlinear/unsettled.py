@@ -13,6 +13,8 @@ from pbem.solve.problem.problem import Problem
 
 # So many pairs, or interfaces, are named.
 MOST_NAMED = 5
+# Where more pairs than this do not settle, it is not for the elements beside them.
+MOST_PLACES = 300
 
 
 def describe_unsettled(
@@ -30,6 +32,7 @@ def describe_unsettled(
             f"single pairs part when they are pressed, or move against a shear: {_name(problem, group[failed.wrong])}; "
             "with the others in their present modes contact there has none or several solutions; where elements are "
             "longer than the distance to the next face, use shorter ones",
+            _list_places(problem, group[failed.wrong]),
         )
     if reason == "no admissible modes" and failed is not None:
         loses = bool((problem.laws.tensile_strength[group] > 0).any())
@@ -47,8 +50,16 @@ def describe_unsettled(
     where = ", ".join(f"{count} on {names[number]}" for number, count in first)
     worst = np.array([int(np.argmax(proposal.violation))])
     return ConvergenceError(
-        reason, f"pairs that still change mode: {where}; the worst {_name(problem, worst)}; try shorter elements there"
+        reason, f"pairs that still change mode: {where}; the worst {_name(problem, worst)}; try shorter elements there",
+        _list_places(problem, np.flatnonzero(proposal.changed)),
     )
+
+
+def _list_places(problem: Problem, pairs: Integer) -> tuple[complex, ...]:
+    """Where these pairs lie; nothing if they are many."""
+    if len(pairs) > MOST_PLACES:
+        return ()
+    return tuple(complex(z) for z in problem.mesh.pairs.position[pairs])
 
 
 def _name(problem: Problem, pairs: Integer) -> str:

@@ -65,6 +65,7 @@ def end_at_rest(problem: Problem, stage: int, target: float, error: ConvergenceE
         error.reason,
         f"stage {name!r} stopped at the fraction 0; the load grows in proportion from rest, and what fails at "
         f"{target:.6g} fails at every fraction: {error.detail}",
+        error.places,
     )
 
 
@@ -106,4 +107,5 @@ def end_march(
         error.reason,
         f"stage {name!r} stopped at the fraction {reached:.6g}; the step to {target:.6g} failed and is the "
         f"smallest allowed (solver.min_step = {problem.model.solver.min_step:g}): {error.detail}{bound}",
+        error.places,
     )

@@ -1,0 +1,95 @@
+"""Passes of one run, each from rest on a finer mesh than the last: what follows a pass whose contacts do not settle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pbem.errors import ConvergenceError, PbemError
+from pbem.geometry.junction import format_point
+from pbem.mesh.generate import generate_mesh
+from pbem.model.model import Model
+from pbem.model.refinement import bisect_elements, count_elements, mark_near
+from pbem.results.accuracy import Pass
+from pbem.wording import count
+
+# A run whose contacts do not settle is tried again so many times, with so many times the elements and so many unknowns
+# at most: the next try is to cost no more than a user would wait for without having asked for it.
+MOST_TRIES = 3
+MOST_GROWTH = 3.0
+MOST_UNKNOWNS = 10_000
+# So many places are named.
+MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Target:
+    """The result file, and whether to go on with it or to replace it."""
+
+    path: Path
+    resume: bool
+    force: bool
+
+
+@dataclass(frozen=True)
+class Finer:
+    """A model with shorter elements where contacts did not settle, and a sentence that says so."""
+
+    model: Model
+    note: str
+
+
+def plan_finer(first: Model, model: Model, unknowns: int, tries: int, error: ConvergenceError) -> Finer | None:
+    """What to solve in place of a model whose contacts did not settle; None if that is how the run ends.
+
+    first: the model before any such try; unknowns: of this one; tries: how many there were.
+    """
+    if not error.places or tries >= MOST_TRIES or unknowns > MOST_UNKNOWNS:
+        return None
+    marked = mark_near(model, error.places)
+    finer = bisect_elements(model, marked)
+    had, before, after = (_count_all(each) for each in (first, model, finer))
+    if after == before or after > MOST_GROWTH * had or unknowns * after > MOST_UNKNOWNS * before:
+        return None
+    try:
+        generate_mesh(finer)
+    except PbemError:
+        return None
+    note = (
+        f"Contacts did not settle ({error.reason}) near {_list_places(model, error.places)}. Elements there are "
+        f"halved, {count(after, 'element')} in place of {before}, and the run begins again from rest."
+    )
+    return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
+
+
+def _count_all(model: Model) -> int:
+    return sum(count_elements(curve) for curve in model.curves.values())
+
+
+def _list_places(model: Model, places: Sequence[complex]) -> str:
+    named = ", ".join(format_point(z + model.origin) for z in places[:MOST_NAMED])
+    more = len(places) - MOST_NAMED
+    return named + (f" and {count(more, 'more place')}" if more > 0 else "")
+
+
+def blame_tries(error: ConvergenceError, tries: int, unknowns: int) -> ConvergenceError:
+    """Says that shorter elements did not help either."""
+    if not tries or not error.places:
+        return error
+    return ConvergenceError(
+        error.reason,
+        f"{error.detail}; elements beside pairs that did not settle were halved {count(tries, 'time')} already, up to "
+        f"{unknowns} unknowns",
+    )
+
+
+def blame_pass(error: BaseException, one: Pass, unknowns: int) -> BaseException:
+    """Says which pass of `analysis.accuracy` it was that did not converge, and what the file holds."""
+    if not isinstance(error, ConvergenceError) or error.reason == "accuracy":
+        return error
+    return ConvergenceError(
+        error.reason,
+        f"with the mesh refined for analysis.accuracy, pass {one.number} of {unknowns} unknowns, {error.detail}; the "
+        f"file holds pass {one.number - 1}, which was solved, but is not as accurate as was asked for",
+    )

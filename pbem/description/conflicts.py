@@ -10,6 +10,7 @@ from typing import Any
 from pbem.description.effects import NEEDED, OWN_KEYS
 from pbem.description.finding import Finding
 from pbem.description.generated_conflicts import check_generated
+from pbem.description.resultant_conflicts import check_resultants
 from pbem.errors import KeyPath
 from pbem.wording import show
 
@@ -37,6 +38,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
             findings += _check_law(loc, table)
     for loc, table in _tables(raw, ("tools",)):
         findings += _check_rigid(loc, table)
+    findings += check_resultants(raw)
     findings += _check_generate(raw)
     findings += _check_stages(raw)
     findings += _check_solver(raw)

@@ -9,7 +9,7 @@ from pbem.description.case import Case
 from pbem.description.schema import StageTable
 from pbem.errors import Fault, KeyPath
 from pbem.model.model import Construction, Contact, Hold, Interface, Law, Model, Stage
-from pbem.model.roles import Roles, unknown_name
+from pbem.model.roles import Roles, describe_name, unknown_name
 
 # What a stage says of interfaces, cracks and contacts, with what they are from then on (None: what their law says).
 KEYS: Mapping[str, Hold | None] = {"open": "open", "close": "closed", "release": None}
@@ -24,10 +24,11 @@ def read_construction(
     stages: list[Construction] = []
     faults: list[Fault] = []
     for number, table in enumerate(case.stages):
-        faults += _check_removed(case, number, table, removed)
+        faults += _check_removed(case, roles, number, table, removed)
         removed += [name for name in dict.fromkeys(table.remove) if name in case.regions and name not in removed]
         around = {name for name in laws if not set(removed).isdisjoint(_list_sides(roles, name))}
-        faults += _check_joints(case, number, table, joints, laws, around)
+        faults += _check_joints(case, roles, number, table, joints, laws, around)
+        faults += _check_gone(roles, number, table, removed)
         for key, hold in KEYS.items():
             for name in (name for name in getattr(table, key) if name in laws):
                 joints.pop(name, None)
@@ -56,12 +57,26 @@ def list_removed(case: Case, stage: int) -> set[str]:
     return {name for table in case.stages[: stage + 1] for name in table.remove}
 
 
-def _check_removed(case: Case, number: int, table: StageTable, before: Sequence[str]) -> Iterator[Fault]:
+# How to take away what is no region, by what it is.
+INSTEAD: Mapping[str, str] = {
+    "a rigid tool": "a region; a tool that is to bear nothing has its contact in 'open'",
+    "an interface": "a region; faces that are to bear nothing are named in 'open'",
+    "a crack": "a region; faces that are to bear nothing are named in 'open'",
+    "a contact": "a region; faces that are to bear nothing are named in 'open'",
+    "a point load": "a region; a load ends with fx = 0 and fy = 0 in a stage",
+}  # fmt: skip
+
+
+def _check_removed(
+    case: Case, roles: Roles, number: int, table: StageTable, before: Sequence[str]
+) -> Iterator[Fault]:
     loc: KeyPath = ("stages", number, "remove")
     seen: list[str] = []
     for name in table.remove:
         if name not in case.regions:
-            yield unknown_name(loc, name, "region", case.regions)
+            kind = describe_name(case, roles, name)
+            yield (Fault.at(loc, f"'{name}', {kind}", INSTEAD.get(kind, "a region")) if kind
+                   else unknown_name(loc, name, "region", case.regions))
         elif name in before or name in seen:
             yield Fault.at(loc, f"region '{name}', which is gone already", "each region once")
         elif case.regions[name].infinite:
@@ -71,8 +86,28 @@ def _check_removed(case: Case, number: int, table: StageTable, before: Sequence[
         yield Fault.at(loc, "all regions", "at least one region that stays")
 
 
+def _check_gone(roles: Roles, number: int, table: StageTable, removed: Collection[str]) -> Iterator[Fault]:
+    """Values in a stage for what is gone with a region by then, which have no effect."""
+    gone: dict[KeyPath, tuple[str, str]] = {
+        ("boundary", name): (f"conditions on '{name}'", roles.outer[name])
+        for name in table.boundary if roles.outer.get(name) in removed
+    }  # fmt: skip
+    gone |= {("temperature", name): ("a temperature", name) for name in table.temperature if name in removed}
+    gone |= {("eigenstrain", name): ("an eigenstrain", name) for name in table.eigenstrain if name in removed}
+    for loc, (found, region) in gone.items():
+        yield Fault.at(("stages", number, *loc), f"{found} of region '{region}', which is gone",
+                       "no values for what is gone, in the stage that removes it and in those after it")
+    for name in table.interfaces:
+        sides = roles.shared[name] if name in roles.shared else [roles.cracks.get(name)]
+        if not set(removed).isdisjoint(sides):
+            expected = (f"its pressure in [stages.boundary.{name}]" if name in list_bared(roles, removed) else
+                        "no values for what is gone, in the stage that removes it and in those after it")
+            yield Fault.at(("stages", number, "interfaces", name), f"a pressure of '{name}', where a region is gone",
+                           expected)
+
+
 def _check_joints(
-    case: Case, number: int, table: StageTable, before: Mapping[str, Hold], laws: Mapping[str, Law],
+    case: Case, roles: Roles, number: int, table: StageTable, before: Mapping[str, Hold], laws: Mapping[str, Law],
     gone: Collection[str],
 ) -> Iterator[Fault]:
     """Names that are none, are named twice, would change nothing, or are those of faces of a region that is gone."""
@@ -81,9 +116,13 @@ def _check_joints(
         loc: KeyPath = ("stages", number, key)
         for name in getattr(table, key):
             if name not in laws:
-                if name in case.curves:
-                    expected = "an interface of two regions, a crack or a contact"
-                    yield Fault.at(loc, f"'{name}', a curve of one region", expected)
+                kind, expected = describe_name(case, roles, name), "an interface of two regions, a crack or a contact"
+                if kind:
+                    if name in roles.in_contact:
+                        expected += f": '{name}' is in contact '{roles.in_contact[name]}'"
+                    if kind == "a region" and key == "open":
+                        expected += "; 'remove' takes regions away"
+                    yield Fault.at(loc, f"'{name}', {kind}", expected)
                 else:
                     yield unknown_name(loc, name, "interface, crack or contact", laws)
                 continue

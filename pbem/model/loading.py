@@ -164,6 +164,11 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
                 kind = "an interface" if name in roles.shared else "a crack"
                 expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
                 faults.append(Fault.at(loc, f"conditions on '{name}', {kind}", expected))
+            elif roles.outer.get(name) in case.tools:
+                tool = roles.outer[name]
+                keys = "fx, fy, moment, ux, uy or rotation in "
+                place = f"[stages.tools.{tool}]" if prefix else f"[tools.{tool}]"
+                faults.append(Fault.at(loc, f"conditions on '{name}', a rigid tool", keys + place))
             elif name in roles.in_contact:
                 expected = f"conditions on other curves: what it does is told in [contacts.{roles.in_contact[name]}]"
                 found = f"conditions on '{name}', which is in contact '{roles.in_contact[name]}'"
@@ -176,8 +181,12 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
         for name in names:
             loc = (*prefix, "interfaces", name)
             if name in roles.outer:
-                found = f"a law for '{name}', an outer curve of region '{roles.outer[name]}'"
-                faults.append(Fault.at(loc, found, "a curve shared by two regions, or a crack"))
+                kind = ("a rigid tool" if roles.outer[name] in case.tools else
+                        f"an outer curve of region '{roles.outer[name]}'")
+                expected = "a curve shared by two regions, or a crack"
+                if name in roles.in_contact:
+                    expected += f"; what '{name}' does is told in [contacts.{roles.in_contact[name]}]"
+                faults.append(Fault.at(loc, f"a law for '{name}', {kind}", expected))
             elif name not in case.curves:
                 faults.append(unknown_name(loc, name, "interface or crack", two_sided))
     for number, stage in enumerate(case.stages):

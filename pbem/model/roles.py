@@ -33,8 +33,19 @@ class Roles:
 def unknown_name(loc: KeyPath, name: str, what: str, known: Iterable[str]) -> Fault:
     """A fault for a name that nothing in the file defines, with the nearest one that is defined."""
     names = list(known)
-    expected = f"one of the {what}s: {list_names(names)}" if names else f"no name: the file has no such {what}"
+    several = what.replace("interface, crack or", "interfaces, cracks and")
+    expected = f"one of the {several}s: {list_names(names)}" if names else f"no name: the file has no such {what}"
     return Fault.at(loc, f"unknown {what} '{name}'{suggest(name, names)}", expected)
+
+
+def describe_name(case: Case, roles: Roles, name: str) -> str:
+    """What the file calls by a name that stands where another kind of thing is meant; "" if nothing."""
+    kinds = {
+        "a region": case.regions, "a rigid tool": case.tools, "an interface": roles.shared, "a crack": roles.cracks,
+        "a contact": case.contacts, "a curve of one region": roles.outer, "a curve": case.curves,
+        "a material": case.materials, "a point load": case.point_loads, "a point support": case.point_supports,
+    }  # fmt: skip
+    return next((kind for kind, names in kinds.items() if name in names), "")
 
 
 def resolve_roles(case: Case) -> Roles:

@@ -1,0 +1,54 @@
+"""Forces that no value is given for, on curves and at points, checked on the file's own tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pbem.description.finding import Finding
+from pbem.errors import KeyPath
+
+# What a table of a force says besides its values.
+BESIDES = {"about", "how", "at"}
+
+
+def check_resultants(raw: Mapping[str, Any]) -> list[Finding]:
+    """A fault for every force, on a curve or at a point, without a value in its table and in all stages; and for a
+    point that nothing is about."""
+    findings: list[Finding] = []
+    for loc, table in _list_forces(raw):
+        uniform = table.get("how", "uniform") == "uniform"
+        point = loc[0] == "point_loads"
+        if not any(set(each) - BESIDES for each in (table, *_list_changes(raw, loc))):
+            found = "a point load without values" if point else "a force without values"
+            keys = "fx or fy" if uniform and not point else "fx, fy or moment"
+            findings.append(Finding(loc, found, f"{keys}, here or in a stage"))
+        elif uniform and not point and "about" in table and "moment" not in table:
+            findings.append(Finding((*loc, "about"), 'a point of the moment with how = "uniform"', 'how = "linear", or '
+                                    "no such point: a uniform traction has the moment of its force"))
+    return findings
+
+
+def _list_forces(raw: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Mapping[str, Any]]]:
+    """The tables of forces on curves and at points, past anything that is none (the schema reports that)."""
+    for name, table in _read(raw, "boundary").items():
+        if isinstance(table, dict) and isinstance(table.get("force"), dict):
+            yield ("boundary", name, "force"), table["force"]
+    for name, table in _read(raw, "point_loads").items():
+        if isinstance(table, dict):
+            yield ("point_loads", name), table
+
+
+def _list_changes(raw: Mapping[str, Any], loc: KeyPath) -> Iterator[Mapping[str, Any]]:
+    """What the stages say of a table."""
+    stages = raw.get("stages")
+    for stage in stages if isinstance(stages, list) else []:
+        table = stage
+        for key in loc:
+            table = _read(table, str(key))
+        yield table
+
+
+def _read(table: Any, key: str) -> Mapping[str, Any]:
+    found = table.get(key) if isinstance(table, dict) else None
+    return found if isinstance(found, dict) else {}

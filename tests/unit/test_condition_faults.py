@@ -1,0 +1,87 @@
+"""Wrong conditions, forces, tools and constructions are told with their place, what was found and what is expected."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbem.case.build import parse_model
+from pbem.errors import CaseError
+
+BLOCKS = """
+materials.m = { young = 1e3, poisson = 0.3, expansion = 1e-5 }
+[curves]
+foot = { points = [[0, 0], [2, 0]], elements = 4 }
+right0 = { points = [[2, 0], [2, 1]], elements = 3 }
+seam = { points = [[2, 1], [0, 1]], elements = 4 }
+left0 = { points = [[0, 1], [0, 0]], elements = 3 }
+right1 = { points = [[2, 1], [2, 2]], elements = 3 }
+head = { points = [[2, 2], [0, 2]], elements = 4 }
+left1 = { points = [[0, 2], [0, 1]], elements = 3 }
+punch = { points = [[0, 2], [2, 2]], elements = 1 }
+crack = { points = [[0.5, 0.5], [1.5, 0.5]], elements = 4 }
+[regions]
+low = { material = "m", boundary = ["foot", "right0", "seam", "left0"], cracks = ["crack"] }
+up = { material = "m", boundary = ["seam", "right1", "head", "left1"] }
+[contacts]
+seat = { between = ["punch", "head"] }
+[tools]
+punch = { uy = -0.01, ux = 0.0, rotation = 0.0 }
+[boundary]
+foot = { ux = 0.0, uy = 0.0 }
+"""
+
+# What is written below the sample; then the place of the fault, and pieces of its text.
+WRONG = {
+    "remove a tool": ('[[stages]]\nremove = ["punch"]', "stages[1].remove", ["'punch', a rigid tool", "in 'open'"]),
+    "remove an interface": ('[[stages]]\nremove = ["seam"]', "stages[1].remove", ["'seam', an interface", "'open'"]),
+    "remove a crack": ('[[stages]]\nremove = ["crack"]', "stages[1].remove", ["'crack', a crack", "'open'"]),
+    "remove a curve": ('[[stages]]\nremove = ["left1"]', "stages[1].remove", ["'left1', a curve of one region"]),
+    "remove a material": ('[[stages]]\nremove = ["m"]', "stages[1].remove", ["'m', a material", "a region"]),
+    "remove a misspelt region": ('[[stages]]\nremove = ["lou"]', "stages[1].remove", ["did you mean 'low'?"]),
+    "open a region": ('[[stages]]\nopen = ["up"]', "stages[1].open", ["'up', a region", "'remove' takes regions away"]),
+    "open a tool": ('[[stages]]\nopen = ["punch"]', "stages[1].open", ["a rigid tool", "'punch' is in contact 'seat'"]),
+    "close nothing": ('[[stages]]\nclose = ["sem"]', "stages[1].close",
+                      ["did you mean 'seam'?", "one of the interfaces, cracks and contacts"]),
+    "no force": ("[boundary.left1]\nforce = {}", "boundary.left1.force", ["without values", "fx or fy, here or in a"]),
+    "no linear force": ('[boundary.left1]\nforce = { how = "linear" }', "boundary.left1.force", ["fx, fy or moment"]),
+    "a point without moment": ("[boundary.left1]\nforce = { fx = 1.0, about = [0, 0] }", "boundary.left1.force.about",
+                               ['how = "uniform"', 'how = "linear"']),
+    "a moment of a uniform force": ("[boundary.left1]\nforce = { moment = 1.0 }", "boundary.left1.force.moment",
+                                    ['how = "linear"']),
+    "no point load": ("[point_loads.p]\nat = [1.0, 1.5]", "point_loads.p", ["without values"]),
+    "conditions on a tool": ("[boundary.punch]\nux = 1.0", "boundary.punch", ["a rigid tool", "in [tools.punch]"]),
+    "conditions on a tool in a stage": ("[[stages]]\n[stages.boundary.punch]\nux = 1.0", "stages[1].boundary.punch",
+                                        ["a rigid tool", "in [stages.tools.punch]"]),
+    "a law of a tool": ("[interfaces.punch]\nfriction = 0.3", "interfaces.punch", ["a rigid tool", "[contacts.seat]"]),
+    "friction in a stage's tool": ("[[stages]]\n[stages.tools.punch]\nfriction = 0.3", "stages[1].tools.punch.friction",
+                                   ["unknown key 'friction';", "told in the table [contacts.NAME]"]),
+    "heat of what is gone": ('[[stages]]\nremove = ["up"]\n[[stages]]\n[stages.temperature]\nup = 5.0',
+                             "stages[2].temperature.up", ["region 'up', which is gone"]),
+    "misfit of what is gone": ('[[stages]]\nremove = ["up"]\n[stages.eigenstrain.up]\nexx = 0.1',
+                               "stages[1].eigenstrain.up", ["region 'up', which is gone"]),
+    "conditions of what is gone": ('[[stages]]\nremove = ["up"]\n[[stages]]\n[stages.boundary.left1]\ntx = 5.0',
+                                   "stages[2].boundary.left1", ["region 'up', which is gone"]),
+    "pressure of faces that are gone": (
+        '[interfaces.seam]\nlaw = "coulomb"\nfriction = 0.3\n[[stages]]\nremove = ["up"]\n[[stages]]\n'
+        "[stages.interfaces.seam]\npressure = 5.0", "stages[2].interfaces.seam", ["[stages.boundary.seam]"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "place", "pieces"), WRONG.values(), ids=[name.replace(" ", "_") for name in WRONG])
+def test_a_wrong_condition_is_told(text: str, place: str, pieces: list[str]) -> None:
+    with pytest.raises(CaseError) as raised:
+        parse_model(BLOCKS + text)
+    (fault,) = raised.value.faults
+    assert str(fault).startswith(place + " (line")
+    for piece in pieces:
+        assert piece in str(fault)
+
+
+@pytest.mark.parametrize("text", [
+    '[boundary.left1]\nforce = { how = "linear" }\n[[stages]]\n[stages.boundary.left1]\nforce = { moment = 1.0 }',
+    "[boundary.left1]\nforce = {}\n[[stages]]\n[[stages]]\n[stages.boundary.left1]\nforce = { fy = 1.0 }",
+    "[point_loads.p]\nat = [1.0, 1.5]\n[[stages]]\n[stages.point_loads.p]\nfx = 1.0",
+    "[boundary.left1]\nrigid = {}",
+])  # fmt: skip
+def test_values_may_come_with_the_stages(text: str) -> None:
+    parse_model(BLOCKS + text)

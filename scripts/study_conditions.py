@@ -30,6 +30,7 @@ from pbem.results.reader import Results  # noqa: E402
 from scripts.conditions.draft import OPERATORS, SCHEMES, Setting  # noqa: E402
 from scripts.conditions.everything import CONDITIONS  # noqa: E402
 from scripts.conditions.place import draw_place  # noqa: E402
+from scripts.conditions.trial import check_energy  # noqa: E402
 
 COLUMNS = ("name", "scheme", "operator", "order", "ranks", "seed", "cell", "quantity", "error", "tolerance", "message")
 
@@ -66,9 +67,10 @@ def judge(name: str, setting: Setting, folder: Path, ranks: int = 1) -> Cell:
         return judge_message(str(error), trial.refused)
     if trial.refused:
         return Cell("FAULT", message=f"not refused; expected: {trial.refused}")
-    figures = [each for each in trial.check(results)]
+    figures = list(trial.check(results))
     if not figures:
         return Cell("FAULT", message="nothing was looked at")
+    figures += check_energy(results, trial)
     worst = max(figures, key=lambda each: each.error / each.tolerance if each.error == each.error else float("inf"))
     return Cell("ok" if worst.error <= worst.tolerance else "FAULT", *worst)
 

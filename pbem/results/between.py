@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.closure import find_closure
 from pbem.contact.declaration import SLIP_PATH, Slide
 from pbem.contact.laws import PairLaws, collect_laws, evaluate_strength, find_creeping
@@ -26,8 +26,8 @@ class Violations:
     """By how much interpolated fields break the conditions of contact between the nodes, largest per interface (i,).
 
     penetration: length by which faces overlap; tension: normal traction beyond the tensile strength; cone: friction
-    traction beyond its bound; stress. Zero where they hold, and on bonded interfaces and those that never touch; cone
-    also where friction creeps, as it then gives way to any traction.
+    traction beyond its bound; stress. Zero where they hold, and on bonded interfaces and those that never touch, by law
+    or in the stage; cone also where friction creeps, as it then gives way to any traction.
     """
 
     penetration: Real
@@ -48,7 +48,7 @@ class BetweenNodes:
         """Of a step of the run."""
         contact, pressure = step.contact, evaluate_pressure(self._model, self._mesh, step.stage, step.factor)
         laws = self._laws
-        checked, creeps = ~(laws.bonded | laws.parted), find_creeping(laws)
+        checked, creeps = ~(laws.bonded | laws.parted | self._find_held(step.stage)), find_creeping(laws)
         limit = np.where(contact.broken, 0.0, laws.tensile_strength)
         count = laws.count
         penetration, tension, cone = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -64,6 +64,12 @@ class BetweenNodes:
             bound = evaluate_strength(laws, admissible, slide, pressure).bound
             cone = np.maximum(cone, np.where(creeps, 0.0, np.abs(p_s) - bound))
         return Violations(*(self._gather(np.where(checked, each, 0.0)) for each in (penetration, tension, cone)))
+
+    def _find_held(self, stage: int) -> Bool:
+        """The pairs (m,) that a stage has closed or opened, whatever their law."""
+        joints = self._model.stages[stage].construction.joints
+        held = [number for number, name in enumerate(self._mesh.interface_names) if name in joints]
+        return np.isin(self._mesh.pairs.interface, held)
 
     def _read(self, values: Real, weights: Real) -> Real:
         return np.asarray(np.einsum("mj,mj->m", weights, values[self._pair]))

@@ -35,8 +35,7 @@ from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load
-from pbem.mesh.interpolation import interpolate_tips, locate_nodes
-from pbem.mesh.mesh import Mesh, list_faces, second_face_nodes
+from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.dissipation import (
     PairRecord,
@@ -46,14 +45,13 @@ from pbem.results.dissipation import (
     record_pairs,
     record_pairs_at_rest,
 )
+from pbem.results.face_weights import weigh_faces
 from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
 from pbem.results.runaway import Runaway
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Step
 
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# Gauss points along tip elements, in the root of the distance from the tip.
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 # A step within which faces ran away released at least this part of the energy that was stored.
 LEAST_RELEASED = 0.01
 # Interfaces that took part in it have at least this part of what was released.
@@ -213,7 +211,17 @@ class EnergyBalance:
         total = float(weight @ np.abs((along + outer.stiffness * by) * by).sum(axis=1))
         total += float(np.abs((new.load - old.load) * (new.conjugate - old.conjugate)).sum())
         pressure, opened = new.pairs.pressure - old.pairs.pressure, new.pairs.g_n - old.pairs.g_n
-        return 0.5 * (total + float(self._pair_weight @ np.abs(pressure * opened)))
+        total += float(self._pair_weight @ np.abs(pressure * opened))
+        # Tools push where they touch; what swells works against the stress; what a stage releases is a load as well.
+        change, moved = new.traction - old.traction, new.displacement - old.displacement
+        total += _add_sizes(self._tools, change, moved) + _add_sizes(self._weight, change, new.swollen - old.swollen)
+        if self._there is not None:
+            at = self._there.bare
+            total += _add_sizes(self._weight[at], change[at], moved[at])
+            fallen, slid = new.pairs.p_n - old.pairs.p_n, new.pairs.g_s - old.pairs.g_s
+            work = np.abs(fallen * opened) + np.abs((new.pairs.p_s - old.pairs.p_s) * slid)
+            total += float(self._pair_weight @ np.where(self._there.opening, work, 0.0))
+        return 0.5 * total
 
     @property
     def _pair_weight(self) -> Real:
@@ -376,22 +384,9 @@ class EnergyBalance:
         )
 
 
-def weigh_faces(mesh: Mesh) -> Real:
-    """Weights (f,) at the nodes of `list_faces(mesh)` that integrate a traction times a displacement.
-
-    On tip elements they integrate the square-root shapes exactly, elsewhere they are those of the mesh.
-    """
-    weight = mesh.weight.copy()
-    tips = np.flatnonzero(mesh.tip)
-    if len(tips):
-        root = 0.5 * (1 + POINTS)
-        s = np.where(mesh.tip[tips] == 1, 1, -1)[:, None] * (2 * root**2 - 1)
-        length = 2 * WEIGHTS * root * mesh.geometry.select(tips).stretch(s)
-        shapes = interpolate_tips(mesh.tip[tips], locate_nodes(mesh)[tips], s)
-        nodes = tips[:, None] * (mesh.order + 1) + np.arange(mesh.order + 1)
-        weight[nodes] = np.einsum("eq,eqj->ej", length, shapes)
-    return np.concatenate([weight, weight[second_face_nodes(mesh)]])
-
-
 def _dot(weight: Real, traction: Complex, displacement: Complex) -> float:
     return float(weight @ (traction * np.conj(displacement)).real)
+
+
+def _add_sizes(weight: Real, traction: Complex, displacement: Complex) -> float:
+    return float(weight @ np.abs((traction * np.conj(displacement)).real))

@@ -150,7 +150,7 @@ def release_a_weld(setting: Setting) -> Trial:
             yield from expect(results, setting, "b1", step, complex(jump), each, f"step {step}", sheared)
         yield Figure("slips", float((results.contact["j1"].mode[-1] != 1).sum()), 0.5)
 
-    return Trial(draft.case(), check)
+    return Trial(draft.case(), check, releases=True)
 
 
 @condition("stages: remove what pulls")

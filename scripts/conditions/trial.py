@@ -30,11 +30,15 @@ Check = Callable[[Results], Iterator[Figure]]
 
 @dataclass(frozen=True)
 class Trial:
-    """A case and what its results have to obey; refused: words of the message where it cannot be computed."""
+    """A case and what its results have to obey; refused: words of the message where it cannot be computed; releases:
+    whether faces run away in it, as a step comes upon them that have to slip at once; lacks: what the discrete fields
+    may lack of the balance of energies, where the shapes do not contain them."""
 
     case: dict[str, Any]
     check: Check
     refused: str = ""
+    releases: bool = False
+    lacks: float = 1e-4
 
 
 Maker = Callable[[Setting], Trial]
@@ -121,3 +125,25 @@ def inside(
     ])  # fmt: skip
     scale = (scale or max(np.abs(each).max() for each in field.stress())) * place.stress
     yield Figure("stress inside", off(found, expected, scale), tolerance)
+
+
+# Energies below this part of stress times strain times area, or of modulus times displacement squared, are rounding.
+NO_ENERGY = 1e-9
+
+
+def check_energy(results: Results, trial: Trial) -> Iterator[Figure]:
+    """Loads do what is stored, dissipated, released and removed; nothing runs away where loads grow steadily."""
+    energy = results.energy
+    external, elastic = np.asarray(energy.external), np.asarray(energy.elastic)
+    if not np.isfinite(external).all():
+        return
+    young = max(material["young"] for material in trial.case["materials"].values())
+    area = float(np.prod(np.ptp(results.nodes.position, axis=0)))
+    stress, moved = (float(np.nanmax(np.abs(values))) for values in (results.traction, results.displacement))
+    least = NO_ENERGY * (stress**2 * area / young + young * moved**2)
+    scale = max(np.abs(external).max(), np.abs(elastic).max(), least)
+    left = external - elastic - energy.dissipated - energy.released - energy.removed
+    yield Figure("energy", off(left, 0.0, scale), trial.lacks)
+    yield Figure("dissipated", float(max(-np.diff(energy.dissipated, prepend=0.0).min(), 0.0)) / scale, 1e-9)
+    if not trial.releases:
+        yield Figure("released", off(np.asarray(energy.released), 0.0, scale), trial.lacks)

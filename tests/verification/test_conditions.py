@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import pbem
+from pbem.solve.problem.step import SilentReporter
 from scripts.conditions.draft import SCHEMES
 from scripts.conditions.everything import CONDITIONS
 from scripts.conditions.trial import Figure, Trial
@@ -30,6 +32,29 @@ def test_conditions_give_their_exact_answers(
 def test_a_pin_under_a_force_along_the_axis_of_its_mesh(name: str, tmp_path: Path) -> None:
     """Friction of both senses is in balance, and the place where it changes lies between two pairs."""
     assert judge(name, make_setting("SST", "dense", 2, 0), tmp_path).word == "ok"
+
+
+class Listener(SilentReporter):
+    """Keeps what is told."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.told.append(text)
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("fluid in an open crack", "J and"), ("stages: tension after an opening elsewhere", "between the nodes"),
+    ("stages: release a weld", "between the nodes"), ("round tool of one element under a force", "ran away"),
+    ("heat and stress at rest that balance", "balance"),
+])
+def test_nothing_is_told_that_is_not_so(name: str, words: str, tmp_path: Path) -> None:
+    """K and J of rounding agree; faces that a stage has joined bear any tension; tools that touch more and more push
+    along a path of equilibria."""
+    listener = Listener()
+    pbem.run(CONDITIONS[name](make_setting("SST", "dense", 2, 0)).case, tmp_path / "told.h5", reporter=listener)
+    assert not [told for told in listener.told if words in told]
 
 
 def test_faults_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -125,6 +125,8 @@ def _explain_lack(number: int, table: GenerateTable, count: int, area: Area) -> 
     key = "density" if table.density is not None else "fraction"
     value = table.density or table.fraction or 0.0
     found += f" in an area of {area.size:.4g}, a {key} of {value * count / table.count:.3g}"
+    if count == 0:  # nothing tells what would be possible
+        return Finding(("generate", number, key), found, f"a lower {key}, or a smaller distance")
     possible = _find_possible(table, key, value * count / table.count)
     expected = f"a {key} of about {possible:.2g} at most, or a smaller distance"
     return Finding(("generate", number, key), found, expected)

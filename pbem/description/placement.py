@@ -34,6 +34,10 @@ class Body:
     radius: float
 
 
+# The largest body covers no more cells than so many along its half-length or radius, however small others are.
+MOST_CELLS = {"cracks": 200, "inclusions": 50}
+
+
 @dataclass(frozen=True)
 class Area:
     """Where centres lie: a rectangle from `low` to `high`, or the disc inside of it; `within`: so do the whole bodies,
@@ -188,7 +192,17 @@ def make_ground(tables: Sequence[GenerateTable]) -> Ground:
     """Ground for the bodies of some tables."""
     distance = max(table.distance for table in tables)
     size = min(table.half_length or table.radius or math.inf for table in tables)
-    return Ground(2 * size + distance, distance)
+    longest = max(_bound_size(table) / MOST_CELLS[table.kind] for table in tables)
+    return Ground(max(2 * size + distance, longest), distance)
+
+
+def _bound_size(table: GenerateTable) -> float:
+    """No half-length or radius of a table is larger."""
+    size = table.half_length or table.radius
+    assert size is not None
+    if table.distribution == "power":
+        return table.largest or size
+    return size * (1 + table.spread if table.distribution == "uniform" else math.exp(table.spread * CUT_OFF))
 
 
 def place_bodies(table: GenerateTable, ground: Ground) -> tuple[list[Body], Area]:

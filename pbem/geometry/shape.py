@@ -161,7 +161,8 @@ def join_ends(curves: Mapping[str, Curve], tolerance: Tolerance) -> tuple[dict[s
             number += 2
             if start == end and not abs(leg.turn) > math.pi:
                 short.append((name, index + 1))
-            legs.append(replace(leg, start=start, end=end))
+            # An arc goes through its ends; one that closes upon itself has no chord to be laid over.
+            legs.append(replace(leg, start=start, end=end) if start == end else leg.tie(start, end))
         result[name] = Curve(name, tuple(legs))
     return result, list({name: (name, index) for name, index in reversed(short)}.values())
 

@@ -55,7 +55,11 @@ def pair_contact(
     both = sorted((chains[joint.first], chains[joint.second]), key=lambda chain: order.index(chain.curve))
     others = Elements.join([chain.elements for chain in chains.values()])
     behind = REACH * joint.overlap
-    slave, master, seen = _choose_slave(both[0], both[1], others, behind)
+    if joint.slave:
+        slave, master = both if both[0].curve == joint.slave else both[::-1]
+        seen = couple_curves(slave.elements, master.elements, slave.local, others, behind)
+    else:
+        slave, master, seen = _choose_slave(both[0], both[1], others, behind)
     met = seen.cover > LEAST_COVER
     own_weight, other_weight = (weigh_nodes(chain.elements, chain.local).ravel() for chain in (slave, master))
     used = met[seen.slave]

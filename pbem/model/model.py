@@ -100,7 +100,8 @@ class Contact:
 
     first, second: names of the curves; the pairs lie on the first, which gives their normal. Neither has a
     Condition: where they do not touch they are free of traction. overlap: how deep the bodies lie in each other as they
-    are drawn, at most (length); 0 where they do not.
+    are drawn, at most (length); 0 where they do not. slave: the curve whose nodes the pairs belong to, where the meshes
+    do not choose it.
     """
 
     name: str
@@ -108,6 +109,7 @@ class Contact:
     second: str
     law: Law
     overlap: float = 0.0
+    slave: str = ""
 
 
 @dataclass(frozen=True)

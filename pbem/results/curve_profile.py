@@ -116,16 +116,16 @@ def _read_pairs(results: Results, contact: Contact, quantity: str, step: int, ab
     arc, position = contact.arc_length, contact.position
     ends = find_crack_ends(results, contact) if kind and contact.second is None else []
     arcs, points, jumps = [arc], [position], [values]
-    for first, place, arc_at_tip, rooted in ends:
+    for first, element, arc_at_tip, rooted in ends:
         # From the node beside the tip; the shape there is that of the tip's elements.
         node = 0 if first else len(arc) - 1
         t = np.linspace(0.0, 1.0, TIP_POINTS + 1)[:-1] ** 2
         t = t if first else t[::-1]
-        drawn = (
-            arc_at_tip + t * (arc[node] - arc_at_tip),
-            place + t[:, None] * (position[node] - place),
-            values[node] * (np.sqrt(t) if rooted else t),
-        )
+        along = arc_at_tip + t * (arc[node] - arc_at_tip)
+        own = results.elements.geometry.select(np.array([element]))
+        fractions = abs(along - arc_at_tip) / own.lengths[0]
+        places = own.place_fractions((fractions if first else 1.0 - fractions)[None])[0]
+        drawn = along, np.stack([places.real, places.imag], axis=1), values[node] * (np.sqrt(t) if rooted else t)
         for parts, part in zip((arcs, points, jumps), drawn, strict=True):
             parts.insert(0 if first else len(parts), part)
     line = np.concatenate(points)
@@ -137,15 +137,15 @@ def _read_pairs(results: Results, contact: Contact, quantity: str, step: int, ab
     )
 
 
-def find_crack_ends(results: Results, contact: Contact) -> list[tuple[bool, Real, float, bool]]:
-    """The ends of a crack that are tips: whether it is the first, its point (2,), its arc length, and whether jumps
-    there have the square-root shape."""
+def find_crack_ends(results: Results, contact: Contact) -> list[tuple[bool, int, float, bool]]:
+    """The ends of a crack that are tips: whether it is the first, the element (of the first face), its arc length, and
+    whether jumps there have the square-root shape."""
     elements, names = results.elements, results.nodes.curve_names
     if isinstance(contact, JoinedContact):
         # Those of the trace: the start of its first piece, and the end of the last one.
         begin, last = (find_crack_ends(results, contact.pieces[at]) for at in (0, -1))
-        return [each for each in begin if each[0]] + [
-            (False, point, arc + contact.starts[-1], rooted) for is_first, point, arc, rooted in last if not is_first]
+        moved = [(first, element, arc + contact.starts[-1], rooted) for first, element, arc, rooted in last]
+        return [*(each for each in begin if each[0]), *(each for each in moved if not each[0])]
     if contact.name not in names or not len(contact.arc_length):
         return []
     own = first_faces(elements, names.index(contact.name))
@@ -154,11 +154,11 @@ def find_crack_ends(results: Results, contact: Contact) -> list[tuple[bool, Real
     tips = {contact.name: results.tips[contact.name]} if contact.name in results.tips else {}
     factors = tips[contact.name].KI if tips else np.full((1, 2), np.nan)
     ends = []
-    for first, element, vertex in ((True, own[0], 0), (False, own[-1], 1)):
+    for first, element in ((True, int(own[0])), (False, int(own[-1]))):
         if not len(factors) or np.isnan(factors[-1, 0 if first else 1]):
             continue
         arc = 0.0 if first else float(elements.geometry.select(own).lengths.sum())
-        ends.append((first, elements.vertices[element, vertex], arc, bool(elements.tip[element])))
+        ends.append((first, element, arc, bool(elements.tip[element])))
     return ends
 
 

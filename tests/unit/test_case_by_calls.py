@@ -247,6 +247,25 @@ def draw(**points: list[complex]) -> dict[str, Curve]:
     return joined
 
 
+def test_an_arc_goes_through_the_points_that_its_ends_are_joined_to() -> None:
+    """Its centre follows, from which both are equally far; an arc without chord keeps its own."""
+    off = 1e-10 * (1 + 2j)
+    for turn in (20.0, 90.0, 180.0, 300.0, -45.0):
+        arc = draw_circle("arc", 3 + 1j, 2.0, Division(elements=32), (10.0, 10.0 + turn))
+        assert isinstance(arc, Curve)
+        line = draw_polyline("line", [arc.end + off, 9 + 9j, arc.start - off], Division(elements=8))
+        curves = {"line": line, "arc": arc}
+        joined = join_ends(curves, make_tolerance(curves, measure_extent(curves)[1]))[0]["arc"]
+        (leg,) = joined.legs
+        assert (joined.end, joined.start) == (line.start, line.end) and leg.center is not None
+        radii = np.abs(np.array([leg.start, *leg.point(np.array([0.3, 0.6])), leg.end]) - leg.center)
+        assert np.ptp(radii) < 1e-13 and abs(radii[0] - 2.0) < 2e-9
+    whole = draw_circle("arc", 3 + 1j, 2.0, Division(elements=32), (10.0, 369.99999999999))
+    assert isinstance(whole, Curve)
+    (leg,) = join_ends({"arc": whole}, make_tolerance({"arc": whole}, 6.0))[0]["arc"].legs
+    assert leg.start == leg.end and leg.center == 3 + 1j
+
+
 def test_curves_loops_and_crossings_without_a_case() -> None:
     curves = draw(floor=[0j, 2 + 0j], sides=[2 + 0j, 2 + 1j, 1j, 0j], hole=[0.5 + 0.5j, 1 + 0.5j, 1 + 0.7j, 0.5 + 0.5j])
     tolerance = make_tolerance(curves, 2.0)

@@ -177,6 +177,22 @@ def test_long_and_short_bodies_are_placed_together() -> None:
     assert find_area(table, []).size == pytest.approx(300 / 0.004)
 
 
+@pytest.mark.parametrize("large", ["half_length = 1e8", "half_length = 1e8\ndistribution = 'lognormal'\nspread = 0.5"])
+def test_bodies_of_very_different_tables_are_placed_soon(large: str) -> None:
+    """The ground's cells follow the smallest bodies only as far as the largest do not cover millions of them."""
+    cracks = CRACKS.replace("count = 40", "count = 3").replace("half_length = 1.0", large)
+    curves = parse_case(cracks.replace("density = 0.1", "density = 1e-20") + INCLUSIONS[len(ROCK):]).curves
+    assert len(curves) == 23
+    lengths = [math.dist(*curve.points) for name, curve in curves.items() if curve.points and name.startswith("crack")]
+    assert min(lengths) > 2e7
+
+
+def test_a_table_that_finds_no_room_at_all_is_told_so() -> None:
+    fault = find_only_fault(CRACKS + INCLUSIONS[len(ROCK):].replace("fraction = 0.3\ndistance = 0.1",
+                                                                    "fraction = 0.3\ndistance = 1e6"))
+    assert "room for 0 of 20 inclusions" in fault and "expected a lower fraction, or a smaller distance" in fault
+
+
 def test_the_same_table_gives_the_same_places_everywhere() -> None:
     # Numbers written down once: they must not change with versions or machines.
     expected = parse_case(CRACKS).curves["crack_1"].points

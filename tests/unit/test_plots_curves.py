@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+import pbem
 from pbem.results.curve_picture import CurveOptions, CurvePicture
 from pbem.results.curve_plot import draw_quantity
 from pbem.results.curve_profile import measure_angles, read_profile
@@ -89,6 +92,18 @@ def test_angles_along_a_circle_have_no_jumps(results: Results) -> None:
         assert -180 < 0.5 * (found.min() + found.max()) <= 180 + 1e-6
     with pytest.raises(ValueError, match="'joint' is no arc of a circle"):
         read_profile(results, "joint", "slip", -1, "angle")
+
+
+def test_angles_along_a_crack_on_an_arc_go_from_tip_to_tip(tmp_path: Path) -> None:
+    """What is drawn beside the tips lies on the circle, too."""
+    case = {
+        "materials": {"rock": {"young": 1e3, "poisson": 0.2}},
+        "curves": {"arc": {"center": [3, 4], "radius": 2.0, "angles": [30, 120], "elements": 8}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["arc"]}}, "remote": {"syy": 1.0},
+    }
+    profile = read_profile(pbem.run(case, tmp_path / "x.h5"), "arc", "opening", -1, "angle")
+    assert profile.line_place[[0, -1]] == pytest.approx([30.0, 120.0], abs=1e-9)
+    assert (np.diff(profile.line_place) > 0).all() and profile.line_values[[0, -1]].tolist() == [0.0, 0.0]
 
 
 def test_quantities_of_nodes_are_those_of_the_first_side(results: Results) -> None:

@@ -10,12 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.bem.location import locate_points
+from pbem.bundled import find_case
 from pbem.case.build import parse_model
+from pbem.case.case import Case
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, start_memory
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, linearise
 from pbem.mesh.generate import generate_mesh
+from pbem.model.build import build_model
 from pbem.parallel import world
 from pbem.solve.estimate.coarser_mesh import put_beside
 from pbem.solve.problem.problem import Problem, System
@@ -152,3 +155,15 @@ def test_the_model_chooses_its_system_and_keeps_it_for_a_second_solution(problem
         assert choose_system(beside.model, beside.mesh) is kind
         assert beside.model.solver.newton_tolerance == (1e-9 if name == "dense" else 1e-7)
         assert (kind.refuse_ranks(problem.model, problem.mesh, problem.mesh.nodes + 1) is None) == (name != "dense")
+
+
+def test_a_contact_is_compared_on_the_curve_whose_nodes_have_its_pairs() -> None:
+    """Merged elements may make the other curve the coarser one; its pairs could not be compared with anything."""
+    case = Case.read(find_case("hertz"))
+    for elements in (24, 27, 28, 30):
+        model = build_model(case.replace({"curves.nose.elements": elements}))
+        mesh = generate_mesh(model)
+        beside = put_beside(model, mesh)
+        assert beside is not None and beside.mesh.pairs.count > 9 and beside.seen.all()
+        of = {mesh.curve_names[curve] for curve in mesh.node_curve[mesh.pairs.slave]}
+        assert of == {mesh.curve_names[curve] for curve in beside.mesh.node_curve[beside.mesh.pairs.slave]}

@@ -12,7 +12,7 @@ from pbem.bem.operator_choice import choose_operator
 from pbem.mesh.carry import Carry, carry_nodes
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model
+from pbem.model.model import Contact, Model
 from pbem.model.refinement import coarsen_model
 
 # The second solution starts from the modes of the first, so that it settles soon or never.
@@ -57,8 +57,19 @@ def put_beside(model: Model, mesh: Mesh) -> Beside | None:
         return None
     eased = choose_operator(model, mesh).ease(coarse.model.solver)
     eased = replace(eased, newton_max_iterations=min(eased.newton_max_iterations, MOST_ITERATIONS))
-    second = replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=())
+    contacts = _keep_slaves(coarse.model, mesh)
+    second = replace(coarse.model, solver=eased, interior_points=(), interior_grid=None, notes=(), contacts=contacts)
     return relate_meshes(coarse.kind, model, mesh, second, generate_mesh(second))
+
+
+def _keep_slaves(model: Model, mesh: Mesh) -> dict[str, Contact]:
+    """Contacts whose pairs belong to the same curve as those of a mesh: on the other one nothing can be compared."""
+    curve = mesh.node_curve
+    found = {}
+    for name, contact in model.contacts.items():
+        slaves = mesh.pairs.slave[mesh.pairs.interface == mesh.interface_names.index(name)]
+        found[name] = replace(contact, slave=mesh.curve_names[curve[slaves[0]]]) if len(slaves) else contact
+    return found
 
 
 def relate_meshes(

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as OutlinePath
+from matplotlib.text import Text
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.generate import generate_mesh
@@ -20,6 +21,7 @@ from pbem.model.model import Condition, Model
 from pbem.model.origin import move_back
 from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Value, evaluate
+from pbem.results.label_room import part_labels
 from pbem.results.model_text import describe_condition
 from pbem.results.outline import MANY_ELEMENTS, choose_points, to_columns
 from pbem.results.plot_style import FORCE, MOTION, SUPPORT, TOOL_WIDTH, choose_shades, escape, label, style
@@ -27,6 +29,8 @@ from pbem.results.refinement_plot import draw_levels
 
 MOST_NAMES = 30
 CRACK = "#A51C30"
+# Characters of what is prescribed on a curve that stand in one line.
+LONGEST = 48
 
 
 def plot_model(
@@ -55,9 +59,8 @@ def draw_model(model: Model, mesh: Mesh, levels: Integer | None = None) -> Figur
         _draw_condition(axes, model, mesh, condition, used[condition.curve])
     _draw_points(axes, model)
     few = len(model.curves) <= MOST_NAMES
-    for name, elements in used.items():
-        if few and len(elements):
-            _name_curve(axes, model, mesh, name, elements)
+    names = [_name_curve(axes, model, mesh, name, elements) for name, elements in used.items()
+             if few and len(elements)]
     _draw_tips(axes, model)
     if len(model.interfaces) <= MOST_NAMES:
         for name in model.interfaces:
@@ -72,6 +75,7 @@ def draw_model(model: Model, mesh: Mesh, levels: Integer | None = None) -> Figur
     if levels is not None:
         handles += draw_levels(axes, mesh, levels)
     axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    part_labels(axes, names)
     return figure
 
 
@@ -90,9 +94,10 @@ def _draw_regions(axes: Axes, model: Model, mesh: Mesh) -> None:
         if region.rigid:
             points = to_columns(lines[own])
             axes.add_collection(LineCollection(list(points), colors="0.15", linewidths=TOOL_WIDTH, zorder=2.5))
-            middle = points.reshape(-1, 2)[points.shape[0] * points.shape[1] // 2]
-            axes.annotate(escape(region.name), middle, xytext=(4, 4), textcoords="offset points", style="italic",
-                          color="0.3", zorder=6)
+            if len(model.curves) > MOST_NAMES:  # else its curve has its name
+                middle = points.reshape(-1, 2)[points.shape[0] * points.shape[1] // 2]
+                axes.annotate(escape(region.name), middle, xytext=(4, 4), textcoords="offset points", style="italic",
+                              color="0.3", zorder=6)
             continue
         if region.infinite:
             axes.set_facecolor(shades[number])
@@ -267,8 +272,9 @@ def _draw_points(axes: Axes, model: Model) -> None:
                       fontsize=7, color=SUPPORT, zorder=6)
 
 
-def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: Integer) -> None:
-    """The curve's name at its middle, with what is prescribed there; beside a steep curve the text runs upwards."""
+def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: Integer) -> tuple[Text, complex]:
+    """The curve's name at its middle, with what is prescribed there, and the direction away from it; beside a steep
+    curve the text runs upwards."""
     one_side = elements[mesh.region[elements] == mesh.region[elements[0]]]
     # Curves inside are named off their middle, where other names are likelier to be.
     most, which = (1, 0) if name in model.conditions else (4, 3 if mesh.crack[one_side[0]] else 0)
@@ -278,20 +284,22 @@ def _name_curve(axes: Axes, model: Model, mesh: Mesh, name: str, elements: Integ
         given = describe_condition(model, model.conditions[name])
         loaded = any(any(stage.boundary.get(name, (0.0, 0.0))) for stage in model.stages)
         if given[0] != "free":
-            text, far = f"{name}\n{given[0]}, {given[1]}", 0.14 if loaded else 0.045
+            between = ", " if len(given[0]) + len(given[1]) <= LONGEST else "\n"
+            text, far = f"{name}\n{given[0]}{between}{given[1]}", 0.14 if loaded else 0.045
     if model.curves[name].closed:
         # Below the curve: inside of a hole there is no room.
         lowest = mesh.start[one_side][np.argmin(mesh.start[one_side].imag)]
         place, normal, far = complex(lowest), -1j, 0.02
     steep = abs(normal.real) > 0.75
     at = place + far * model.size * normal
-    axes.text(
+    written = axes.text(
         at.real, at.imag, escape(text), rotation=90 if steep else 0, fontsize=7, color="0.2", zorder=6, linespacing=1.4,
         ha="left" if normal.real > 0.4 else "right" if normal.real < -0.4 else "center",
         va="center" if steep else "bottom" if normal.imag > 0 else "top",
     )
     room = at + 0.06 * model.size * normal * (1 + text.count("\n"))
     axes.update_datalim(to_columns(np.array([room])))
+    return written, normal
 
 
 def _draw_tips(axes: Axes, model: Model) -> None:

@@ -15,6 +15,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.construction import describe_construction
 from pbem.model.model import Condition, Law, Model, Region, Stage
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference
+from pbem.model.varying import Value, Varying
 from pbem.results.doubts import list_doubts
 from pbem.results.law_text import TITLES, list_law_rows
 from pbem.results.text_tables import format_bytes, format_number, section, shorten, table
@@ -127,11 +128,21 @@ def describe_condition(model: Model, condition: Condition) -> tuple[str, str]:
         return "free", "free"
     texts = []
     for i, quantity in enumerate(condition.known):
-        given = [f"{value[i]:g}" for value in values]
+        given = [_show_value(value[i]) for value in values]
         given = given[:1] if len(set(given)) == 1 else shorten(given, 6)
         spring = f", spring {condition.stiffness[i]:g}" if condition.stiffness[i] else ""
         texts.append(f"{'u' if quantity == 'displacement' else 't'}{names[i]} = {', '.join(given)}{spring}")
     return texts[0], texts[1]
+
+
+# An expression that is longer is cut off: those of forces that are spread over a curve are the program's own.
+LONGEST = 40
+
+
+def _show_value(value: Value) -> str:
+    text = f"{value:g}"
+    is_long = isinstance(value, Varying) and not value.table and len(text) > LONGEST
+    return f'{text[:LONGEST // 2]} ..."' if is_long else text
 
 
 def _interface_rows(model: Model, mesh: Mesh, made: Collection[str]) -> list[list[str]]:

@@ -54,7 +54,7 @@ from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
 from pbem.model.support_motions import check_independent
-from pbem.model.tools import check_tools, make_tool_regions, orient_tools
+from pbem.model.tools import check_tools, divide_tools, make_tool_regions, orient_tools
 from pbem.model.varying import Varying
 from pbem.wording import list_names
 
@@ -195,7 +195,7 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     supports, wrong = place_point_supports(case, roles, curves)
     faults += wrong
     tips = find_tips(curves, cracks)
-    curves = divide_for_tips(case, curves, tips)
+    curves = divide_tools(case, divide_for_tips(case, curves, tips))
     notes += describe_near_misses(case, curves, tips)
     faults += check_tip_elements(case, curves, tips)
     return _Topology(

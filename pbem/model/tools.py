@@ -36,6 +36,27 @@ def check_tools(case: Case, roles: Roles) -> list[Fault]:
     return faults
 
 
+# Elements of a tool at least, at order 0 and above: its nodes have to tell a rotation from a translation, also those
+# of the coarser mesh beside, whose elements are merged in pairs or have an order less.
+LEAST_ELEMENTS = (4, 2)
+
+
+def divide_tools(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
+    """The curves, with more elements on the longest leg of tools that have too few of them."""
+    result = dict(curves)
+    for name, table in case.tools.items():
+        legs = [(leg.length, curve, number) for curve in (name, *table.curves) if curve in result
+                for number, leg in enumerate(result[curve].legs)]
+        lacking = LEAST_ELEMENTS[min(case.analysis.order, 1)] - sum(
+            result[curve].legs[number].elements for _, curve, number in legs)
+        if lacking > 0 and legs:
+            _, curve, number = max(legs, key=lambda each: each[0])
+            own = list(result[curve].legs)
+            own[number] = replace(own[number], elements=own[number].elements + lacking)
+            result[curve] = Curve(curve, tuple(own))
+    return result
+
+
 def orient_tools(case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles) -> Loops:
     """The curves of every tool as loops by themselves, open or closed, travelled so that their normals face the bodies.
     """

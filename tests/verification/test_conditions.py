@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import pbem
@@ -32,6 +33,16 @@ def test_conditions_give_their_exact_answers(
 def test_a_pin_under_a_force_along_the_axis_of_its_mesh(name: str, tmp_path: Path) -> None:
     """Friction of both senses is in balance, and the place where it changes lies between two pairs."""
     assert judge(name, make_setting("SST", "dense", 2, 0), tmp_path).word == "ok"
+
+
+@pytest.mark.parametrize("order", [0, 1, 3])
+def test_a_flat_tool_of_one_element_presses_evenly(order: int, tmp_path: Path) -> None:
+    """Its nodes have to know a rotation, on the coarser mesh of the estimate too."""
+    case = CONDITIONS["flat tool of one element"](make_setting("SST", "dense", order, 0)).case
+    case["tools"]["press"]["moment"] = 0.0
+    results = pbem.run(case, tmp_path / "press.h5")
+    np.testing.assert_allclose(results.rigid["press"].force[-1], [0.0, -3.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(results.rigid["press"].motion[-1], [0.0, -6e-3, 0.0], atol=1e-9 if order else 5e-4)
 
 
 class Listener(SilentReporter):

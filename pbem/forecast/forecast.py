@@ -8,7 +8,7 @@ with runs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pbem.bem.operator_choice import choose_operator
@@ -71,7 +71,10 @@ def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> F
     size = measure_size(model, mesh.nodes)
     work = count_work(model, mesh)
     coarse = coarsen_model(model)
-    second = None if coarse is None else count_work(coarse.model, generate_mesh(coarse.model))
+    second = None
+    if coarse is not None:  # with the same operator, though the other one might be chosen for so few unknowns
+        eased = replace(coarse.model, solver=choose_operator(model, mesh).ease(coarse.model.solver))
+        second = count_work(eased, generate_mesh(eased))
     changes = expect_changes(model, mesh, work.pairs)
     # The second solution begins from the statuses of the first.
     settled = Changes(float(size.steps), 0.0)

@@ -24,7 +24,7 @@ STARTED, EVERYWHERE = 142e6, 2300.0
 # pair changes, and where some do; and how their number grows with that of the ranks.
 AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
 # Of the hierarchical operator near blocks, and groups' inverses, to what is counted; of MUMPS' factors likewise.
-NEAR_MEMORY, INVERSES, SPARSE_FACTORS = 1.0, 0.3, 1.5
+NEAR_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.3, 1.0, 1.5
 # Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
 SCATTERED = 1.2
 
@@ -43,7 +43,8 @@ START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 1.4e-6
 # Of an unknown in the assembly of the hierarchical operator.
 PLACED = 40e-6
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
-ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, SPARSE, COLUMN = 0.65, 2.0, 110.0, 0.5, 1.0, 3.5, 0.5
+ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 2.0, 110.0, 0.5, 1.0, 0.5
+SPARSE, SPARSE_SHARED = 2.0, 3.5
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,8 @@ def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
         return {"operator": 8 * NEAR_MEMORY * work.entries, "preconditioner": 8 * INVERSES * work.factored,
                 "mesh and vectors": EVERYWHERE * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
-    factors = (SPARSE_FACTORS if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
+    sparse = SPARSE_FACTORS if ranks == 1 else SPARSE_FACTORS_SHARED
+    factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
     copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
     return {
         "operator": 8 * (work.entries + work.besides),
@@ -139,7 +141,8 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
         }  # fmt: skip
     factors = 1.0 if work.columns else changes.factorisations
     columns = work.columns or 2.0 * min(changes.part, CHANGING) * work.pairs
-    rate = speed.operation * (SPARSE if work.sparse else FACTOR if ranks == 1 else FACTOR_SHARED) * share
+    alone, shared = (SPARSE, SPARSE_SHARED) if work.sparse else (FACTOR, FACTOR_SHARED)
+    rate = speed.operation * (alone if ranks == 1 else shared) * share
     return {
         "assembly": ENTRY * speed.entry * (work.entries + work.besides) * share,
         "steps": vectors + factors * (FORMED * speed.byte * 8 * work.formed * share + rate * work.operations

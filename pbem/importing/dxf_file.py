@@ -72,7 +72,7 @@ def _open(path: Path, reading: Reading) -> Any:
             from ezdxf import recover
     except ImportError as error:
         raise PbemError(
-            f"{path}: DXF files are read by ezdxf, which is missing ({error}): install python3-ezdxf, or run "
+            f"{path}: DXF files are read by ezdxf, which is missing ({error}): apt-get install python3-ezdxf, or run "
             "pip install ezdxf"
         ) from None
     try:

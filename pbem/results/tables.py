@@ -192,6 +192,11 @@ KINDS: Mapping[str, Callable[[Results], Table]] = {
 
 def make_dataframe(results: Results, what: str) -> Any:
     """The table as a pandas.DataFrame. Raises ImportError, which names the package, if pandas is not installed."""
+    return frame_columns(lambda: make_table(results, what))
+
+
+def frame_columns(find: Callable[[], Mapping[str, Any]]) -> Any:
+    """A pandas.DataFrame of columns, found once it is there. Raises ImportError as `make_dataframe`."""
     try:
         import pandas
     except ImportError as error:
@@ -199,4 +204,4 @@ def make_dataframe(results: Results, what: str) -> Any:
             "to_dataframe needs the package pandas, which is not installed: pip install pandas, or on Debian and "
             "Ubuntu apt-get install python3-pandas"
         ) from error
-    return pandas.DataFrame(make_table(results, what))
+    return pandas.DataFrame(find())

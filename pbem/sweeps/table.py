@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError, StorageError, printable
+from pbem.results.tables import frame_columns
 from pbem.sweeps.values import write_cell
 
 # After the values that were set and the quantities. case: a mark of the case and its settings, by which a table that
@@ -77,11 +78,7 @@ class Table:
 
     def to_dataframe(self) -> Any:
         """The table as pandas has it. Raises ImportError where pandas is not installed."""
-        try:
-            import pandas  # type: ignore[import-untyped,unused-ignore]
-        except ImportError as error:
-            raise ImportError("to_dataframe needs the package pandas: pip install pandas, or python3-pandas") from error
-        return pandas.DataFrame({column: list(self[column]) for column in self.columns}, columns=list(self.columns))
+        return frame_columns(lambda: {column: list(self[column]) for column in self.columns})
 
     def __repr__(self) -> str:
         shown = [list(self.columns), *([_show(row[each]) for each in self.columns] for row in self._rows[:MOST_SHOWN])]

@@ -433,7 +433,7 @@ def test_a_table_prints_and_becomes_a_dataframe(folder: Path) -> None:
     try:
         import pandas
     except ImportError:
-        with pytest.raises(ImportError, match="pip install pandas"):
+        with pytest.raises(ImportError, match="apt-get install python3-pandas"):
             table.to_dataframe()
     else:
         frame = table.to_dataframe()

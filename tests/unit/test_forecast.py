@@ -19,6 +19,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import world
+from pbem.solve.estimate.coarser_mesh import put_beside
 from pbem.solve.system.assembly import assemble_problem
 from tests.unit.case_sample import BLOCKS
 
@@ -120,3 +121,19 @@ def test_stored_steps_are_counted() -> None:
     stages = tuple(replace(model.stages[0], steps=steps) for steps in (3, 4))
     for every, stored in ((1, 7), (2, 5), (10, 2)):
         assert count_stored_steps(replace(model, stages=stages, output_every=every)) == stored
+
+
+def test_the_second_solution_has_the_operator_of_the_run() -> None:
+    """As the run has it, which would choose the dense one for so few unknowns: a quarter of its entries."""
+    field = TILTED.replace("elements = 6", "elements = 160").format(sxx=0, syy=-1)
+    model, mesh = read(field)
+    memory = {}
+    for operator in ("dense", "hierarchical"):
+        chosen = replace(model, solver=replace(model.solver, operator=operator))
+        found = make_forecast(chosen, mesh, 1, timed=False)
+        memory[operator] = found.memory["second solution, for the estimate"]
+        assert found.operator == operator
+    beside = put_beside(replace(model, solver=replace(model.solver, operator="hierarchical")), mesh)
+    assert beside is not None
+    entries = count_work(beside.model, beside.mesh).entries
+    assert 8 * entries <= memory["hierarchical"] < 0.5 * memory["dense"]

@@ -252,8 +252,8 @@ def _read_by_meshio(path: Path) -> Grid:
             import meshio
     except ImportError as error:
         raise PbemError(
-            f"{path}: binary meshes are read by meshio, which is missing ({error}): apt-get install python3-meshio, run "
-            "pip install meshio, or write the mesh as text (gmsh -bin 0)"
+            f"{path}: binary meshes are read by meshio, which is missing ({error}): apt-get install "
+            "python3-meshio, run pip install meshio, or write the mesh as text (gmsh -bin 0)"
         ) from None
     read: Callable[[str], Any] = meshio.gmsh.read
     try:

@@ -42,6 +42,8 @@ from pbem.wording import suggest
 ACROSS, CLOSER = 64, 6.0
 # Colours diverge from zero if the field reaches beyond it on both sides by this part of the larger one.
 BOTH_SIDES = 0.1
+# What is smaller than this part of the largest displacement, or component of stress, is shown as the 0 that it is.
+ROUNDING = 1e-9
 HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
@@ -99,8 +101,11 @@ class FieldPicture:
         self._values: VertexValues = VertexField(results, self._triangles).evaluate(steps)
         self._steps = list(steps)
         formula = FIELDS[name][2]
-        self._field = np.array([formula(u, s) for u, s in
-                                zip(self._values.displacement, self._values.stress, strict=True)])
+        field = np.array([formula(u, s) for u, s in
+                          zip(self._values.displacement, self._values.stress, strict=True)])
+        whole = self._values.displacement if FIELDS[name][1] else self._values.stress
+        largest = float(np.abs(whole[np.isfinite(whole)]).max(initial=0.0))
+        self._field = np.where(np.abs(field) <= ROUNDING * largest, 0.0, field)
         self._shown = self._values.exact & self._box.contains(to_columns(self._triangles.position))
         weights = np.tile(np.where(self._shown, self._triangles.weights, 0.0), len(self._steps))
         there = weights > 0

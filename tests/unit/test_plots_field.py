@@ -239,3 +239,21 @@ def test_units_from_small_to_large_have_few_ticks(tmp_path: Path) -> None:
             texts = [re.sub(r"[^0-9.]", "", each.get_text()) for each in axis.get_ticklabels()]
             assert 3 <= len(texts) <= 9 and max(map(len, texts)) <= 5
             assert r"10" in axis.get_offset_text().get_text()
+
+
+def test_rounding_is_shown_as_zero(tmp_path: Path) -> None:
+    """A block pressed along y has no stress along x: all of it is 0, without marks and contours, in any unit."""
+    for unit in (1e-6, 1.0, 1e9):
+        case = {
+            "materials": {"rock": {"young": 1e3 * unit, "poisson": 0.0}},
+            "curves": {"sides": {"points": [[2, 0], [2, 1]], "elements": 4}, "bottom": {"points": [[0, 0], [2, 0]],
+                       "elements": 4}, "top": {"points": [[2, 1], [0, 1]], "elements": 4},
+                       "left": {"points": [[0, 1], [0, 0]], "elements": 4}},
+            "regions": {"block": {"material": "rock", "boundary": ["bottom", "sides", "top", "left"]}},
+            "boundary": {"bottom": {"un": 0.0}, "left": {"un": 0.0}, "top": {"tn": -1.0 * unit}},
+        }
+        results = pbem.run(case, tmp_path / "x.h5", force=True)
+        picture = FieldPicture(results, "sxx", FieldOptions(shape=(8, 8)), [0])
+        assert np.isfinite(picture.values(0)).all() and not picture.values(0).any()
+        assert not any("min" in text.get_text() for text in picture.draw(0).axes[0].texts)
+        assert (FieldPicture(results, "syy", FieldOptions(shape=(8, 8)), [0]).values(0) < -0.099 * unit).all()

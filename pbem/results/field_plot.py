@@ -104,8 +104,8 @@ class FieldPicture:
         field = np.array([formula(u, s) for u, s in
                           zip(self._values.displacement, self._values.stress, strict=True)])
         whole = self._values.displacement if FIELDS[name][1] else self._values.stress
-        largest = float(np.abs(whole[np.isfinite(whole)]).max(initial=0.0))
-        self._field = np.where(np.abs(field) <= ROUNDING * largest, 0.0, field)
+        scale = float(np.abs(whole[np.isfinite(whole)]).max(initial=0.0))
+        self._field = np.where(np.abs(field) <= ROUNDING * scale, 0.0, field)
         self._shown = self._values.exact & self._box.contains(to_columns(self._triangles.position))
         weights = np.tile(np.where(self._shown, self._triangles.weights, 0.0), len(self._steps))
         there = weights > 0

@@ -32,6 +32,14 @@ from scripts.conditions.everything import CONDITIONS  # noqa: E402
 from scripts.conditions.place import draw_place  # noqa: E402
 from scripts.conditions.trial import check_energy  # noqa: E402
 
+# Of ranks on a machine with fewer cores, in a container as well.
+ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_hwloc_base_binding_policy": "none", "PRTE_MCA_hwloc_default_binding_policy": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+}  # fmt: skip
+# Of what ranks print that fail.
+LAST_LINES = 6
 COLUMNS = ("name", "scheme", "operator", "order", "ranks", "seed", "cell", "quantity", "error", "tolerance", "message")
 
 
@@ -86,10 +94,10 @@ def run_on_ranks(case: dict, folder: Path, ranks: int) -> Results:
     pbem.Case(**case).write(folder / "case.toml")
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-m", "pbem", "run",
                str(folder / "case.toml"), "-o", str(folder / "results.h5"), "--force"]  # fmt: skip
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
+    environment = {**os.environ, **ENVIRONMENT}
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
     if done.returncode:
-        raise PbemError(done.stderr.strip() or done.stdout.strip())
+        raise PbemError("\n".join((done.stderr.strip() or done.stdout.strip()).split("\n")[-LAST_LINES:]))
     return pbem.open_results(folder / "results.h5")
 
 

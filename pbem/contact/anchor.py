@@ -72,14 +72,15 @@ def _anchor_group(nodes: _Nodes, motions: Sequence[RigidBodyMode]) -> list[Ancho
     anchors: list[Anchor] = []
     remaining = np.eye(len(motions))  # combinations of motions that the anchors so far do not see
     for _ in motions:
-        best, strength = None, -1.0
+        best, strength, sight = None, -1.0, remaining[0]
         for motion, name in [(each, region) for each in motions for region in each.regions]:
             anchor = _anchor_region(nodes, motion, name)
             seen = np.array([_apply(nodes, anchor, name, other) for other in motions]) @ remaining
             if np.linalg.norm(seen) > strength * (1 + 1e-9):
-                best, strength, direction = anchor, float(np.linalg.norm(seen)), seen / np.linalg.norm(seen)
+                best, strength, sight = anchor, float(np.linalg.norm(seen)), seen
         assert best is not None
         anchors.append(best)
+        direction = sight / strength
         remaining = remaining @ (np.eye(remaining.shape[1]) - np.outer(direction, direction))
     return anchors
 

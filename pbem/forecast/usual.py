@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Real
+from pbem.bem.near import LARGE
 from pbem.contact.laws import find_joint
 from pbem.forecast.calibration import Speed
 from pbem.forecast.disk import count_stored_steps
@@ -18,13 +19,15 @@ from pbem.forecast.work import Work
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
-# Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps.
-STARTED, EVERYWHERE = 142e6, 2300.0
+# Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps, with
+# the dense and with the hierarchical operator.
+STARTED, EVERYWHERE, EVERYWHERE_FAR = 142e6, 2300.0, 1300.0
 # Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
 # pair changes, and where some do; and how their number grows with that of the ranks.
 AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
-# Of the hierarchical operator near blocks, and groups' inverses, to what is counted; of MUMPS' factors likewise.
-NEAR_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.3, 1.0, 1.5
+# Of the hierarchical operator near blocks, those of large models (see pbem.bem.near), and groups' inverses, to what is
+# counted; of MUMPS' factors likewise.
+NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.5, 1.0, 1.5
 # Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
 SCATTERED = 1.2
 
@@ -39,7 +42,7 @@ CHANGING = 0.35
 
 # Seconds: of the start; of a vector's entry in an iteration; of an entry in a product, shared and on every rank; of an
 # unknown in the preconditioner; of a call of a library that shares matrices; of an interior point and a node.
-START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 1.4e-6, 0.6e-6, 5e-6, 0.1, 0.15e-6
+START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 0.85e-6, 0.4e-6, 5e-6, 0.1, 0.15e-6
 # Of an unknown in the assembly of the hierarchical operator.
 PLACED = 40e-6
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
@@ -112,8 +115,9 @@ def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
 def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
     """Bytes over all ranks by use, without the processes themselves; part: of the pairs, see Changes."""
     if work.hierarchical:
-        return {"operator": 8 * NEAR_MEMORY * work.entries, "preconditioner": 8 * INVERSES * work.factored,
-                "mesh and vectors": EVERYWHERE * ranks * work.unknowns}
+        near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
+        return {"operator": 8 * near * work.entries, "preconditioner": 8 * INVERSES * work.factored,
+                "mesh and vectors": EVERYWHERE_FAR * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
     sparse = SPARSE_FACTORS if ranks == 1 else SPARSE_FACTORS_SHARED
     factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored

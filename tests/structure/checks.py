@@ -18,7 +18,8 @@ ORDER = (
     "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
-BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock")
+BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock",
+        "heap")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = ("solve", "driver", "sweeps", "run_command", "sweep_command", "cli", "__main__", "parallel")
 

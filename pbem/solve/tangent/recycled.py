@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.constraints import ConstraintMap
+from pbem.heap import give_back
 from pbem.parallel import add_up, broadcast
 from pbem.solve.petsc.minimal_residual import MinimalResidual, Rows
 from pbem.solve.petsc.session import find_number
@@ -71,6 +72,7 @@ class RecycledSpace:
         self.keep(directions, _of_columns(preconditioner.turn_back, products))
         space.forget()
         preconditioner.update(constraints)
+        give_back()
         self._made_for = constraints
         if self.count and changed is not None:
             turned = _of_columns(preconditioner.turn, self._products.astype(float))

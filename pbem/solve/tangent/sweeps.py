@@ -23,6 +23,7 @@ from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plas
 from pbem.contact.loads import Load
 from pbem.contact.local_laws import solve_laws
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
+from pbem.heap import give_back
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes
 from pbem.parallel import add_up
@@ -79,6 +80,7 @@ class Sweeps:
             owned.append(np.isin(near, inside))
         self._pairs, self._owned = np.concatenate(pairs), np.concatenate(owned)
         self._first = np.cumsum([len(each) for each in pairs])
+        give_back()
 
     def settle(
         self, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load, law: Linearisation,

@@ -40,6 +40,7 @@ from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
 from pbem.model.point_supports import PointSupport, place_point_supports
+from pbem.model.pulled import check_pulled
 from pbem.model.recall import Recall
 from pbem.model.resultants import describe_unbalance, find_unbalanced_force
 from pbem.model.rigid_body import find_tractions
@@ -341,7 +342,9 @@ def _check_hold(
 
 def _check_support(model: Model, recall: Recall) -> tuple[list[Fault], list[str]]:
     """Faults for bodies that nothing holds; notes for those that stay at rest because their loads balance."""
-    faults: list[Fault] = []
+    faults = list(check_pulled(model))
+    if faults:
+        return faults, []
     balanced: list[str] = []
     free: dict[str, RigidBodyMode] = {}
     groups = group_stages(model)

@@ -85,3 +85,22 @@ def test_a_wrong_condition_is_told(text: str, place: str, pieces: list[str]) -> 
 ])  # fmt: skip
 def test_values_may_come_with_the_stages(text: str) -> None:
     parse_model(BLOCKS + text)
+
+
+PULLS = {
+    "at once": ("punch = { fy = 1.0 }", "", "stage 'load'"),
+    "beside friction": ("punch = { fx = 1.0, fy = 2.0, rotation = 0.0 }", "", "stage 'load'"),
+    "in a stage": ("punch = { fy = -1.0, ux = 0.0 }",
+                   '[[stages]]\n[[stages]]\nname = "lift"\n[stages.tools.punch]\nfy = 0.5', "stage 'lift'"),
+    "for a time": ("punch = { fy = { expression = \"-sin(2*pi*t)\" } }", "", "stage 'load'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("tool", "text", "stage"), PULLS.values(), ids=[name.replace(" ", "_") for name in PULLS])
+def test_a_flat_tool_that_is_pulled_off_is_refused(tool: str, text: str, stage: str) -> None:
+    case = BLOCKS.replace("punch = { uy = -0.01, ux = 0.0, rotation = 0.0 }", tool)
+    with pytest.raises(CaseError, match=rf"tools.punch .* in {stage}, which pulls it off 'seat'"):
+        parse_model(case + text)
+    # Bonds bear tension; and what is given moves.
+    parse_model(case.replace('"head"] }', '"head"], law = "bonded" }') + text)
+    parse_model(BLOCKS.replace("uy = -0.01", "uy = 0.01"))

@@ -37,9 +37,17 @@ def format_path(path: KeyPath) -> str:
         if isinstance(part, int):
             text += f"[{part + 1}]"
         else:
-            key = part if _BARE.match(part) else '"' + part.replace("\\", "\\\\").replace('"', '\\"') + '"'
-            text += f".{key}" if text else key
+            text += f".{_quote(part)}" if text else _quote(part)
     return text
+
+
+def format_key(path: KeyPath) -> str:
+    """The path as keys that are set are written, e.g. ``curves.wall.points.1``; entries of lists count from 0."""
+    return ".".join(str(part) if isinstance(part, int) else _quote(part) for part in path)
+
+
+def _quote(part: str) -> str:
+    return part if _BARE.match(part) else '"' + part.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pbem.case.reader import FileDraft, add_lines
 from pbem.case.writer import write_value
 from pbem.description.case import Case, Draft, draft_case
 from pbem.description.replacement import Replaced, set_keys
-from pbem.errors import Fault
+from pbem.errors import Fault, format_key
 
 # How messages name a key that was set: from the key, its value and the path that it led to.
 Label = Callable[[str, Any, str], str]
@@ -60,7 +60,7 @@ def add_lines_but(
         if origin is None:
             named += add_lines([fault], lines) if lines else [fault]
         else:
-            place = "" if fault.place in changes else fault.place
+            place = "" if fault.place in changes else format_key(fault.path) or fault.place
             named.append(replace(fault, place=label(origin, changes[origin], place) or origin))
     return named
 

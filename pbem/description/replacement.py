@@ -56,8 +56,13 @@ class Replaced:
     origins: Mapping[KeyPath, str]
 
     def find_origin(self, path: KeyPath) -> str | None:
-        """The key, as it was written, that set what a fault is about; None if nothing did."""
-        return next((self.origins[path[:end]] for end in range(len(path), 0, -1) if path[:end] in self.origins), None)
+        """The key, as it was written, that set what a fault is about, or an entry of the list that it is about; None if
+        nothing did."""
+        size = len(path)
+        above = (path[:end] for end in range(size, 0, -1))
+        entries = (each for each in self.origins
+                   if 0 < size < len(each) and each[:size] == path and isinstance(each[size], int))
+        return next((self.origins[each] for each in (*above, *entries) if each in self.origins), None)
 
 
 def split_key(key: str) -> tuple[Part, ...] | None:

@@ -133,3 +133,20 @@ def test_another_past_is_refused(folder: Path, capsys: Capture, old: str, new: s
     assert run("--resume") == (2 if said else 0)
     assert said in capsys.readouterr().err
     assert not said or (folder / "blocks.h5").read_bytes() == before
+
+
+def test_entries_of_lists_are_counted_as_in_the_key(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From 0, as what was set is; also where a list as a whole is wrong for one of its entries."""
+    for option, place in (
+        ("stages.*.steps=-1", "--set stages.*.steps=-1 (stages.1.steps): found -1"),
+        ("stages.0.steps=-1", "--set stages.0.steps=-1: found -1"),
+        ('curves.top.points.1.0="x"', '--set curves.top.points.1.0="x": found "x"'),
+        ("curves.top.points.1=[1]", "--set curves.top.points.1=[1]"),
+    ):
+        assert main(["check", "blocks.toml", "--set", option]) == 2
+        assert place in capsys.readouterr().err
+    text = Path("blocks.toml").read_text().replace("elements = 2 }\n[regions.lower]", "elements = [2] }\n[regions.lower]")
+    assert "elements = [2] }" in text
+    Path("listed.toml").write_text(text)
+    assert main(["check", "listed.toml", "--set", "curves.top.elements.0=-1"]) == 2
+    assert "--set curves.top.elements.0=-1 (curves.top.elements): found [-1]" in capsys.readouterr().err

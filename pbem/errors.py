@@ -96,12 +96,15 @@ class ConvergenceError(PbemError):
     reason: a short name, e.g. "mode cycle", "singular tangent", "iteration limit", "linear solver"
     detail: where and what to try, in sentences. places: points (in the coordinates of the model) of the pairs whose
     contact did not settle, where shorter elements may help; none if they would not, or if there are too many.
+    unless: of "free motion" in the last statuses of a search that did not settle, what else may be the reason
+    (`pbem.solve.nonlinear.unsettled.Unsettled`).
     """
 
-    def __init__(self, reason: str, detail: str, places: tuple[complex, ...] = ()) -> None:
+    def __init__(self, reason: str, detail: str, places: tuple[complex, ...] = (), unless: Any = None) -> None:
         self.reason = reason
         self.detail = detail
         self.places = places
+        self.unless = unless
         super().__init__(f"{reason}: {detail}")
 
 

@@ -18,7 +18,7 @@ from pbem.wording import count
 # at most: the next try is to cost no more than a user would wait for without having asked for it.
 MOST_TRIES = 3
 MOST_GROWTH = 3.0
-MOST_UNKNOWNS = 10_000
+MOST_UNKNOWNS = 5_000
 # So many places are named.
 MOST_NAMED = 3
 

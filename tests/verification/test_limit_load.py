@@ -10,8 +10,11 @@ from pbem.case.build import parse_model
 from pbem.contact.laws import start_memory
 from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
+from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import world
+from pbem.solve.nonlinear.unsettled import Unsettled
 from pbem.solve.steps import march
+from pbem.solve.steps.ends import find_reason
 from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
 from pbem.solve.system.assembly import assemble_problem
 from tests.verification.proofs.proof import write_case
@@ -179,3 +182,27 @@ def test_what_is_known_to_fail_is_not_tried_again_before_it_is_near() -> None:
     assert not ceiling.is_reached(0.499, 1.0, 1e-4)
     assert not limited.lower(0.35, 0.35, fails).is_reached(0.349, 1.0, 1e-4)
     assert limited.lower(0.398, 0.398, fails).is_reached(0.395, 1.0, 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("motion", "shear", "expected"),
+    [
+        (1.0, 0.2, "iteration limit"),  # pushed by less than friction bears: it can be held
+        (1j, 0.2, "iteration limit"),  # lies on what is below
+        (1.0, 0.3, "free motion"),  # pushed by more: nothing holds it
+        (1.0, 0.0, "free motion"),  # pushed by nothing: any place would do
+    ],
+)
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_a_body_is_free_to_move_only_if_nothing_could_hold_it(
+    motion: complex, shear: float, expected: str, unit: float
+) -> None:
+    """The last statuses of a search that did not settle are no proof of that."""
+    model = parse_model(write_pushed_block(shear, {"friction": 0.25}, unit))[1]
+    problem = assemble_problem(model, generate_mesh(model), world)
+    upper = RigidBodyMode(("upper",), {"upper": (motion, 0.0)}, "translation of 'upper'")
+    unless = Unsettled(ConvergenceError("iteration limit", "pairs that still change"), (upper,))
+    error = ConvergenceError("free motion", "nothing prevents a translation", unless=unless)
+    assert find_reason(problem, start_memory(problem.laws), 1, 1.0, error).reason == expected
+    settled = ConvergenceError("free motion", "nothing prevents a translation")
+    assert find_reason(problem, start_memory(problem.laws), 1, 1.0, settled) is settled

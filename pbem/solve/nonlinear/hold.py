@@ -23,6 +23,7 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Proposal
 from pbem.contact.separating import stick_bonded
 from pbem.errors import ConvergenceError
+from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.imbalance import DRIVEN
@@ -244,6 +245,10 @@ class Hold:
         """The motions that neither pairs nor anchors hold, in words; None if there are none."""
         support = self._find_free_motions(modes)
         return (support.text or None) if self.driven else support.unheld
+
+    def list_free(self, modes: ModeState) -> tuple[RigidBodyMode, ...]:
+        """The motions of bodies that are free, if neither pairs nor anchors hold one of them."""
+        return self._find_free_motions(modes).motions if self.find_free(modes) else ()
 
     def _find_free_motions(self, modes: ModeState) -> FreeMotions:
         return self.problem.find_free_motions(self._stick_bonded(modes))

@@ -35,7 +35,7 @@ from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.search import PLAIN, PLAIN_IF_LOOSE, Globalisation, Search
-from pbem.solve.nonlinear.unsettled import describe_unsettled
+from pbem.solve.nonlinear.unsettled import Unsettled, describe_unsettled
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
@@ -245,10 +245,15 @@ def _go_on(forcing: Forcing, search: Search) -> bool:
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
     """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
     search.unsettled = reason != "no admissible modes"
-    return hold.problem.decide(lambda: (
-        hold.describe_free_motion(proposal.modes)
-        or hold.describe_floating(proposal.modes)
-        or describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)))
+
+    def describe() -> ConvergenceError:
+        error = describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)
+        free, motions = hold.describe_free_motion(proposal.modes), hold.list_free(proposal.modes)
+        if free and motions:
+            return ConvergenceError(free.reason, free.detail, unless=Unsettled(error, motions))
+        return free or hold.describe_floating(proposal.modes) or error
+
+    return hold.problem.decide(describe)
 
 
 def _pivot(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pbem.arrays import Integer
@@ -9,12 +11,25 @@ from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
 from pbem.geometry.junction import format_point
+from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.problem.problem import Problem
 
 # So many pairs, or interfaces, are named.
 MOST_NAMED = 5
 # Where more pairs than this do not settle, it is not for the elements beside them.
 MOST_PLACES = 300
+
+
+@dataclass(frozen=True)
+class Unsettled:
+    """A search that did not settle, and the motions that are free in its last modes.
+
+    If the loads drive one of these motions, and some forces of the contacts balance them, the modes are not those of an
+    equilibrium, and the error is this one.
+    """
+
+    error: ConvergenceError
+    motions: tuple[RigidBodyMode, ...]
 
 
 def describe_unsettled(

@@ -10,7 +10,7 @@ from pbem.contact.separating import find_bonded
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
 from pbem.solve.steps.ceiling import Ceiling
-from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
+from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction, is_driven
 
 # Reasons for which a step without equilibrium can fail.
 UNSETTLED = ("iteration limit", "mode cycle", "singular tangent", "no admissible modes")
@@ -31,6 +31,22 @@ def refuse_load(problem: Problem, memory: Memory, stage: int, target: float, now
     return ConvergenceError(
         "limit load", "bonds fail one after the other until no forces that the contacts can carry balance the loads"
     )
+
+
+def find_reason(
+    problem: Problem, memory: Memory, stage: int, target: float, error: ConvergenceError
+) -> ConvergenceError:
+    """The error of a step that fails, with a truer reason if a body is free only in modes that are no equilibrium.
+
+    Found by the first rank, for all.
+    """
+    unless = error.unless
+    if unless is None:
+        return error
+    held = problem.decide(lambda: bool(
+        is_driven(problem, stage, target, unless.motions) and can_balance(problem, memory, stage, target)))
+    found: ConvergenceError = unless.error if held else error
+    return found
 
 
 def find_balanced(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float:

@@ -7,16 +7,18 @@ no smaller step finds an equilibrium. A linear programme in the tractions of the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
-from pbem.contact.constraints import build_constraints
+from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.laws import Memory, PairLaws, tensile_limit
 from pbem.contact.loads import Load
 from pbem.contact.modes import P_N, P_S, Linearisation
+from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.problem.problem import Problem
 
 # What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.
@@ -48,6 +50,23 @@ def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -
     """Whether some tractions balance the loads at a fraction of a stage; None if unknown, as above."""
     solved = _solve(problem, memory, stage, fraction, fraction)
     return None if solved is None or not solved.certain else solved.share is not None
+
+
+def is_driven(problem: Problem, stage: int, fraction: float, motions: Sequence[RigidBodyMode]) -> bool:
+    """Whether the loads at a fraction of a stage do work on one of these motions of bodies."""
+    mesh = problem.mesh
+    _, given = _collect_given(problem, problem.evaluate_load(stage, fraction))
+    force = np.where(mesh.node_crack, 0.0, mesh.weight) * (given[::2] + 1j * given[1::2])
+    for motion in motions:
+        work = np.zeros(mesh.nodes)
+        for number, name in enumerate(mesh.region_names):
+            if name in motion.velocities:
+                own = mesh.node_region == number
+                shift, spin = motion.velocities[name]
+                work[own] = (np.conj(shift + 1j * spin * mesh.position[own]) * force[own]).real
+        if abs(work.sum()) > BALANCED * np.abs(work).sum():
+            return True
+    return False
 
 
 @dataclass(frozen=True)
@@ -82,11 +101,8 @@ def _sum_up(
     problem: Problem, loads: list[Load], regions: Integer
 ) -> tuple[sparse.csr_matrix, Real, Real]:
     """Force and moment over length of every region (3 k,): what unknown tractions add (3 k, 2 nodes), and loads."""
-    mesh, count = problem.mesh, problem.laws.count
-    tangent = np.zeros((count, 4, 2))
-    tangent[:, P_N, 0] = tangent[:, P_S, 1] = 1.0
-    law = Linearisation(tangent, np.zeros((count, 4)), np.arange(count))
-    maps = [build_constraints(mesh, problem.outer, np.zeros(count), law, load, 1.0) for load in loads]
+    mesh = problem.mesh
+    maps, known = zip(*(_collect_given(problem, load) for load in loads), strict=True)
     weight = np.where(mesh.node_crack, 0.0, mesh.weight)
     rows, columns, values = [], [], []
     for row, region in enumerate(regions):
@@ -100,10 +116,19 @@ def _sum_up(
                 values.append(weight[own] * value)
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     resultant = sparse.csr_matrix(entries, shape=(3 * len(regions), 2 * mesh.nodes))
-    given = [
-        resultant @ (each.offset - load.known)[2 * mesh.nodes :] for each, load in zip(maps, loads, strict=True)
-    ]
-    return resultant @ maps[0].matrix[2 * mesh.nodes :], given[0], given[1]
+    before, after = (resultant @ each for each in known)
+    return resultant @ maps[0].matrix[2 * mesh.nodes :], before, after
+
+
+def _collect_given(problem: Problem, load: Load) -> tuple[ConstraintMap, Real]:
+    """The map from tractions of pairs to those of faces, and those that are given (2 nodes,), with what stands for the
+    forces inside of bodies."""
+    mesh, count = problem.mesh, problem.laws.count
+    tangent = np.zeros((count, 4, 2))
+    tangent[:, P_N, 0] = tangent[:, P_S, 1] = 1.0
+    law = Linearisation(tangent, np.zeros((count, 4)), np.arange(count))
+    constraints = build_constraints(mesh, problem.outer, np.zeros(count), law, load, 1.0)
+    return constraints, (constraints.offset - load.known)[2 * mesh.nodes :]
 
 
 def _maximise(

@@ -19,7 +19,7 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, Reporter, Step, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.ceiling import SAFE, Ceiling
-from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, refuse_load
+from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, find_reason, refuse_load
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing
@@ -162,19 +162,20 @@ def _advance(
                     refuse = _never if proportional() else partial(refuse_load, problem, memory, stage, target)
                     solution = solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
             return solution, target, ceiling.pass_by(target)
-        except ConvergenceError as error:
+        except ConvergenceError as failure:
+            error = find_reason(problem, memory, stage, target, failure)
             balanced = find_balanced(problem, memory, stage, reached, target)
             if proportional():
                 if balanced < target and error.reason != "free motion":
                     ceiling = ceiling.lower(target, balanced, error)
-                    raise end_at_limit(problem, stage, reached, ceiling, error) from error
-                raise end_at_rest(problem, stage, target, error) from error
+                    raise end_at_limit(problem, stage, reached, ceiling, error) from failure
+                raise end_at_rest(problem, stage, target, error) from failure
             ceiling = ceiling.lower(target, balanced, error)
             if ceiling.is_reached(reached, target, least):
-                raise end_at_limit(problem, stage, reached, ceiling, error) from error
+                raise end_at_limit(problem, stage, reached, ceiling, error) from failure
             half = SAFE * (balanced - reached) if balanced < target else 0.5 * (target - reached)
             if half < least:
-                raise end_march(problem, memory, stage, reached, target, error) from error
+                raise end_march(problem, memory, stage, reached, target, error) from failure
             reporter.reject(error.reason, error.detail)
             tries += 1
             smallest = tries == TRIED_FROM_REST and is_proportional_at_last(problem, memory, stage, reached)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.bem import near
 from pbem.results.reader import Results
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.tangent import krylov
@@ -27,8 +28,9 @@ MOST_ITERATIONS = 60
 
 @pytest.fixture(autouse=True)
 def mostly_far(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Small leaves and groups in a small model."""
+    """Small leaves and groups in a small model, and its weak entries packed as those of a large one."""
     shrink_leaves(monkeypatch, 4)
+    monkeypatch.setattr(near, "LARGE", 0)
     monkeypatch.setattr(groups, "ONE_GROUP", 0)
 
 

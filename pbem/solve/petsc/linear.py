@@ -50,8 +50,11 @@ class LinearSolver:
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, method: Method, local_rows: int, rows: int, multiply: Callable[[Real], Real]
+        self, comm: MPI.Intracomm, method: Method, local_rows: int, rows: int, multiply: Callable[[Real], Real],
+        prefix: str = PREFIX,
     ) -> None:
+        """prefix: of the options of PETSc's that are heeded."""
+        self._prefix = prefix
         self.method = method
         self.comm = comm
         self.shape = ((local_rows, rows), (local_rows, rows))
@@ -167,7 +170,7 @@ class LinearSolver:
     def _set_up(self) -> bool:
         """Make the Krylov solver and the factors; whether there are any."""
         solver = self.solver = PETSc.KSP().create(comm=self.comm)
-        solver.setOptionsPrefix(PREFIX)
+        solver.setOptionsPrefix(self._prefix)
         solver.setOperators(self.matrix, self.matrix)  # products are those of `multiply` once there are factors
         # Not "preonly": with factors as preconditioner GMRES ends in one iteration, and heeds the user's options.
         solver.setType("fgmres")

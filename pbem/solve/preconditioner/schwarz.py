@@ -15,18 +15,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import lapack
 
-from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.arrays import Bool, Integer, Real
 from pbem.bem.rigid_motions import RigidMotions
-from pbem.bem.rigid_region import form_rigid_rows
-from pbem.bem.rows import Sources, evaluate_rows
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
 from pbem.contact.constraints import ConstraintMap
 from pbem.mesh.mesh import Mesh
-from pbem.mesh.numbering import list_nodes, number_components, split_components
+from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
+from pbem.solve.preconditioner.local_operator import LocalOperator
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 
 Single = NDArray[np.float32]
@@ -65,23 +63,21 @@ class SchwarzPreconditioner:
         self, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
         groups: Sequence[Subdomain], nodes: Integer, rigid: Sequence[RigidMotions] = (),
     ) -> None:
-        self._mesh, self._anchors, self._materials = mesh, tuple(anchors), tuple(materials)
-        self._rigid = [motions for motions in rigid if motions.interpolated]
-        self._sources = collect_sources(mesh, materials)
-        self._scale = scale_equations(mesh, materials, length)
-        self._first_element = np.searchsorted(mesh.region, np.arange(len(materials)))
-        self.free = collect_free_terms(mesh, np.arange(mesh.nodes), self._scale)
-        self._nodes = nodes
-        # The mesh makes these anew at every call, for all nodes.
-        self._node_element, self._node_region, self._node_local = mesh.node_element, mesh.node_region, mesh.node_local
+        self._mesh, self._nodes = mesh, nodes
+        self._local = LocalOperator(mesh, materials, length, anchors, rigid)
+        self.free = self._local.free
         self._node_crack = mesh.node_crack
         self._formed: sparse.csr_matrix | None = None
         self._widening = 1
         self._less: Elimination | None = None
-        self._acting = np.eye(len(anchors))  # projection onto the combinations of anchors that act
         self.singular = 0  # groups without an inverse, of those formed last
         self.most_drift = 0.0  # inverses serve until the constraint map has changed by more than this part
         self.inverses = [self._place(group) for group in groups]
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is left for directions of former systems to tell."""
+        return False
 
     def drop_inverses(self) -> None:
         """Drop all inverses; `update` would form them anew."""
@@ -102,24 +98,30 @@ class SchwarzPreconditioner:
 
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
-        matrix, former = constraints.matrix, self._less
-        change = _measure_changes(self._formed, matrix)
-        self._formed = matrix
-        change[self._find_anchored(constraints)] = np.inf
-        by_column = matrix.tocsc()
-        free = (self.free @ matrix).tocsr()
-        less = self._less = eliminate_tractions(matrix, free, self._node_crack)
-        if former is not None:
-            change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
+        change = self._take_map(constraints)
+        by_column = constraints.matrix.tocsc()
+        assert self._less is not None
         count, self.singular = 0, 0
         with clock.piece("preconditioner"):
             for inverse in self.inverses:
                 inverse.drift += float(change[inverse.around].max())
                 if not inverse.formed or inverse.drift > self.most_drift:
-                    self._invert(inverse, by_column, free, less)
+                    self._invert(inverse, by_column, self._free, self._less)
                     inverse.drift = 0.0
                     count += 1
         return count
+
+    def _take_map(self, constraints: ConstraintMap) -> Real:
+        """Take another constraint map; by which part of itself each of its columns (unknowns,) has changed."""
+        matrix, former = constraints.matrix, self._less
+        change = _measure_changes(self._formed, matrix)
+        self._formed = matrix
+        change[self._local.find_anchored(constraints)] = np.inf
+        self._free = (self.free @ matrix).tocsr()
+        less = self._less = eliminate_tractions(matrix, self._free, self._node_crack)
+        if former is not None:
+            change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
+        return change
 
     def apply(self, residual: Real, result: Real) -> None:
         """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,) (theory, 63)."""
@@ -184,7 +186,7 @@ class SchwarzPreconditioner:
         own[inside] = not len(inverse.group.nearest)
         rows = np.flatnonzero(~first | own)
         left = np.flatnonzero(~local)
-        whole = self._form(elements, around, rows, left, constraints, free, less)
+        whole = self._local.form(elements, around, rows, left, constraints, free, less)
         rest = ~first[rows]
         factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(whole[rest]), overwrite_a=True)
         # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
@@ -222,7 +224,7 @@ class SchwarzPreconditioner:
         wanted[at] = True
         rows, left = np.flatnonzero(~first | wanted), np.flatnonzero(~local)
         whole, forces = (
-            self._form(elements, around, rows, columns, matrix.tocsc(), (self.free @ matrix).tocsr(), less)
+            self._local.form(elements, around, rows, columns, matrix.tocsc(), (self.free @ matrix).tocsr(), less)
             for columns, matrix in ((left, constraints), (at, offsets))
         )
         rest = ~first[rows]
@@ -239,7 +241,7 @@ class SchwarzPreconditioner:
         around = list_nodes(self._mesh, elements)
         at = number_components(np.searchsorted(around, nodes))
         free = (self.free @ constraints).tocsr()
-        return self._form(elements, number_components(around), at, at, constraints.tocsc(), free, None)
+        return self._local.form(elements, number_components(around), at, at, constraints.tocsc(), free, None)
 
     def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
         """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""
@@ -256,126 +258,6 @@ class SchwarzPreconditioner:
         around = list_nodes(self._mesh, elements)
         inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
         return elements, number_components(around), inside
-
-    def _form(
-        self, elements: Integer, around: Integer, rows: Integer, left: Integer, constraints: sparse.csc_matrix,
-        free: sparse.csr_matrix, less: Elimination | None,
-    ) -> Real:
-        """Turned rows of the tangent operator, and its columns that are left, of the nodes of elements, dense.
-
-        rows, left: places in around (k,), the unknowns of elements, rising.
-        """
-        mesh, columns = self._mesh, around[left]
-        nodes = np.unique(around[rows] // 2)
-        formed = np.zeros((2 * len(nodes), len(left)))
-        row, column, value = _take_entries(free, number_components(nodes))
-        place, known = _find_places(columns, column)
-        formed[row[known], place[known]] = value[known]
-        column, row, value = _take_entries(constraints, columns)
-        # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
-        sources = np.unique(self._node_element[row // 2 % mesh.nodes])
-        for region in np.unique(mesh.region[elements]):
-            own = np.flatnonzero(self._node_region[nodes] == region)
-            seen = sources[mesh.region[sources] == region]
-            if not len(own) or not len(seen):
-                continue
-            values, places = self._evaluate(int(region), seen, nodes[own])
-            place, known = _find_places(places, row)
-            entries = (value[known], (place[known], column[known]))
-            chosen = sparse.csr_matrix(entries, shape=(len(places), len(left)))
-            formed[number_components(own)] += (chosen.T @ values.T).T
-        turned = formed if less is None else less.turn[nodes] @ formed.reshape(len(nodes), 2, -1)
-        return np.asarray(turned.reshape(2 * len(nodes), -1)[np.searchsorted(number_components(nodes), around[rows])])
-
-    def _evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
-        """Rows of B of nodes, less the free terms, on the entries of v of elements of the same region."""
-        mesh = self._mesh
-        sources: Sources = self._sources[region].select(elements - self._first_element[region])
-        bounded = bool((sources.family == 0).any())
-        place, there = _find_places(elements, self._node_element[nodes])
-        on = np.where(there, place, -1)
-        seen = list_nodes(mesh, elements)
-        columns = number_components(seen)
-        if bounded:
-            columns = np.concatenate([columns, 2 * mesh.nodes + columns])
-        material = self._materials[region]
-        if material.rigid is not None:
-            whole = form_rigid_rows(mesh, region, material)
-            first, count = self._first_element[region] * (mesh.order + 1), whole.shape[1] // 2
-            at = np.concatenate([number_components(seen - first), count + number_components(seen - first)])
-            values = whole[np.ix_(number_components(nodes - first), at)]
-            return self._hold(values, nodes, seen, region), columns
-        values = np.empty((2 * len(nodes), len(columns)))
-        for traction in (False, True):
-            at = np.flatnonzero(mesh.traction_equation[nodes] == traction)
-            if len(at):
-                own = nodes[at]
-                normal = mesh.normal[own] if traction else None
-                parts = evaluate_rows(sources, mesh.position[own], on[at], normal, bounded, self._node_local[own])
-                values[number_components(at)] = np.concatenate([part for part in parts if part is not None], axis=1)
-        values *= -np.repeat(self._scale[nodes], 2)[:, None]
-        for motions in self._rigid:
-            place, there = _find_places(columns, motions.columns)
-            if motions.region == region and there.all():
-                rotation = np.zeros(4 * mesh.nodes)
-                rotation[motions.columns] = motions.basis[-1]
-                left = (self.free[number_components(nodes)] @ rotation) + values @ rotation[columns]
-                values[:, place] -= np.outer(left, motions.basis[-1])
-        # After the rotations, which the anchors hold.
-        return self._hold(values, nodes, seen, region), columns
-
-    def _hold(self, values: Real, nodes: Integer, seen: Integer, region: int) -> Real:
-        """Rows of nodes on the displacements of others, with what the region's anchors add."""
-        own_anchors = [number for number, anchor in enumerate(self._anchors) if anchor.region == region]
-        for one in own_anchors:
-            for other in own_anchors:
-                if self._acting[one, other]:
-                    self._anchor(values, nodes, seen, one, other)
-        return values
-
-    def _find_anchored(self, constraints: ConstraintMap) -> Bool:
-        """Unknowns of the regions on which other anchors act than before."""
-        released = constraints.released
-        acting = np.eye(len(self._anchors))
-        if released is not None:
-            acting -= released @ released.T
-        moved = np.flatnonzero(np.abs(acting - self._acting).max(axis=1, initial=0.0) > 0)
-        self._acting = acting
-        regions = [self._anchors[number].region for number in moved]
-        return np.repeat(np.isin(self._node_region, regions), 2)
-
-    def _anchor(self, values: Real, nodes: Integer, seen: Integer, one: int, other: int) -> None:
-        """Add the pattern of one anchor in the equations of nodes, by the functional of another of the same region."""
-        at, pattern = _look_up(self._anchors[one].nodes, self._anchors[one].pattern, nodes)
-        on, functional = _look_up(self._anchors[other].nodes, self._anchors[other].functional, seen)
-        where = np.ix_(number_components(at), number_components(on))
-        values[where] += self._acting[one, other] * np.outer(split_components(pattern), split_components(functional))
-
-
-def _look_up(
-    known: Integer, value: Complex, nodes: Integer
-) -> tuple[Integer, Complex]:
-    """Places in nodes (k,) of those that are known (sorted), and their values."""
-    place, there = _find_places(known, nodes)
-    at = np.flatnonzero(there)
-    return at, value[place[at]]
-
-
-def _take_entries(matrix: sparse.csr_matrix | sparse.csc_matrix, chosen: Integer) -> tuple[Integer, Integer, Real]:
-    """Entries of chosen rows of a matrix by rows, or columns of one by columns: place in chosen, other index, value.
-
-    Slices of scipy's take time in proportion to the whole matrix.
-    """
-    first = matrix.indptr[chosen].astype(np.int64)
-    count = matrix.indptr[chosen + 1] - first
-    at = np.arange(count.sum()) + np.repeat(first - (np.cumsum(count) - count), count)
-    return np.repeat(np.arange(len(chosen)), count), matrix.indices[at].astype(np.int64), matrix.data[at]
-
-
-def _find_places(known: Integer, numbers: Integer) -> tuple[Integer, Bool]:
-    """Where numbers are in a sorted list, and whether they are."""
-    place = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
-    return place, known[place] == numbers
 
 
 def find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:

@@ -30,7 +30,9 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
 from pbem.model.model import Model
 from pbem.parallel import add_up
+from pbem.solve.petsc.session import find_number
 from pbem.solve.petsc.shares import cut_equally
+from pbem.solve.preconditioner.bodies import BodiesPreconditioner
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain, divide_model, share_groups, surround_groups
 from pbem.solve.problem.problem import Problem
@@ -127,10 +129,14 @@ class HierarchicalSystem:
 
     def make_tangent(self, problem: Problem) -> TangentOperator:
         """GMRES, preconditioned by the groups."""
-        preconditioner = SchwarzPreconditioner(
+        given = (
             problem.mesh, [region.material for region in problem.model.regions], problem.model.size, problem.anchors,
             self.groups, self.nodes, self.operator.rigid,
         )
+        if find_number("newton_bodies", 1):
+            preconditioner = BodiesPreconditioner(problem.comm, *given)
+        else:
+            preconditioner = SchwarzPreconditioner(*given)
         return KrylovTangent(problem, preconditioner, self.groups, self.widen_groups)
 
     def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> TreeRows:

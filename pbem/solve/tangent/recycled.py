@@ -68,8 +68,9 @@ class RecycledSpace:
         if before is not None and changed is not None and not changed.any() and _act_same_anchors(before, constraints):
             preconditioner.update(constraints)
             return
-        directions, products = space.known
-        self.keep(directions, _of_columns(preconditioner.turn_back, products))
+        if not preconditioner.whole:
+            directions, products = space.known
+            self.keep(directions, _of_columns(preconditioner.turn_back, products))
         space.forget()
         preconditioner.update(constraints)
         give_back()

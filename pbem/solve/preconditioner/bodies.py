@@ -110,10 +110,7 @@ class BodyFactors:
 
 
 class BodiesPreconditioner(SchwarzPreconditioner):
-    """Factors of the whole; the groups take their place where the operator of the bodies is singular or serves badly.
-
-    Factors serve until more than `few` columns of the constraint map have changed.
-    """
+    """Factors of the whole; the groups take their place where the operator is singular or the factors serve badly."""
 
     def __init__(
         self, comm: MPI.Intracomm, mesh: Mesh, materials: Sequence[Material], length: float, anchors: Sequence[Anchor],
@@ -140,22 +137,17 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         try:
             with clock.piece("preconditioner"):
                 self._factors.factorise(constraints.matrix)
-        except ConvergenceError:
+        except (ConvergenceError, MemoryError):
             self.give_up()
             return super().update(constraints)
         self._drift = np.zeros_like(change)
         return 1
 
     def give_up(self) -> None:
-        """Serve by the groups from now on."""
+        """See SchwarzPreconditioner."""
         if self._factors is not None:
             self._factors.destroy()
         self._factors = self._formed = None
-
-    def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
-        """See SchwarzPreconditioner; GMRES took too many iterations."""
-        self.give_up()
-        super().regroup(groups, widening)
 
     def drop_inverses(self) -> None:
         """See SchwarzPreconditioner."""
@@ -163,11 +155,13 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         self.give_up()
 
     def apply(self, residual: Real, result: Real) -> None:
-        """See SchwarzPreconditioner."""
+        """See SchwarzPreconditioner (theory, 115)."""
         if self._factors is None:
             super().apply(residual, result)
-        else:
-            result[:] = self._factors.solve(residual[self._rows])
+            return
+        # MUMPS scales its matrix, but not a right-hand side of lengths in small units.
+        size = float(np.abs(residual).max(initial=0.0)) or 1.0
+        result[:] = size * self._factors.solve(residual[self._rows] / size)
 
 
 def _make_block(mesh: Mesh, local: LocalOperator, nodes: Integer, region: int) -> Block:

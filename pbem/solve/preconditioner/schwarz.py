@@ -76,8 +76,11 @@ class SchwarzPreconditioner:
 
     @property
     def whole(self) -> bool:
-        """Whether nothing is left for directions of former systems to tell."""
+        """Whether it is the inverse of the whole, or nearly, in place of the groups' (see BodiesPreconditioner)."""
         return False
+
+    def give_up(self) -> None:
+        """Serve by the groups from now on."""
 
     def drop_inverses(self) -> None:
         """Drop all inverses; `update` would form them anew."""

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.body_factors import FactorCount, choose_body_factors
 from pbem.bem.hierarchical import (
     HierarchicalOperator,
     anchor_rows,
@@ -65,6 +66,7 @@ class HierarchicalSystem:
     widen_groups: Callable[[int], tuple[Subdomain, ...]]
     tolerance: float
     notes: tuple[str, ...]
+    by_bodies: bool
     _count: Count = field(default_factory=Count)
 
     @staticmethod
@@ -88,13 +90,15 @@ class HierarchicalSystem:
         for anchor in anchors:
             operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
         own_cracks = cut_equally(np.flatnonzero(mesh.node_crack), comm)
+        by_bodies = choose_body_factors(mesh) if find_number("newton_bodies", 1) else None
         return HierarchicalSystem(
             operator=operator,
             crack_points=place_nodes_on_cracks(operator, own_cracks) if mesh.crack.any() else None,
             groups=surround_groups(mesh, groups, first, last),
             widen_groups=lambda widening: surround_groups(mesh, groups, first, last, widening),
             tolerance=model.solver.tolerance,
-            notes=(_describe_operator(operator, len(groups), model.solver.tolerance, error),),
+            notes=(_describe_operator(operator, by_bodies, len(groups), model.solver.tolerance, error),),
+            by_bodies=by_bodies is not None,
         )
 
     @property
@@ -128,15 +132,14 @@ class HierarchicalSystem:
         return np.zeros(0) if self.crack_points is None else split_components(self.crack_points.displacement(v))
 
     def make_tangent(self, problem: Problem) -> TangentOperator:
-        """GMRES, preconditioned by the groups."""
+        """GMRES, preconditioned by the groups, or by the factors of all bodies together."""
         given = (
             problem.mesh, [region.material for region in problem.model.regions], problem.model.size, problem.anchors,
             self.groups, self.nodes, self.operator.rigid,
         )
-        if find_number("newton_bodies", 1):
-            preconditioner = BodiesPreconditioner(problem.comm, *given)
-        else:
-            preconditioner = SchwarzPreconditioner(*given)
+        preconditioner = (
+            BodiesPreconditioner(problem.comm, *given) if self.by_bodies else SchwarzPreconditioner(*given)
+        )
         return KrylovTangent(problem, preconditioner, self.groups, self.widen_groups)
 
     def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> TreeRows:
@@ -185,9 +188,14 @@ def _reach_tolerance(
         terms = min(MOST_TERMS, max(terms + 2, choose_terms(tolerance**2 / error)))
 
 
-def _describe_operator(operator: HierarchicalOperator, groups: int, tolerance: float, error: float) -> str:
+def _describe_operator(
+    operator: HierarchicalOperator, by_bodies: FactorCount | None, groups: int, tolerance: float, error: float
+) -> str:
     forest = operator.parts.forest
+    preconditioner = f"{groups} groups in the preconditioner" if by_bodies is None else (
+        f"the preconditioner factorises all bodies together ({by_bodies.factored / 1e6:.3g} million numbers)"
+    )
     return (
-        f"hierarchical operator: {len(forest.leaves)} clusters of elements, {operator.parts.terms} terms, {groups} "
-        f"groups in the preconditioner; relative error of its products {error:.1e} (asked: {tolerance:.0e})"
+        f"hierarchical operator: {len(forest.leaves)} clusters of elements, {operator.parts.terms} terms, "
+        f"{preconditioner}; relative error of its products {error:.1e} (asked: {tolerance:.0e})"
     )

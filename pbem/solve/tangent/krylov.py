@@ -230,7 +230,13 @@ class KrylovTangent(TangentOperator):
             self._solver.solve(self._right, self._left)
 
     def _widen(self) -> bool:
-        """Let the groups of the preconditioner take in more around them; whether there was more to take."""
+        """Let the groups of the preconditioner take in more around them; whether there was more to take.
+
+        Factors of all bodies together that serve badly give way to groups.
+        """
+        if self.preconditioner.whole:
+            self.preconditioner.give_up()
+            return True
         wider = self.widening * WIDENING
         if wider > MOST_WIDENING:
             return False

@@ -98,6 +98,8 @@ class LinearSolver:
         self.matrix.setType("aij")
         self.matrix.setPreallocationNNZ(tuple(count.astype(PETSc.IntType) for count in counts))
         self.matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, True)
+        # Ranks would wait for different things where one of them has no columns of the others.
+        self.matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
 
     def fill_columns(self, first: int, values: Real) -> None:
         """Set some columns (local_rows, k) of a dense matrix, from the first on; all ranks together."""

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Bodies and cracks that are connected: products and iterations of GMRES, also over those without recycled directions.
+"""Bodies and cracks that are connected: products and iterations of GMRES, also over those without what serves them.
 
     [mpirun -n 2] .venv/bin/python scripts/bench_connected.py [--models beam layers masonry] [--size 1.0] [--alone]
     [mpirun -n 2] .venv/bin/python scripts/bench_connected.py --models --traces KB11_traces.geojson [--count 150]
@@ -7,10 +7,11 @@
 Models, all with the hierarchical operator: a beam of 1:50 that is held at one end; 40 layers of 10 x 0.3 with friction
 between them, pressed and then sheared; a wall of 20 x 20 bricks in running bond with friction in all joints, by its
 weight, pressed and then sheared. --size scales their numbers. Traces: the middle of a map, each trace cut into 1, 4 and
-16 pieces of equal length. --alone leaves out the runs without recycled directions (option newton_recycled 0).
+16 pieces of equal length. --without names the option that is 0 in the runs that are compared with (newton_bodies: no
+factors of all bodies together; newton_recycled: no recycled directions). --alone leaves these out.
 
 A line for each run: unknowns, Newton's iterations, the most and all iterations of GMRES, products, seconds of this
-rank's processor; the last ones also over those of the run without recycled directions, and of maps over those of whole
+rank's processor; the last ones also over those of the run without, and of maps over those of whole
 traces; pairs whose status differs from the other run's.
 """
 
@@ -165,10 +166,10 @@ class Outcome:
     modes: NDArray[np.int8]
 
 
-def run(case: Path, folder: Path, recycled: bool) -> Outcome | None:
-    """What a run takes; None but on the first rank."""
+def run(case: Path, folder: Path, without: str | None) -> Outcome | None:
+    """What a run takes, with an option that is 0; None but on the first rank."""
     begin, counting = time.process_time(), Counting()
-    petsc = {} if recycled else {"newton_recycled": "0"}
+    petsc = {} if without is None else {without: "0"}
     results = pbem.run(case, folder / "run.h5", force=True, operator="hierarchical", reporter=counting, petsc=petsc)
     seconds = time.process_time() - begin
     if world.rank:
@@ -179,10 +180,10 @@ def run(case: Path, folder: Path, recycled: bool) -> Outcome | None:
                    np.concatenate(modes))  # fmt: skip
 
 
-def compare(case: Path, folder: Path, alone: bool, whole: Outcome | None) -> Outcome | None:
-    """Print a line. whole: a run that is compared with as well."""
-    plain = None if alone else run(case, folder, recycled=False)
-    found = run(case, folder, recycled=True)
+def compare(case: Path, folder: Path, without: str | None, whole: Outcome | None) -> Outcome | None:
+    """Print a line. without: the option that is 0 in the run that is compared with; whole: one more of these."""
+    plain = None if without is None else run(case, folder, without)
+    found = run(case, folder, None)
     if found is None:
         return None
     line = (f"{case.stem[:14]:14s}{found.unknowns:9d}{found.newton:8d}{found.most:7d}{found.linear:7d}"
@@ -207,8 +208,10 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=150, help="traces that are taken")
     parser.add_argument("--length", type=float, default=0.7, help="of an element at most")
     parser.add_argument("--pieces", type=int, nargs="+", default=list(PIECES))
+    parser.add_argument("--without", choices=["newton_bodies", "newton_recycled"], default="newton_bodies")
     parser.add_argument("--alone", action="store_true")
     options = parser.parse_args()
+    without = None if options.alone else options.without
     with tempfile.TemporaryDirectory() as name:
         folder = Path(world.bcast(name))
         if world.rank == 0:
@@ -221,14 +224,14 @@ def main() -> None:
             if world.rank == 0:
                 case.write_text(MODELS[model](options.size))
             world.Barrier()
-            compare(case, folder, options.alone, None)
+            compare(case, folder, without, None)
         whole = None
         for pieces in options.pieces if options.traces else ():
             case = folder / f"pieces{pieces}.toml"
             if world.rank == 0:
                 make_map_case(options.traces, folder, options.count, pieces, options.length)
             world.Barrier()
-            found = compare(case, folder, options.alone, whole)
+            found = compare(case, folder, without, whole)
             whole = whole or found
         world.Barrier()
 

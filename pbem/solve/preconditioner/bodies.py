@@ -67,7 +67,7 @@ class BodyFactors:
         self._blocks = [_make_block(mesh, local, nodes, int(region)) for region in np.unique(mesh.node_region[nodes])]
 
     def factorise(self, constraints: sparse.csr_matrix) -> None:
-        """Factorise K = B M for a constraint map M, with the anchors that act with it.
+        """Factorise K = B M for a constraint map M, with the anchors that act with it (theory, 119).
 
         Raises ConvergenceError ("singular tangent" or "linear solver") or MemoryError on all ranks alike.
         """
@@ -155,7 +155,7 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         self.give_up()
 
     def apply(self, residual: Real, result: Real) -> None:
-        """See SchwarzPreconditioner (theory, 115)."""
+        """See SchwarzPreconditioner (theory, 119)."""
         if self._factors is None:
             super().apply(residual, result)
             return

@@ -1,0 +1,170 @@
+"""Many small bodies: the factors are those of the whole tangent operator, and GMRES ends at once with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.bem import body_factors
+from pbem.bem.body_factors import choose_body_factors, count_body_factors
+from pbem.case.build import parse_model
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.errors import ConvergenceError
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.parallel import world
+from pbem.solve.petsc.session import petsc_options
+from pbem.solve.preconditioner.bodies import BodiesPreconditioner, BodyFactors
+from pbem.solve.problem.problem import Problem
+from pbem.solve.system import hierarchical as system
+from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
+from scripts.bench_connected import write_layers, write_wall
+from tests.identities.solving import assemble_tangent, linearise_pairs
+from tests.unit.case_sample import BLOCKS
+from tests.unit.far_sample import TEXTS, read_sample
+from tests.unit.test_forcing import expect_same
+from tests.unit.test_recycled import run
+
+Real = NDArray[np.float64]
+WALL, LAYERS = write_wall(0.25), write_layers(0.25)  # 5 x 5 bricks, 10 layers
+
+
+def read_mesh(text: str) -> Mesh:
+    return generate_mesh(parse_model(text)[1])
+
+
+@pytest.fixture
+def by_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However few or large the bodies are."""
+    monkeypatch.setattr(system, "choose_body_factors", count_body_factors)
+
+
+def assemble(name: str, operator: str) -> Problem:
+    model = read_sample(name, operator)
+    return assemble_problem(model, generate_mesh(model), world)
+
+
+def assemble_text(text: str) -> Problem:
+    model = parse_model(text)[1]
+    model = replace(model, solver=replace(model.solver, operator="hierarchical"))
+    return assemble_problem(model, generate_mesh(model), world)
+
+
+def constrain(problem: Problem, modes: ModeState | None) -> ConstraintMap:
+    return problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 1.0))
+
+
+def draw_modes(problem: Problem) -> ModeState:
+    random, count = np.random.default_rng(1), problem.mesh.pairs.count
+    return ModeState(random.choice([STICK, SLIP, OPEN], count).astype(np.int8), random.choice([-1.0, 1.0], count))
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+@pytest.mark.parametrize("name", TEXTS)
+def test_it_is_the_inverse(name: str, mixed: bool, by_bodies: None) -> None:
+    problem = assemble(name, "hierarchical")
+    modes = draw_modes(problem) if mixed and name in ("cracks", "infinite", "panel") else None
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and isinstance(tangent.preconditioner, BodiesPreconditioner)
+    assert tangent.preconditioner.update(constrain(problem, modes)) == 1 and tangent.preconditioner.whole
+    exact = assemble_tangent(assemble(name, "dense"), modes)
+    unknowns = np.random.default_rng(3).normal(size=problem.unknowns)
+    # Lengths in any unit: sizes that single precision would not hold.
+    for size in (1.0, 1e-60):
+        found = np.zeros(problem.unknowns)
+        tangent.preconditioner.apply(size * (exact @ unknowns), found)
+        np.testing.assert_allclose(found / size, unknowns, rtol=0, atol=1e-8 * np.abs(unknowns).max())
+    assert tangent.preconditioner.update(constrain(problem, modes)) == 0
+    tangent.destroy()
+
+
+@pytest.mark.parametrize("text", [WALL, LAYERS], ids=["wall", "layers"])
+def test_systems_take_one_or_two_iterations(text: str, tmp_path: Path) -> None:
+    found, counts = run(text, tmp_path)
+    assert len(counts) >= 5 and np.ptp(np.concatenate([each.mode[-1] for each in found.contact.values()])) == 2
+    # A few pairs that changed are left to GMRES, by no more products than pairs have unknowns.
+    assert np.median(counts) == 1 and max(counts) <= 8
+    without, further = run(text, tmp_path, newton_bodies="0")
+    assert sum(further) > (2 * sum(counts) if text == LAYERS else 0)
+    expect_same(found, without)
+
+
+def test_units_change_no_count(tmp_path: Path) -> None:
+    """The wall in metres and pascals: moduli and stresses times a million, weights by volume too."""
+    pascal = WALL.replace("1000.0", "1e9").replace("density = 0.05", "density = 5e4")
+    pascal = pascal.replace("ty = -1.0", "ty = -1e6").replace("tx = 0.3", "tx = 3e5")
+    (found, counts), (other, further) = run(WALL, tmp_path), run(pascal, tmp_path, newton_recycled="40")
+    assert counts == further
+    for name, contact in found.contact.items():
+        np.testing.assert_array_equal(other.contact[name].mode, contact.mode)
+
+
+def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    layers = write_layers(0.15)
+    found, _ = run(layers, tmp_path)
+    calls = []
+
+    def refuse(self: BodyFactors, constraints: object) -> None:
+        calls.append(1)
+        raise ConvergenceError("singular tangent", "no factors")
+
+    monkeypatch.setattr(BodyFactors, "factorise", refuse)
+    by_groups, _ = run(layers, tmp_path, newton_recycled="39")
+    # The solution from which errors are estimated asks once, too.
+    assert 1 <= len(calls) <= 2
+    expect_same(found, by_groups)
+
+
+def test_entries_and_operations_are_counted_as_dissection_gives_them() -> None:
+    mesh = read_mesh(BLOCKS)
+    count = count_body_factors(mesh)
+    one, other = mesh.node_region[mesh.pairs.first], mesh.node_region[mesh.pairs.second]
+    assert len(mesh.region_names) == 2 and (one != other).all()
+    shared, factored, operations = 4.0 * mesh.pairs.count, 0.0, 0.0
+    for region in range(2):
+        own = 2.0 * (mesh.node_region == region).sum() - shared / 2
+        factored += own * (own + 2 * shared)
+        operations += 2 / 3 * ((own + shared) ** 3 - shared**3)
+    assert count.factored == pytest.approx(factored + shared**2)
+    assert count.operations == pytest.approx(operations + 2 / 3 * shared**3)
+
+
+@pytest.mark.parametrize("text", [WALL, LAYERS], ids=["wall", "layers"])
+def test_counted_factors_are_about_those_of_the_solver(text: str) -> None:
+    problem = assemble_text(text)
+    mesh = problem.mesh
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and isinstance(tangent.preconditioner, BodiesPreconditioner)
+    tangent.preconditioner.update(constrain(problem, None))
+    factors = tangent.preconditioner._factors
+    assert factors is not None
+    count, solver = count_body_factors(mesh), factors._solver.solver
+    assert solver is not None
+    factor = solver.getPC().getFactorMatrix()
+    assert 0.6 < count.factored / factor.getMumpsInfog(29) < 1.6
+    assert 0.5 < count.operations / factor.getMumpsRinfog(3) < 2.0
+    assert sum(block.transposed.size for block in factors._blocks) == count.rows
+    tangent.destroy()
+
+
+def test_it_is_taken_where_it_stores_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    wall, large = read_mesh(WALL), read_mesh(BLOCKS.replace("elements = ", "elements = 10"))
+    assert choose_body_factors(wall) is not None
+    assert 2 * large.nodes > 4000 and choose_body_factors(large) is None
+    assert choose_body_factors(read_mesh(BLOCKS)) is None  # one group
+    for name in ("MOST_ENTRIES", "MOST_OPERATIONS"):
+        with monkeypatch.context() as less:
+            less.setattr(body_factors, name, 300.0)
+            assert choose_body_factors(wall) is None
+
+
+def test_the_log_tells_it() -> None:
+    assert "factorises all bodies together" in " ".join(assemble_text(LAYERS).system.notes)
+    with petsc_options({"newton_bodies": "0"}):
+        assert "groups in the preconditioner" in " ".join(assemble_text(LAYERS).system.notes)

@@ -47,7 +47,7 @@ from pbem.solve.launch.memory import check_memory
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
-from pbem.solve.petsc.options import check_options
+from pbem.solve.petsc.options import check_kind, check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
 from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
 from pbem.solve.steps.march import free_at_last, go_on, march, note_place, resume_modes, start_from
@@ -88,11 +88,12 @@ def run(
     then holds every step reached), StorageError (the disk has no room for a step; the file holds those before it),
     LawError (a custom law failed), StopError (told to stop by a signal; KeyboardInterrupt by SIGINT). Any other
     exception on one rank ends all ranks, but for one that computes alone. ValueError: there is no such operator.
-    TypeError: comm is no communicator.
+    TypeError: comm is no communicator, petsc no dictionary.
     """
     comm = check_communicator(comm)
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
+    check_kind(petsc)
     path = find_file(case)
     name = UNNAMED if path is None else str(path)
     try:

@@ -54,6 +54,8 @@ def add_lines_but(
     faults: list[Fault], found: Replaced, changes: Mapping[str, Any], label: Label, lines: Mapping[Any, int]
 ) -> list[Fault]:
     """Faults at the keys that were set, and the lines of the others."""
+    if not isinstance(changes, Mapping):  # which is the fault
+        return faults
     named = []
     for fault in faults:
         origin = fault.place if fault.place in changes else found.find_origin(fault.path)

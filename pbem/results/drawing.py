@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -36,7 +37,9 @@ def plot(
     """
     if not len(results.steps):
         raise ResultFileError(str(results.path), "holds no load step yet")
-    at = results.choose_steps(step)[0]
+    at = _choose_step(results, step)
+    for name, limits in (("xlim", xlim), ("ylim", ylim)):
+        _check_limits(name, limits)
     if x not in ABSCISSAE:
         raise ValueError(f"x: found {x!r}; expected one of {', '.join(ABSCISSAE)}")
     if ax is not None and not isinstance(ax, Axes):
@@ -44,8 +47,8 @@ def plot(
     _refuse_unused(curve, ax, xlim, ylim, x, how)
     with style():
         if curve is not None:
-            names = [curve] if isinstance(curve, str) else list(curve)
-            fields = [field] if isinstance(field, str) else None if field is None else list(field)
+            names = _list_texts("curve", curve)
+            fields = None if field is None else _list_texts("field", field)
             return _plot_curves(results, find_curves(results, names), fields, at, x, xlim, ylim, ax, how)
         if isinstance(field, str):
             return draw_field(results, field, at, axes=ax)
@@ -54,6 +57,32 @@ def plot(
         if ax is not None:
             raise ValueError("ax: the picture of the bodies has axes of its own; give curve=, field= or both")
         return draw_results(results, at)
+
+
+def _choose_step(results: Results, step: Any) -> int:
+    chosen = results.choose_steps(step)
+    if len(chosen) != 1:
+        raise ValueError(f"step: found {step!r}; expected the place of one stored step")
+    return chosen[0]
+
+
+def _list_texts(name: str, value: Any) -> list[str]:
+    listed = [value] if isinstance(value, str) else value
+    if not isinstance(listed, list | tuple) or not listed or not all(isinstance(each, str) for each in listed):
+        raise ValueError(f"{name}: found {value!r}; expected a name, or a list of them")
+    return list(listed)
+
+
+def _check_limits(name: str, limits: Any) -> None:
+    """Raise ValueError for limits of an axis that are not two different numbers."""
+    if limits is None:
+        return
+    try:
+        low, high = (float(each) for each in limits)
+    except (TypeError, ValueError, OverflowError):
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low != high):
+        raise ValueError(f"{name}: found {limits!r}; expected two different numbers")
 
 
 def _refuse_unused(curve: Any, ax: Any, xlim: Any, ylim: Any, x: str, how: dict[str, Any]) -> None:

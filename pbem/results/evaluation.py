@@ -195,7 +195,7 @@ def read_points(points: ArrayLike) -> Complex:
     """Complex points (q,) of x and y (q, 2), or of one point (2,). Raises ValueError for anything else."""
     try:
         values: Any = np.asarray(points, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"points: expected numbers of shape (q, 2), x and y; {error}") from error
     if values.ndim == 1 and values.shape == (2,):
         values = values[None]

@@ -6,7 +6,7 @@ import hashlib
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,7 +27,7 @@ from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
-from pbem.solve.petsc.options import check_options
+from pbem.solve.petsc.options import check_kind, check_options
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
@@ -39,6 +39,7 @@ from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, Table, TableFile
 from pbem.sweeps.values import check_combinations, check_values, combine, find_place, write_cell
+from pbem.wording import show
 
 # Models that were made to try the values and are kept until they are computed.
 MOST_CHECKED = 32
@@ -119,11 +120,13 @@ def sweep(
     comm = check_communicator(comm)
     if operator is not None and operator not in get_args(Operator):
         raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
-    setting = Setting(case, set or {}, operator, petsc or {}, None if keep is None else Path(keep), neighbours, label)
+    check_kind(petsc)
+    folder = None if keep is None else Path(keep)
+    setting = Setting(case, {} if set is None else set, operator, petsc or {}, folder, neighbours, label)
     try:
         with abort_if_unexpected(comm, PbemError):
             check_start(comm)
-            several = do_on_first(comm, PbemError, lambda: _check(values, quantities))
+            several = do_on_first(comm, PbemError, lambda: _check(values, quantities, setting.fixed))
             file: list[TableFile] = []
             plan = do_on_first(comm, PbemError, lambda: _make_plan(
                 setting, several, quantities, out, force, comm, file, option))
@@ -136,11 +139,14 @@ def sweep(
         raise
 
 
-def _check(values: Mapping[str, Any], quantities: Sequence[str] | None) -> dict[str, list[Any]]:
+def _check(values: Mapping[str, Any], quantities: Any, fixed: Any) -> dict[str, list[Any]]:
     several = check_values(values)
     check_combinations(several)
-    if isinstance(quantities, str):
-        raise CaseError("the sweep", (Fault("quantities", "a text", "a list of texts"),))
+    if not isinstance(fixed, Mapping):
+        raise CaseError("the sweep", (Fault("set", show(fixed), "a dictionary: values by keys"),))
+    if quantities is not None and (isinstance(quantities, str) or not isinstance(quantities, Iterable)):
+        found = "a text" if isinstance(quantities, str) else show(quantities)
+        raise CaseError("the sweep", (Fault("quantities", found, "a list of texts"),))
     return several
 
 

@@ -443,3 +443,16 @@ def test_a_table_prints_and_becomes_a_dataframe(folder: Path) -> None:
 def test_a_file_that_cannot_be_a_table_is_refused(folder: Path) -> None:
     with pytest.raises(ResultFileError, match="is a folder"):
         pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.1]}, out=".")
+
+
+@pytest.mark.parametrize("wrong, said", [
+    ({"set": True}, "set: found true; expected a dictionary"), ({"quantities": 3}, "quantities: found 3"),
+])
+def test_arguments_of_other_kinds_are_told(folder: Path, wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(CaseError, match=said):
+        pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.1]}, **wrong)
+    for call in (pbem.run, lambda case, **more: pbem.sweep(case, {"interfaces.joint.friction": [0.1]}, **more)):
+        with pytest.raises(TypeError, match="petsc: found 'ksp'; expected a dictionary"):
+            call("blocks.toml", petsc="ksp")
+    with pytest.raises(CaseError, match="what is set: found 3; expected a dictionary"):
+        pbem.Case.read("blocks.toml").replace(3)  # type: ignore[arg-type]

@@ -150,3 +150,16 @@ def test_numbers_of_pictures() -> None:
     assert print_number(12345.0) == "12345"
     assert print_number(1e-9) == r"1$\times$10$^{-9}$"
     assert print_number(0.0) == "0"
+
+
+@pytest.mark.parametrize("options, said", [
+    ({"curve": 3}, "curve: found 3; expected a name, or a list"), ({"curve": []}, "curve: found"),
+    ({"curve": "joint", "field": True}, "field: found True"), ({"step": []}, "step: found"),
+    ({"step": [0, 1]}, "step: found"), ({"curve": "joint", "xlim": 3}, "xlim: found 3; expected two different numbers"),
+    ({"curve": "joint", "ylim": (1.0, 1.0)}, "ylim: found"), ({"curve": "joint", "xlim": (0, float("nan"))}, "xlim"),
+])
+def test_options_of_other_kinds_are_told(results: Results, options: dict[str, object], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        results.plot(**options)
+    with pytest.raises(ValueError, match="points: expected numbers"):
+        results.evaluate(10**400)  # type: ignore[arg-type]

@@ -8,6 +8,13 @@ from pbem.errors import CaseError, Fault
 from pbem.solve.petsc.session import PREFIX, PETSc, petsc_options
 
 
+def check_kind(given: object) -> None:
+    """Raise TypeError for options that are no dictionary of texts."""
+    if given is None or (isinstance(given, Mapping) and all(isinstance(name, str) for name in given)):
+        return
+    raise TypeError(f"petsc: found {given!r}; expected a dictionary: values by names of options")
+
+
 def check_options(source: str, case: Mapping[str, str], given: Mapping[str, str]) -> None:
     """Try options without prefix: those of a case's [petsc] table, and those given besides, which win over them.
 

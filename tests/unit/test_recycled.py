@@ -112,3 +112,11 @@ def test_few_directions_are_not_kept() -> None:
     space.keep(np.full((30, 30), 2.0), np.ones((30, 30)))
     assert space.count == 40
     assert space._directions[0].tolist() == [2.0] * 30 + [1.0] * 10
+
+
+def test_a_rank_without_rows_keeps_as_many_directions_as_the_others() -> None:
+    """Of a small model one rank may have all rows; directions come twice, as from one system to the next."""
+    space = RecycledSpace(MPI.COMM_SELF, 40)
+    for count in (15, 12):
+        space.keep(np.zeros((0, count)), np.zeros((0, count)))
+    assert space.count == 27

@@ -11,6 +11,7 @@ import pbem
 from pbem.solve.problem.step import SilentReporter
 from scripts.conditions.draft import SCHEMES
 from scripts.conditions.everything import CONDITIONS
+from scripts.conditions.stages import add_stages, lay_stack
 from scripts.conditions.trial import Figure, Trial
 from scripts.study_conditions import judge, main, make_setting
 
@@ -43,6 +44,17 @@ def test_a_flat_tool_of_one_element_presses_evenly(order: int, tmp_path: Path) -
     results = pbem.run(case, tmp_path / "press.h5")
     np.testing.assert_allclose(results.rigid["press"].force[-1], [0.0, -3.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(results.rigid["press"].motion[-1], [0.0, -6e-3, 0.0], atol=1e-9 if order else 5e-4)
+
+
+def test_an_interference_that_a_stage_opens_leaves_nothing(tmp_path: Path) -> None:
+    """Forces of rounding do not end the run as forces that do not balance."""
+    setting = make_setting("SST", "dense", 2, 0)
+    draft = lay_stack(setting, law={"law": "coulomb", "friction": 0.5, "gap": -0.002})
+    draft["boundary"].update({"foot": {"ux": 0.0, "uy": 0.0}, "head": {"ux": 0.0, "uy": 0.0}})
+    add_stages(draft, {}, {"open": ["j1"], "steps": 2})
+    results = pbem.run(draft.case(), tmp_path / "opened.h5")
+    np.testing.assert_allclose(results.contact["j1"].traction_n[:, 0], [-1.0, -0.5, 0.0], atol=1e-9)
+    np.testing.assert_allclose(results.energy.removed, [0.0, 1.5e-3, 2e-3], atol=1e-9)
 
 
 class Listener(SilentReporter):

@@ -242,10 +242,12 @@ def _measure_whole(
 
 
 def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:
-    """Tractions that are smaller are taken to be as large as this."""
+    """Tractions that are smaller are taken to be as large as this: by what is moved, by gaps and interferences that may
+    have opened, and by what faces that a stage opens carried before."""
     rounding = max(ROUNDING, problem.system.tolerance)
-    moved = float(np.abs(v[: 2 * problem.mesh.nodes]).max(initial=0.0))
-    return max(FAINT * largest, rounding * problem.traction_scale * moved)
+    moved = max(float(np.abs(each).max(initial=0.0)) for each in (v[: 2 * problem.mesh.nodes], problem.laws.gap))
+    carried = 0.0 if problem.carried is None else float(np.abs(problem.carried).max(initial=0.0))
+    return max(FAINT * max(largest, carried), rounding * problem.traction_scale * moved)
 
 
 def _measure_carried(

@@ -84,9 +84,10 @@ class RecycledSpace:
         new = min(directions.shape[1], self._most)
         if new <= FEW:
             return
-        room = min(self._most - new, self.count)
+        count = self.count
+        room = min(self._most - new, count)
         self._directions, self._products = (
-            np.concatenate([each[:, :new].astype(np.float32), old.reshape(len(each), -1)[:, :room]], axis=1)
+            np.concatenate([each[:, :new].astype(np.float32), old.reshape(len(each), count)[:, :room]], axis=1)
             for each, old in ((directions, self._directions), (products, self._products))
         )
 

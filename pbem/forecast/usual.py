@@ -21,13 +21,13 @@ from pbem.model.model import Model
 
 # Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps, with
 # the dense and with the hierarchical operator.
-STARTED, EVERYWHERE, EVERYWHERE_FAR = 142e6, 2300.0, 1300.0
+STARTED, EVERYWHERE, EVERYWHERE_FAR = 142e6, 2300.0, 1000.0
 # Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
 # pair changes, and where some do; and how their number grows with that of the ranks.
 AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
 # Of the hierarchical operator near blocks, those of large models (see pbem.bem.near), and groups' inverses, to what is
 # counted; of MUMPS' factors likewise.
-NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.5, 1.0, 1.5
+NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.4, 1.0, 1.5
 # Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
 SCATTERED = 1.2
 

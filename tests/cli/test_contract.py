@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from mpi4py import MPI
 
 import pbem
 from pbem.cli import main
@@ -122,3 +123,55 @@ def test_tables_of_pandas(folder: Path) -> None:
     assert len(joint) == contact.slip.size
     np.testing.assert_array_equal(np.sort(joint["slip"].to_numpy()), np.sort(contact.slip.ravel()))
     assert len(results.to_dataframe("steps")) == len(results.steps) < len(results.to_dataframe("reactions"))
+
+
+CROSSED = """\
+materials.rock = { young = 1e3, poisson = 0.2 }
+regions.plane = { material = "rock", infinite = true, cracks = ["t12", "t3"] }
+remote = { syy = -1.0, sxy = 0.5 }
+output.interior = { box = [-2, -2, 2, 2], shape = [3, 3] }
+analysis.steps = 2
+[curves]
+t12 = { points = [[-1, 0], [1, 0]], elements = 6 }
+t3 = { points = [[0.1, -1], [0.3, 1]], elements = 6 }
+[interfaces]
+"t12" = { friction = 0.3 }
+t3 = { friction = 0.4 }
+"""
+
+
+def test_cracks_that_cross_are_pieces_of_their_trace(folder: Path, capsys: Capture) -> None:
+    """By names that follow from the trace's, with its law; their tips and interior points are tables."""
+    (folder / "crossed.toml").write_text(CROSSED)
+    assert main(["run", "crossed.toml", "--quiet", "--set", 'interfaces."t12".friction=0.2']) == 0
+    results = pbem.open_results("crossed.h5")
+    assert set(results.contact) == {"t12.1", "t12.2", "t3.1", "t3.2"}
+    assert main(["check", "crossed.toml", "--json"]) == 0
+    assert "t12.1" in capsys.readouterr().out
+    for what, column in (("tips", "KII"), ("interior", "sxy"), ("contact.t12.1", "slip")):
+        assert main(["export", "crossed.h5", "-o", "table.csv", "--what", what]) == 0
+        rows = list(csv.DictReader((folder / "table.csv").read_text().splitlines()))
+        assert rows and column in rows[0] and "step" in rows[0], rows[0]
+    sliding = (results.contact["t12.1"].mode[-1] == 1) & (results.contact["t12.1"].traction_n[-1] < 0)
+    ratio = np.abs(results.contact["t12.1"].traction_s / results.contact["t12.1"].traction_n)[-1][sliding]
+    assert sliding.any() and ratio == pytest.approx(0.2, rel=1e-9)
+
+
+def test_runs_and_sweeps_of_all_that_a_case_can_be(folder: Path) -> None:
+    """A path, a case, tables; values set; a communicator; a sweep that goes on where its table ends."""
+    tables = dict(pbem.Case.read("blocks.toml").given)
+    ways = [pbem.run(each, f"{number}.h5", set={SET: 0.3}, comm=MPI.COMM_SELF)
+            for number, each in enumerate(("blocks.toml", pbem.Case.read("blocks.toml"), tables))]
+    reached = [results.reactions["top"][-1] for results in ways]
+    np.testing.assert_array_equal(reached[1:], reached[:-1])
+    values, wanted = {SET: [0.1, 0.3]}, ["reactions.top.x", "contact.joint.slip.largest"]
+    table = pbem.sweep(tables, values, wanted, out="table.csv")
+    assert table.columns[:3] == (SET, *wanted) and len(table) == 2
+    assert table["reactions.top.x"][1] == pytest.approx(reached[0][0], rel=1e-9)
+    text = (folder / "table.csv").read_bytes()
+    (folder / "table.csv").write_bytes(b"".join(text.splitlines(keepends=True)[:2]))
+    told: list[int] = []
+    again = pbem.sweep(tables, values, wanted, out="table.csv", listener=lambda new, *_: told.append(new))
+    assert told == [1] and again["reactions.top.x"] == pytest.approx(table["reactions.top.x"], rel=1e-9)
+    for x in ("arc_length", "x", "y"):
+        assert isinstance(ways[0].plot(curve="joint", field="opening", x=x), Figure)

@@ -28,6 +28,8 @@ AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
 # Of the hierarchical operator near blocks, those of large models (see pbem.bem.near), and groups' inverses, to what is
 # counted; of MUMPS' factors likewise.
 NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.4, 1.0, 1.5
+# Of all bodies' tangent operator, in PETSc's and MUMPS' copies, and of its factors beyond those.
+BODIES_FORMED, BODIES_FACTORS = 4.0, 1.3
 # Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
 SCATTERED = 1.2
 
@@ -114,12 +116,16 @@ def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
 
 def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
     """Bytes over all ranks by use, without the processes themselves; part: of the pairs, see Changes."""
+    sparse = SPARSE_FACTORS if ranks == 1 else SPARSE_FACTORS_SHARED
+    if work.hierarchical and work.sparse:
+        inverses = work.besides + BODIES_FORMED * work.formed + BODIES_FACTORS * sparse * work.factored
+    else:
+        inverses = INVERSES * work.factored
     if work.hierarchical:
         near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
-        return {"operator": 8 * near * work.entries, "preconditioner": 8 * INVERSES * work.factored,
+        return {"operator": 8 * near * work.entries, "preconditioner": 8 * inverses,
                 "mesh and vectors": EVERYWHERE_FAR * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
-    sparse = SPARSE_FACTORS if ranks == 1 else SPARSE_FACTORS_SHARED
     factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
     copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
     return {
@@ -137,11 +143,14 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
     iterations = changes.iterations
     vectors = python * VECTOR * iterations * work.unknowns
     if work.hierarchical:
-        products = iterations * ((GMRES if changes.part else GMRES_SETTLED) + PRODUCTS)
+        products = iterations * ((1.0 if work.sparse else GMRES if changes.part else GMRES_SETTLED) + PRODUCTS)
+        inverses = python * work.unknowns * INVERSE * share
+        if work.sparse:
+            inverses = speed.operation * SPARSE * share * work.operations + CALL * python
         return {
             "assembly": (NEAR * speed.entry * work.entries + PLACED * python * work.unknowns) * share,
             "steps": vectors + python * work.unknowns * (
-                products * (PRODUCT * share + PRODUCT_ALONE) + iterations * INVERSE * share),
+                products * (PRODUCT * share + PRODUCT_ALONE)) + iterations * inverses,
         }  # fmt: skip
     factors = 1.0 if work.columns else changes.factorisations
     columns = work.columns or 2.0 * min(changes.part, CHANGING) * work.pairs

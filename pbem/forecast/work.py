@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Integer
+from pbem.bem.body_factors import choose_body_factors
 from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements
 from pbem.bem.operator_choice import choose_operator
 from pbem.bem.rigid_motions import need_rotations
@@ -28,7 +29,8 @@ class Work:
     unknowns; pairs: that can change their status. entries: of the operator B; besides: of the rows that give
     the displacements of cracks; formed: of the tangent operator as it is
     filled, in numbers of 8 bytes; factored: of its factors; operations: to factorise it, multiplications and additions.
-    columns: of pairs, computed once for all. hierarchical, sparse: kind of the operator and of its factors.
+    columns: of pairs, computed once for all. hierarchical, sparse: kind of the operator and of its factors; of the
+    hierarchical one these are of all bodies together, and `besides` is of the rows that they are made of.
     """
 
     unknowns: int
@@ -50,7 +52,11 @@ def count_work(model: Model, mesh: Mesh) -> Work:
     unknowns = 2 * mesh.nodes
     if choose_operator(model, mesh).name == "hierarchical":
         entries, inner = _count_hierarchical(model, mesh, find_needed_columns(model, mesh, outer))
-        return Work(unknowns, varying, entries, 0.0, inner, inner, 0.0, 0.0, True, False)
+        bodies = choose_body_factors(mesh)
+        if bodies is None:
+            return Work(unknowns, varying, entries, 0.0, inner, inner, 0.0, 0.0, True, False)
+        return Work(unknowns, varying, entries, bodies.rows, bodies.formed, bodies.factored, bodies.operations, 0.0,
+                    True, True)
     entries, besides = _count_dense(model, mesh, find_needed_columns(model, mesh, outer))
     few = 2 * varying <= FEW * unknowns
     cracks = mesh.pairs.crack & ~(laws.bonded | laws.parted | laws.follows)

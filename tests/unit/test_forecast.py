@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pbem.bem import operator_choice
+from pbem.bem.body_factors import choose_body_factors
 from pbem.case.build import parse_model
 from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import collect_laws
@@ -22,6 +23,7 @@ from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.solve.estimate.coarser_mesh import put_beside
 from pbem.solve.system.assembly import assemble_problem
+from scripts.bench_connected import write_layers
 from tests.unit.case_sample import BLOCKS
 
 TILTED = """
@@ -92,6 +94,22 @@ def test_blocks_are_eliminated_as_their_unknowns_would_be() -> None:
         pattern[np.ix_(near, near)] = True
         left[at] = False
     assert _eliminate(sizes, cliques)[0] == pytest.approx(factored, rel=1e-12)
+
+
+def test_factors_of_all_bodies_are_counted_where_they_are_made() -> None:
+    model, mesh = read(write_layers(0.25))
+    model = replace(model, solver=replace(model.solver, operator="hierarchical"))
+    work, bodies = count_work(model, mesh), choose_body_factors(mesh)
+    assert bodies is not None and work.hierarchical and work.sparse
+    assert (work.besides, work.factored, work.operations) == (bodies.rows, bodies.factored, bodies.operations)
+    # Dense blocks: of each layer the rows by its own unknowns and the tractions and displacements of its pairs.
+    rows = 2.0 * np.bincount(mesh.node_region)
+    faces = np.concatenate([mesh.node_region[each] for each in (mesh.pairs.first, mesh.pairs.second)])
+    assert work.formed == rows @ (rows + 2 * np.bincount(faces, minlength=len(rows)))
+    memory = make_forecast(model, mesh, 1, timed=False).memory["preconditioner"]
+    assert memory > 8 * (bodies.rows + bodies.formed + bodies.factored)
+    two, _ = read(BLOCKS)
+    assert not count_work(replace(two, solver=model.solver), read(BLOCKS)[1]).sparse
 
 
 def test_two_bodies_that_touch_nowhere_are_two_blocks() -> None:

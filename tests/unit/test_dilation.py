@@ -29,6 +29,7 @@ from pbem.contact.seat import find_seat, read_dilation
 from pbem.contact.strength import coulomb, dilating_coulomb, dilating_slip_weakening, slip_weakening
 from pbem.mesh.generate import generate_mesh
 from pbem.model.model import Model
+from pbem.results.dissipation import PairRecord, measure_work
 from pbem.results.model_text import describe_law
 from tests.unit.case_sample import BLOCKS, build, change, find_faults
 
@@ -229,6 +230,25 @@ def test_faces_stick_and_touch_again_where_they_have_been_lifted_to() -> None:
     for off, mode in ((1.001, OPEN), (0.999, STICK)):
         state = PairState(zeros, zeros, off * dilation, memory.slip)
         assert (update_active_set(laws, apart, state, memory, zeros).modes.mode == mode).all()
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_fluid_works_on_closed_faces_that_part_where_it_is_inside(inside: bool) -> None:
+    fluid = f'friction = 0.5\npressure = 5.0\npressurised = "{"all" if inside else "open"}"\n'
+    _, laws = make(change(COULOMB, ("friction = 0.5\n", fluid)))
+    count, zeros, pressure = laws.count, np.zeros(laws.count), np.full(laws.count, 5.0)
+    slides, moved = np.full(count, SLIP), 0.1
+    effective = 9.0 - 5.0 * inside
+    bound, slip = 0.5 * effective, moved / SLOPE
+    records = [
+        PairRecord(slides, zeros - 9, zeros + bound, opening, along, opening, along, pressure,
+                   remember(laws, slip_path=along, dilation=opening).internal, zeros)
+        for opening, along in ((zeros, zeros), (zeros + moved, zeros + slip))
+    ]
+    work = measure_work(laws, np.ones(count), *records)
+    assert work.fluid == pytest.approx(count * 5.0 * moved if inside else 0.0)
+    assert work.dissipated == pytest.approx(count * (bound * slip - effective * moved))
+    assert work.excess == pytest.approx(0.0, abs=1e-10) and np.abs(work.surplus).max() < 1e-12
 
 
 def test_the_numbers_reach_the_model_and_are_told() -> None:

@@ -250,3 +250,24 @@ def test_values_that_are_set_and_swept_reach_the_joint(tmp_path: Path, monkeypat
     case = make_case(ROUGH | {"dilation_part": 0.9, "peak_slip": 1.0, "jrc": 3.0}, PRESSED, ENDS, states)
     values = {f"interfaces.mid.{key}": ROUGH[key] for key in ("dilation_part", "peak_slip", "jrc")}
     check(pbem.run(case, "joint.h5", set=values), states)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_fluid_takes_part_where_it_is(inside: bool, tmp_path: Path) -> None:
+    """In closed parts it relieves the friction, and works on the dilation; where it is in open parts alone there is
+    none: all is as without, and nothing runs away."""
+    pressure = 18.0
+    effective = pressure if inside else 0.0
+    states = predict(PRESSED, ENDS, lambda stress: FRICTION * (stress - effective), climb_up_to(math.inf))
+    law = make_law(pressure=pressure, pressurised="all" if inside else "open")
+    results = pbem.run(make_case(law, PRESSED, ENDS, states), tmp_path / "joint.h5")
+    check(results, states)
+    energy = results.energy
+    total = [0.0]
+    for before, after in pairwise(states):
+        stress = 0.5 * (before.stress + after.stress) - effective
+        lifted = stress * (after.dilation - before.dilation)
+        total.append(total[-1] + 1.5 * (FRICTION * stress * (after.path - before.path) - lifted))
+    np.testing.assert_allclose(energy.dissipated, total, rtol=1e-8)
+    left = energy.external - energy.elastic - energy.dissipated
+    assert np.abs(left).max() < 1e-8 * np.abs(energy.external).max() and not energy.released.any()

@@ -6,11 +6,12 @@ one step then is a linear complementarity problem (A. Klarbring, Comput. Methods
 form of D. E. Stewart and J. C. Trinkle (Int. J. Numer. Methods Eng. 39, 1996). With N = tensile strength - pressure -
 p_n >= 0, friction traction p_s = b_+ - b_-, both >= 0, and a size of the slip l >= 0,
 
-    g_n >= 0 to N,   l - slip >= 0 to b_+,   l + slip >= 0 to b_-,   cohesion + friction N - b_+ - b_- >= 0 to l
+    g_n - climb l >= 0 to N,   l - slip >= 0 to b_+,   l + slip >= 0 to b_-,
+    cohesion + friction N - b_+ - b_- >= 0 to l
 
-each with its partner of product zero (the friction traction has the sense of the slip: see pbem.contact.modes). The
-matrix is copositive where -A is positive definite, as it is in every sound model, and then Lemke's pivoting ends with a
-solution for any friction.
+each with its partner of product zero (the friction traction has the sense of the slip: see pbem.contact.modes); climb:
+of faces that dilate, at most the friction. The matrix is copositive where -A is positive definite, as it is in every
+sound model, and then Lemke's pivoting ends with a solution for any friction.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from pbem.contact.laws import (
     tensile_limit,
 )
 from pbem.contact.pivoting import solve_by_pivoting
+from pbem.contact.seat import evaluate_dilation, read_dilation
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
 ROUNDING, PERTURBATION = 1e-12, 1e-10
@@ -109,7 +111,8 @@ def _take_modes(modes: ModeState, pairs: Integer) -> ModeState:
 class PairProblem:
     """What the pairs can be (s,), in the response's units.
 
-    constant (4, s), change (4, s, 2 s): of p_n, p_s, g_n and this step's slip, the jumps less those of elastic joints.
+    constant (4, s), change (4, s, 2 s): of p_n, p_s, g_n and this step's slip, the jumps less those of elastic joints
+    and the opening at which faces touch, which rises by climb times the size of the slip.
     The bound is adhesion + friction N, N = limit - p_n; limit: tensile strength - pressure. tension: tensile strength.
     rough: pairs with a bound at all.
     """
@@ -122,6 +125,7 @@ class PairProblem:
     tension: Real
     rough: Bool
     sign: Real
+    climb: Real
 
 
 def pose(subset: Subset, response: Response) -> PairProblem:
@@ -141,9 +145,13 @@ def pose(subset: Subset, response: Response) -> PairProblem:
     strength = evaluate_strength(laws, admissible, memory.look_ahead(ahead), subset.pressure)
     friction = -strength.by_traction
     adhesion = (strength.bound - friction * (limit - admissible)) / unit
+    rises = evaluate_dilation(laws, admissible, memory.look_ahead(ahead), subset.pressure)
+    seat = read_dilation(laws, memory.internal) + rises.opening - rises.by_slip * ahead
+    constant[2] -= seat / response.length_unit
     adhesion = np.where(adhesion > ROUNDING * np.abs(constant[0]).max(initial=0.0), adhesion, 0.0)
     return PairProblem(
-        constant, change, adhesion, friction, limit / unit, tension / unit, resists_slip(laws), subset.modes.sign
+        constant, change, adhesion, friction, limit / unit, tension / unit, resists_slip(laws), subset.modes.sign,
+        rises.by_slip,
     )  # fmt: skip
 
 
@@ -191,6 +199,7 @@ def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeSta
     matrix[size[0], last] = matrix[size[1], last] = 1.0
     matrix[last, size[0]] = matrix[last, size[1]] = -1.0
     matrix[last, rough] = pairs.friction[closed[rough]]
+    matrix[rough, last] = -pairs.climb[closed[rough]]
     slip_at_rest = jump[count + closed[rough]]
     constant = np.concatenate([jump[closed], -slip_at_rest, slip_at_rest, pairs.adhesion[closed[rough]]])
     # Many bounds are zero at rest: unequal small numbers keep the pivoting from going round among them.
@@ -213,8 +222,11 @@ def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:
     is_open, slides = modes.mode == OPEN, modes.mode == SLIP
     by_normal = -modes.sign * np.where(pairs.rough, pairs.friction, 0.0)
     bound = modes.sign * np.where(pairs.rough, pairs.adhesion + pairs.friction * pairs.limit, 0.0)
-    first = np.where(is_open[:, None], pairs.change[0], pairs.change[2])
-    given = np.where(is_open, pairs.limit - pairs.tension - pairs.constant[0], -pairs.constant[2])
+    climb = pairs.sign * np.where(slides & pairs.rough, pairs.climb, 0.0)
+    lifted = pairs.change[2] - climb[:, None] * pairs.change[3]
+    first = np.where(is_open[:, None], pairs.change[0], lifted)
+    on_seat = climb * pairs.constant[3] - pairs.constant[2]
+    given = np.where(is_open, pairs.limit - pairs.tension - pairs.constant[0], on_seat)
     tangential = pairs.change[1] - np.where(slides, by_normal, 0.0)[:, None] * pairs.change[0]
     friction = np.where(slides, bound + by_normal * pairs.constant[0], 0.0) - pairs.constant[1]
     sticks = modes.mode == STICK

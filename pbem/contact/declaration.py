@@ -153,6 +153,12 @@ class FrictionLaw(ABC):
     bonds = False
     dilates = False
 
+    @property
+    def pivots(self) -> bool:
+        """Whether a step of it is a complementarity problem: its bound is linear in the normal traction alone, and its
+        dilation in the slip, but for ends of that."""
+        return self.linear
+
     @abstractmethod
     def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:
         """Friction bound (k,) at the normal traction (compression negative; less the fluid pressure inside)."""

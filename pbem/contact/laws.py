@@ -301,6 +301,14 @@ def find_linear(laws: PairLaws) -> Bool:
     return linear
 
 
+def find_pivoting(laws: PairLaws) -> Bool:
+    """The pairs (m,) whose contact is a complementarity problem, step by step."""
+    pivots = np.zeros(laws.count, dtype=bool)
+    for group in laws.strengths:
+        pivots[group.pairs] = group.law.pivots
+    return pivots
+
+
 def find_creeping(laws: PairLaws) -> Bool:
     """The pairs (m,) whose friction rises with the rate of slip from nothing: they never stick, and hold as they creep.
 

@@ -259,7 +259,10 @@ def update_active_set(
     is_open = modes.mode == OPEN
     slip = plastic_slip(laws, state)
     creeps = find_creeping(laws)
-    apart = measure_clearance(laws, memory, state, pressure)
+    # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to the last stick.
+    slide = memory.look_ahead(slip_ahead(modes, memory, slip))
+    adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), slide, pressure).bound
+    apart = measure_clearance(laws, memory, state, pressure, adhesion > 0)
     seat = find_seat(laws, modes, memory, state, pressure)
     pressed = np.where(state.p_n + pressure > 0, find_pressed(laws, modes, state, pressure, seat), state.p_n)
     normal = pressed + stiffness * np.where(is_open, apart, 0.0)
@@ -272,10 +275,7 @@ def update_active_set(
     parting = normal + pressure - np.where(is_open, 0.0, limit)
     opens = np.where(is_open, parting > -margin, parting > margin)
     admissible = np.minimum(normal, limit - pressure)
-    slide = memory.look_ahead(slip_ahead(modes, memory, slip))
     bound = evaluate_strength(laws, admissible, slide, pressure).bound
-    # Faces that meet again do so where they are: with cohesion in the trial they would be torn back to the last stick.
-    adhesion = evaluate_strength(laws, np.minimum(0.0, -pressure), slide, pressure).bound
     # Not where even stiff surroundings would not reach it: cohesion far above all tractions would push them back.
     reached = np.abs(state.p_s + laws.stiffness * np.where(still, 0.0, slip - memory.slip)) * STIFFEST
     weak = is_open & (reached > bound)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Real
+from pbem.arrays import Bool, Real
 from pbem.contact.closure import find_closure, measure_closure_error
 from pbem.contact.declaration import Dilation, Slide
 from pbem.contact.dilating import DILATION
@@ -64,14 +64,15 @@ def find_seat(laws: PairLaws, modes: ModeState, memory: Memory, state: PairState
     return find_opening_at_rest(laws, modes, memory) + evaluate_dilation(laws, state.p_n, slide, pressure).opening
 
 
-def measure_clearance(laws: PairLaws, memory: Memory, state: PairState, pressure: Real) -> Real:
+def measure_clearance(laws: PairLaws, memory: Memory, state: PairState, pressure: Real, adheres: Bool) -> Real:
     """By how much (m,) open pairs clear their asperities: negative where they would touch.
 
     What slips in the step rides up on them, also if it parts: else pairs would stay open because others lift them
-    (theory, 117).
+    (theory, 117). Not if it adheres (m,), as faces that slip only because they lose their cohesion as they part would
+    neither part nor stay together.
     """
     slide = memory.look_ahead(np.abs(plastic_slip(laws, state) - memory.slip))
-    added = evaluate_dilation(laws, state.p_n, slide, pressure).opening
+    added = np.where(adheres, 0.0, evaluate_dilation(laws, state.p_n, slide, pressure).opening)
     return state.g_n - find_closure(laws, state.p_n, pressure)[0] - read_dilation(laws, memory.internal) - added
 
 

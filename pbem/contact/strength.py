@@ -77,6 +77,8 @@ def _evaluate_cone(p_n: Real, friction: Real, cohesion: Real) -> Strength:
 class DilatingCoulomb(ConstantDilation, Coulomb):
     """Coulomb's law of faces that dilate."""
 
+    pivots = True
+
     def strength(  # type: ignore[override]
         self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, dilation_angle: Real, dilation_slip: Real
     ) -> Strength:

@@ -12,7 +12,18 @@ from pbem.arrays import Bool, Real
 from pbem.contact.closure import choose_traction
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
+from pbem.contact.laws import (
+    OPEN,
+    SLIP,
+    STICK,
+    Memory,
+    ModeState,
+    PairState,
+    find_linear,
+    find_pivoting,
+    follow_leaders,
+    plastic_slip,
+)
 from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
@@ -114,7 +125,7 @@ def _list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
     interface = problem.mesh.pairs.interface if settling.with_neighbours else None
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
-    varying, excluded = not bool(linear.all()), problem.laws.follows | ~linear
+    varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
     return [
         Search(settling.most_pairs, interface, excluded, varying, sweeping, wary)
         for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying

@@ -17,14 +17,24 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.arrays import Bool, Real
-from pbem.contact.declaration import Dilation, FrictionLaw, Parameters, Slide
-from pbem.contact.dilating import DEGREE, Dilating
+from pbem.contact.declaration import (
+    Dilation,
+    FrictionLaw,
+    InternalVariable,
+    Parameters,
+    Slide,
+    StepEnd,
+    keep_value,
+)
+from pbem.contact.dilating import DEGREE, DILATION, Dilating
 from pbem.contact.friction_bound import Strength
 
 STEEPEST = 70.0
 # How much of the roughness is mobilised, at slips relative to that at the peak; linear in between.
 MOBILISED_AT = np.array([0.0, 0.3, 0.6, 1.0, 2.0, 4.0, 10.0, 25.0, 100.0])
 MOBILISED = np.array([0.0, 0.0, 0.75, 1.0, 0.85, 0.7, 0.5, 0.4, 0.0])
+# At the peak, by the normal traction at the end of the last step; none where faces carried nothing.
+DILATION_ANGLE = InternalVariable("dilation_angle", "degrees", lambda _: np.nan, keep_value)
 _AREA = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(MOBILISED_AT) * (MOBILISED[1:] + MOBILISED[:-1]))])
 
 
@@ -71,6 +81,9 @@ class DilatingJoint(Dilating, BartonBandis):
     """The law with dilation; further parameters: the part of what asperities add by which the dilation angle rises, and
     the slip at which the strength has its peak, length."""
 
+    variables = (DILATION, DILATION_ANGLE)
+    pivots = True
+
     def strength(  # type: ignore[override]
         self, p_n: Real, slide: Slide, /, residual_friction_angle: Real, jrc: Real, jcs: Real, dilation_part: Real,
         peak_slip: Real, closure: Real | None = None,
@@ -80,11 +93,24 @@ class DilatingJoint(Dilating, BartonBandis):
 
     def dilate(self, p_n: Real, slide: Slide, parameters: Parameters) -> Dilation:
         """See FrictionLaw (theory, 116)."""
-        stress, jrc, part = np.maximum(-p_n, 0.0), parameters["jrc"], parameters["dilation_part"]
-        rough, falls = _find_roughness(stress, parameters["residual_friction_angle"], jrc, parameters["jcs"])
-        slope = np.tan(DEGREE * part * rough)
-        by_stress = -DEGREE * part * jrc / np.log(10) / np.where(falls, stress, 1.0) * (1 + slope**2)
+        angle, by_angle = _find_dilation_angle(p_n, parameters)
+        known: Real = slide.start[DILATION_ANGLE.name]
+        begun = np.isfinite(known)
+        slope = np.tan(DEGREE * np.where(begun, known, angle))
+        by_traction: Real = np.where(begun, 0.0, DEGREE * by_angle * (1 + slope**2))
         peak = parameters["peak_slip"]
         (_, before), (now, after) = (mobilise(path / peak) for path in (slide.path - slide.ahead, slide.path))
         way = peak * (after - before)
-        return Dilation(slope * way, np.where(falls, -by_stress * way, 0.0), slope * now)
+        return Dilation(slope * way, by_traction * way, slope * now)
+
+    def advance(self, end: StepEnd, parameters: Parameters) -> dict[str, Real]:
+        """As all faces that dilate, and the dilation angle of the next step."""
+        angle, _ = _find_dilation_angle(end.p_n, parameters)
+        return {**super().advance(end, parameters), DILATION_ANGLE.name: np.where(end.p_n < 0, angle, np.nan)}
+
+
+def _find_dilation_angle(p_n: Real, parameters: Parameters) -> tuple[Real, Real]:
+    """The angle at the peak (k,), degrees, and its derivative by p_n."""
+    stress, jrc, part = np.maximum(-p_n, 0.0), parameters["jrc"], parameters["dilation_part"]
+    rough, falls = _find_roughness(stress, parameters["residual_friction_angle"], jrc, parameters["jcs"])
+    return part * rough, np.where(falls, part * jrc / np.log(10) / np.where(falls, stress, 1.0), 0.0)

@@ -39,6 +39,8 @@ from pbem.contact.seat import evaluate_dilation, read_dilation
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
 ROUNDING, PERTURBATION = 1e-12, 1e-10
+# A bound bends if its tangent at the traction of a pair meets the axis off from it by more than this part.
+BENT = 1e-9
 # Tractions that some motion hardly changes leave a body free without these pairs.
 FREE = 1e-11
 # Stiffness of the springs that then hold it, relative to that of its surroundings.
@@ -144,7 +146,12 @@ def pose(subset: Subset, response: Response) -> PairProblem:
     ahead = np.where(subset.modes.mode == SLIP, np.abs(plastic_slip(laws, state) - memory.slip), 0.0)
     strength = evaluate_strength(laws, admissible, memory.look_ahead(ahead), subset.pressure)
     friction = -strength.by_traction
-    adhesion = (strength.bound - friction * (limit - admissible)) / unit
+    adhesion = strength.bound - friction * (limit - admissible)
+    # Of a bound that bends the chord, as the tangent would adhere.
+    bottom = evaluate_strength(laws, limit, memory.look_ahead(ahead), subset.pressure).bound
+    bends = adhesion - bottom > BENT * strength.bound
+    chord = (strength.bound - bottom) / np.where(bends, limit - admissible, 1.0)
+    friction, adhesion = np.where(bends, chord, friction), np.where(bends, bottom, adhesion) / unit
     rises = evaluate_dilation(laws, admissible, memory.look_ahead(ahead), subset.pressure)
     seat = read_dilation(laws, memory.internal) + rises.opening - rises.by_slip * ahead
     constant[2] -= seat / response.length_unit

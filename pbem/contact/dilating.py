@@ -29,7 +29,7 @@ DEGREE = np.pi / 180
 class Dilating(FrictionLaw):
     """What all laws have in common that dilate; `dilate` is left to them."""
 
-    variables = (DILATION,)
+    variables: tuple[InternalVariable, ...] = (DILATION,)
     linear = False
     dilates = True
 

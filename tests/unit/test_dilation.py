@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pbem.contact.barton_bandis import MOBILISED, MOBILISED_AT, DilatingJoint, mobilise
+from pbem.contact.barton_bandis import DILATION_ANGLE, MOBILISED, MOBILISED_AT, DilatingJoint, mobilise
 from pbem.contact.declaration import FrictionLaw, Passage, Slide, StepEnd
 from pbem.contact.dilating import DILATION
 from pbem.contact.laws import (
@@ -56,7 +56,8 @@ def slide(path: object, ahead: object, dilation: float = 0.0) -> Slide:
     """So much slip after a path."""
     path, ahead = np.atleast_1d(np.asarray(path, dtype=float)), np.atleast_1d(np.asarray(ahead, dtype=float))
     return Slide(ahead, {"slip_path": path, "broken": np.zeros(len(path), dtype=bool),
-                         DILATION.name: np.full(len(path), dilation)})
+                         DILATION.name: np.full(len(path), dilation),
+                         DILATION_ANGLE.name: np.full(len(path), np.nan)})
 
 
 def test_a_constant_angle_acts_over_its_slip() -> None:
@@ -93,6 +94,19 @@ def test_a_rough_joint_dilates_by_what_its_asperities_add() -> None:
     np.testing.assert_allclose(found.opening, slopes * 1e-4, rtol=1e-3)
     none = DilatingJoint().dilate(p_n, slide(np.zeros(size), np.full(size, 0.059)), spread(JRC, size))
     assert not none.opening.any() and not none.by_slip.any()
+
+
+def test_the_angle_of_a_step_is_that_of_the_stress_at_its_beginning() -> None:
+    law, no = DilatingJoint(), np.zeros(3, dtype=bool)
+    end = StepEnd(np.array([-10.0, -1e-4, 0.0]), slide(np.full(3, 0.2), np.zeros(3)), np.zeros((3, 2)), no)
+    kept = law.advance(end, spread(JRC, 3))
+    np.testing.assert_allclose(kept[DILATION_ANGLE.name], [5.0, 21.0, np.nan], rtol=1e-12)
+    start = {**slide(np.full(3, 0.2), np.zeros(3)).start, **kept}
+    found = law.dilate(np.full(3, -1.0), Slide(np.full(3, 1e-4), start), spread(JRC, 3))
+    at_end = math.tan(math.radians(0.5 * 20.0))  # of what carried nothing
+    slopes = [math.tan(math.radians(5.0)), math.tan(math.radians(21.0)), at_end]
+    np.testing.assert_allclose(found.by_slip, np.array(slopes) * mobilise(np.array([1.0005]))[0], rtol=1e-12)
+    assert not found.by_traction[:2].any() and found.by_traction[2] > 0
 
 
 LAWS: dict[str, tuple[FrictionLaw, dict[str, float]]] = {

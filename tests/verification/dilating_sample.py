@@ -36,17 +36,16 @@ def predict(
 ) -> list[Sheared]:
     """The states at the ends of stages in which the top goes to `ends` along the joint, by bisection; all of them slip.
 
-    pressed: by which the top has come down. climb(path before, path, stress): what is added to the dilation. softness:
-    of the elastic joint, across and along, length/stress.
+    pressed: by which the top has come down. climb(path before, path, stress before): what is added to the dilation.
+    softness: of the elastic joint, across and along, length/stress.
     """
     states = [Sheared(0.0, 0.0, 0.0, pressed / (2 * size / young + softness[0]), 0.0)]
 
     def slide(last: Sheared, sense: int, ahead: float) -> Sheared:
-        # The dilation depends on the stress that it makes.
         low, high = 0.0, 1e3 * last.stress + young
         for _ in range(64):
             stress = 0.5 * (low + high)
-            dilation = last.dilation + climb(last.path, last.path + ahead, stress)
+            dilation = last.dilation + climb(last.path, last.path + ahead, last.stress)
             below = stress * (2 * size / young + softness[0]) < pressed + dilation
             low, high = (stress, high) if below else (low, stress)
         return Sheared(last.slip + sense * ahead, last.path + ahead, dilation, stress, sense * find_shear(stress))

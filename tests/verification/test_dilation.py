@@ -123,7 +123,7 @@ def test_what_lifts_the_load_is_not_dissipated(what: str, tmp_path: Path) -> Non
 
 
 def test_rough_joints_tend_to_their_path_with_the_steps(tmp_path: Path) -> None:
-    """The stress at the end of a step sets the dilation of all of it: the error falls with the steps."""
+    """The stress at the beginning of a step sets the dilation of all of it: the error falls with the steps."""
     found = {}
     for count in (1, 2, 4, 32):
         ends = [0.04 * (number + 1) / count for number in range(count)]

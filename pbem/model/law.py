@@ -262,8 +262,10 @@ def _check_dilation(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Fault
         found, expected = f"a dilation_slip of '{loc[-1]}' without dilation_angle", "both of them, or none"
         yield Fault.at((*loc, "dilation_slip"), found, expected)
     climb = math.tan(math.radians(table.dilation_angle or 0.0))
-    least = min([_find_friction(table), *(each for each in [table.friction_dynamic] if isinstance(each, float))])
-    if not isinstance(table.friction, VaryingTable) and climb > least * (1 + APEX):
+    # What varies along the curve is looked at there (see `_check_strengths_along`).
+    static = [] if isinstance(table.friction, VaryingTable) else [_find_friction(table)]
+    least = min([*static, *(each for each in [table.friction_dynamic] if isinstance(each, float))], default=math.inf)
+    if climb > least * (1 + APEX):
         angle = math.degrees(math.atan(least))
         found = f"dilation_angle = {table.dilation_angle:g} on '{loc[-1]}', beyond the angle of friction, {angle:.6g}"
         yield Fault.at((*loc, "dilation_angle"), found, "at most the angle of friction: dilation cannot give work")

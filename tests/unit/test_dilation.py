@@ -288,6 +288,10 @@ WRONG = {
         COULOMB, ("friction = 0.5", 'friction = { expression = "0.3 - 0.1*s" }'), "dilation_angle",
         "angle of friction at (2, 1)",
     ),
+    "beyond a number in the end of friction that varies": (
+        COULOMB, ("friction = 0.5", 'friction = { expression = "0.5 - 0.1*s" }\nfriction_dynamic = 0.1\n'
+                  "slip_distance = 1.0"), "dilation_angle", "5.71059",
+    ),
     "no angle": (COULOMB, ("dilation_angle = 10.0\n", ""), "dilation_slip", "without dilation_angle"),
     "a negative angle": (COULOMB, ("dilation_angle = 10.0", "dilation_angle = -1"), "dilation_angle", "-1"),
     "no slip": (COULOMB, ("dilation_slip = 0.3", "dilation_slip = 0"), "dilation_slip", "0"),

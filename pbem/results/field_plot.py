@@ -44,6 +44,8 @@ ACROSS, CLOSER = 64, 6.0
 BOTH_SIDES = 0.1
 # What is smaller than this part of the largest displacement, or component of stress, is shown as the 0 that it is.
 ROUNDING = 1e-9
+# What is smaller than this part of the colours' range is no more than what is left of an area without stress.
+NOTHING = 5e-3
 HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
@@ -208,12 +210,18 @@ class FieldPicture:
             return
         levels = MaxNLocator(self._options.contours + 1).tick_values(low, high)
         levels = levels[(levels > max(low, float(values.min()))) & (levels < min(high, float(values.max())))]
-        if len(levels):
-            dashes = ["--" if level < 0 else "-" for level in levels]
-            widths = [0.9 if level == 0 else 0.4 for level in levels]
-            lines = axes.tricontour(triangulation, values, levels, colors="0.15", linewidths=widths, linestyles=dashes,
-                                    zorder=2)
-            bar.add_lines(lines)  # type: ignore[attr-defined]
+        # Where next to nothing acts the line of zero would wander about.
+        idle = (np.abs(values) <= NOTHING * max(abs(low), abs(high)))[triangulation.triangles].all(axis=1)
+        gone = idle if triangulation.mask is None else idle | triangulation.mask
+        acting = Triangulation(triangulation.x, triangulation.y, triangulation.triangles, mask=gone)
+        left = values[triangulation.triangles[~gone]]
+        crossed = left.min(initial=0.0) < 0 < left.max(initial=0.0)
+        for on, chosen in ((triangulation, levels[levels != 0]), (acting, levels[levels == 0])):
+            if len(chosen) and (crossed or on is not acting):
+                dashes = ["--" if level < 0 else "-" for level in chosen]
+                lines = axes.tricontour(on, values, chosen, colors="0.15", linewidths=0.9 if on is acting else 0.4,
+                                        linestyles=dashes, zorder=2)
+                bar.add_lines(lines, erase=False)  # type: ignore[attr-defined]
 
     def _draw_outlines(self, axes: Axes, step: int) -> None:
         results = self._results

@@ -257,3 +257,18 @@ def test_rounding_is_shown_as_zero(tmp_path: Path) -> None:
         assert np.isfinite(picture.values(0)).all() and not picture.values(0).any()
         assert not any("min" in text.get_text() for text in picture.draw(0).axes[0].texts)
         assert (FieldPicture(results, "syy", FieldOptions(shape=(8, 8)), [0]).values(0) < -0.099 * unit).all()
+
+
+def test_lines_of_zero_are_left_out_where_nothing_acts(griffith: Results, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They stay where values go through zero."""
+    def measure_zero_lines(values: NDArray[np.float64]) -> float:
+        picture = FieldPicture(griffith, "sxy", FieldOptions(limits=(-1.0, 1.0)), [0])
+        monkeypatch.setattr(picture, "values", lambda step: values)
+        drawn = picture.draw(0).axes[0].collections
+        lines = [each for each in drawn if np.allclose(each.get_linewidth(), 0.9)]
+        return float(sum(np.abs(np.diff(path.vertices, axis=0)).sum() for each in lines for path in each.get_paths()))
+
+    x = FieldPicture(griffith, "sxy", FieldOptions(), [0]).triangles.position.real
+    chance = np.random.default_rng(3)
+    assert measure_zero_lines(x) > 1
+    assert measure_zero_lines(np.where(x > 0, x, 0.0) + 1e-4 * chance.normal(size=len(x))) == 0

@@ -260,7 +260,7 @@ def test_rounding_is_shown_as_zero(tmp_path: Path) -> None:
 
 
 def test_lines_of_zero_are_left_out_where_nothing_acts(griffith: Results, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They stay where values go through zero."""
+    """They stay where values go through zero, and along the rim of where they do not act."""
     def measure_zero_lines(values: NDArray[np.float64]) -> float:
         picture = FieldPicture(griffith, "sxy", FieldOptions(limits=(-1.0, 1.0)), [0])
         monkeypatch.setattr(picture, "values", lambda step: values)
@@ -270,5 +270,5 @@ def test_lines_of_zero_are_left_out_where_nothing_acts(griffith: Results, monkey
 
     x = FieldPicture(griffith, "sxy", FieldOptions(), [0]).triangles.position.real
     chance = np.random.default_rng(3)
-    assert measure_zero_lines(x) > 1
-    assert measure_zero_lines(np.where(x > 0, x, 0.0) + 1e-4 * chance.normal(size=len(x))) == 0
+    once = measure_zero_lines(x)
+    assert once > 1 and 0 < measure_zero_lines(np.where(x > 0, x, 0.0) + 1e-4 * chance.normal(size=len(x))) < 2 * once

@@ -95,7 +95,7 @@ def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> F
 
 
 # Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes.
-MOST_DENSE, MOST_HIERARCHICAL = 120.0, 60e3
+MOST_DENSE, MOST_HIERARCHICAL = 120.0, 90e3
 
 
 def exceeds_at_most(model: Model, mesh: Mesh, ranks: int, granted: float) -> bool:

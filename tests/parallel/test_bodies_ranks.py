@@ -15,7 +15,7 @@ from scripts.bench_connected import write_layers, write_wall
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 
-@pytest.mark.parametrize("text", [write_wall(0.25), write_layers(0.15)], ids=["wall", "layers"])
+@pytest.mark.parametrize("text", [write_wall(0.25), write_layers(0.2)], ids=["wall", "layers"])
 def test_statuses_and_products_are_the_same_on_all_ranks(text: str, tmp_path: Path, mpirun: Launch) -> None:
     (tmp_path / "bodies.toml").write_text(text)
     results = []

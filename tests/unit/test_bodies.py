@@ -106,7 +106,7 @@ def test_units_change_no_count(tmp_path: Path) -> None:
 
 
 def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    layers = write_layers(0.15)
+    layers = write_layers(0.2)
     found, _ = run(layers, tmp_path)
     calls = []
 
@@ -119,6 +119,22 @@ def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch
     # The solution from which errors are estimated asks once, too.
     assert 1 <= len(calls) <= 2
     expect_same(found, by_groups)
+
+
+def test_bad_factors_are_made_anew_before_they_are_given_up() -> None:
+    problem = assemble_text(LAYERS)
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent)
+    preconditioner = tangent.preconditioner
+    modes = ModeState(np.full(problem.mesh.pairs.count, STICK, dtype=np.int8), np.ones(problem.mesh.pairs.count))
+    assert preconditioner.update(constrain(problem, modes)) == 1
+    modes.mode[0] = OPEN
+    assert preconditioner.update(constrain(problem, modes)) == 0  # a single pair
+    preconditioner.give_up()
+    assert preconditioner.update(constrain(problem, modes)) == 1 and preconditioner.whole
+    preconditioner.give_up()
+    assert preconditioner.update(constrain(problem, modes)) > 1 and not preconditioner.whole
+    tangent.destroy()
 
 
 def test_entries_and_operations_are_counted_as_dissection_gives_them() -> None:

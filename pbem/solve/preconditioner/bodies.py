@@ -138,13 +138,19 @@ class BodiesPreconditioner(SchwarzPreconditioner):
             with clock.piece("preconditioner"):
                 self._factors.factorise(constraints.matrix)
         except (ConvergenceError, MemoryError):
-            self.give_up()
+            self._drop()
             return super().update(constraints)
         self._drift = np.zeros_like(change)
         return 1
 
     def give_up(self) -> None:
-        """See SchwarzPreconditioner."""
+        """See SchwarzPreconditioner; factors of another constraint map are made anew first."""
+        if self._drift is not None and self._drift.any():
+            self._drift = np.full_like(self._drift, np.inf)
+        else:
+            self._drop()
+
+    def _drop(self) -> None:
         if self._factors is not None:
             self._factors.destroy()
         self._factors = self._formed = None
@@ -152,7 +158,7 @@ class BodiesPreconditioner(SchwarzPreconditioner):
     def drop_inverses(self) -> None:
         """See SchwarzPreconditioner."""
         super().drop_inverses()
-        self.give_up()
+        self._drop()
 
     def apply(self, residual: Real, result: Real) -> None:
         """See SchwarzPreconditioner (theory, 119)."""

@@ -80,7 +80,7 @@ class SchwarzPreconditioner:
         return False
 
     def give_up(self) -> None:
-        """Serve by the groups from now on."""
+        """Serve otherwise from now on, at last by the groups."""
 
     def drop_inverses(self) -> None:
         """Drop all inverses; `update` would form them anew."""

@@ -189,8 +189,12 @@ def _refine_and_solve(
 
 
 def _recall_mesh(model: Model, fractions: Fractions) -> Model:
-    """The model with the element ends of a file that is gone on with."""
-    return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None)
+    """The model with the element ends of a file that is gone on with; as it is if that is of other curves, which is
+    told where all of both is compared."""
+    try:
+        return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None)
+    except ValueError:
+        return model
 
 
 @dataclass(frozen=True)

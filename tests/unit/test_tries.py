@@ -13,7 +13,7 @@ import pytest
 
 import pbem
 from pbem import driver
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, ResultFileError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.refinement import count_elements, mark_near
 from pbem.passes import MOST_TRIES, MOST_UNKNOWNS, blame_tries, plan_finer
@@ -92,6 +92,19 @@ def test_a_run_that_settles_on_a_finer_mesh_is_finished_and_gone_on_with(
     largest = np.abs(more.displacement).max()
     once, twice = (more.displacement[step] for step in (len(results.steps) - 1, -1))
     np.testing.assert_allclose(twice, 2 * once, atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("first", ["right_lower", "top"])
+def test_a_file_of_other_curves_is_not_gone_on_with(
+    first: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    _fail_first(monkeypatch, 1)
+    case = tmp_path / "blocks.toml"
+    case.write_text(BLOCKS)
+    pbem.run(case, tmp_path / "blocks.h5")
+    case.write_text(BLOCKS.replace(first, "other"))
+    with pytest.raises(ResultFileError, match="other"):
+        pbem.run(case, tmp_path / "blocks.h5", resume=True)
 
 
 def test_a_run_that_never_settles_ends_with_its_reason_and_the_last_mesh(

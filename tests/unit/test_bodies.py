@@ -14,7 +14,6 @@ from pbem.bem.body_factors import choose_body_factors, count_body_factors
 from pbem.case.build import parse_model
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
-from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.parallel import world
@@ -110,9 +109,9 @@ def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch
     found, _ = run(layers, tmp_path)
     calls = []
 
-    def refuse(self: BodyFactors, constraints: object) -> None:
+    def refuse(self: BodyFactors, constraints: object) -> bool:
         calls.append(1)
-        raise ConvergenceError("singular tangent", "no factors")
+        return False
 
     monkeypatch.setattr(BodyFactors, "factorise", refuse)
     by_groups, _ = run(layers, tmp_path, newton_recycled="39")
@@ -135,6 +134,31 @@ def test_bad_factors_are_made_anew_before_they_are_given_up() -> None:
     preconditioner.give_up()
     assert preconditioner.update(constrain(problem, modes)) > 1 and not preconditioner.whole
     tangent.destroy()
+
+
+def test_a_singular_operator_has_no_factors(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = assemble_text(LAYERS)
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and tangent.preconditioner.whole
+    form = BodyFactors._form
+    monkeypatch.setattr(BodyFactors, "_form", lambda *given: 0.0 * form(*given))
+    assert tangent.preconditioner.update(constrain(problem, None)) == len(tangent.preconditioner.inverses)
+    assert not tangent.preconditioner.whole
+    tangent.destroy()
+
+
+def test_what_one_rank_lacks_alone_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others would wait for it where all of them factorise."""
+    problem = assemble_text(LAYERS)
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and tangent.preconditioner.whole
+
+    def lack(self: BodyFactors, *_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(BodyFactors, "_form", lack)
+    with pytest.raises(MemoryError):
+        tangent.preconditioner.update(constrain(problem, None))
 
 
 def test_entries_and_operations_are_counted_as_dissection_gives_them() -> None:

@@ -66,10 +66,11 @@ class BodyFactors:
         self._solver = LinearSolver(comm, "mumps", 2 * len(nodes), len(order), lambda part: part, OWN_PREFIX)
         self._blocks = [_make_block(mesh, local, nodes, int(region)) for region in np.unique(mesh.node_region[nodes])]
 
-    def factorise(self, constraints: sparse.csr_matrix) -> None:
+    def factorise(self, constraints: sparse.csr_matrix) -> bool:
         """Factorise K = B M for a constraint map M, with the anchors that act with it (theory, 119).
 
-        Raises ConvergenceError ("singular tangent" or "linear solver") or MemoryError on all ranks alike.
+        Returns on all ranks alike whether there are factors: not of a singular K, or without memory for them. Too
+        little memory to form K, which one rank can lack alone, is raised.
         """
         free = (self._local.free[number_components(self._nodes)] @ constraints).tocsr()
         begin, end = self._first, self._first + 2 * len(self._nodes)
@@ -87,7 +88,11 @@ class BodyFactors:
             row, unknown, value = freed
             values[row, np.searchsorted(places, self._place[unknown])] += value
             self._solver.fill(block.rows, places, values)
-        self._solver.factorise()
+        try:
+            self._solver.factorise()
+        except (ConvergenceError, MemoryError):
+            return False
+        return True
 
     def _form(self, block: Block, places: Integer, moved: tuple[Integer, Integer, Real]) -> Real:
         """A block's rows of K (2 k, c) without free terms in the columns of unknowns at places (c,).
@@ -134,10 +139,9 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         self._drift = change if self._drift is None else self._drift + change
         if np.count_nonzero(self._drift > self.most_drift) <= FEW_CHANGED:
             return 0
-        try:
-            with clock.piece("preconditioner"):
-                self._factors.factorise(constraints.matrix)
-        except (ConvergenceError, MemoryError):
+        with clock.piece("preconditioner"):
+            factored = self._factors.factorise(constraints.matrix)
+        if not factored:
             self._drop()
             return super().update(constraints)
         self._drift = np.zeros_like(change)

@@ -18,7 +18,7 @@ from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
-from pbem.model.refinement import Fractions, bisect_elements, impose_fractions
+from pbem.model.refinement import bisect_elements
 from pbem.parallel import (
     Comm,
     StopSignals,
@@ -29,7 +29,7 @@ from pbem.parallel import (
     lacks_memory,
     world,
 )
-from pbem.passes import Target, blame_pass, blame_tries, plan_finer
+from pbem.passes import Target, blame_pass, blame_tries, plan_finer, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.doubts import find_smooth
 from pbem.results.estimator import Estimator
@@ -156,7 +156,7 @@ def _refine_and_solve(
     one = Pass(1, 0)
     if target.resume:
         read = do_on_first(watch.comm, PbemError, lambda: read_refinement(target.path))
-        model, one = (model, one) if read is None else (_recall_mesh(model, read.fractions), read.one)
+        model, one = (model, one) if read is None else (recall_mesh(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
     first, tries, begun = model, 0, one.number
     while True:
@@ -186,15 +186,6 @@ def _refine_and_solve(
         # The next pass takes the place of this one in the file.
         one = Pass(one.number + 1, now.first_unknowns)
         model, target = bisect_elements(model, decision.marked, decision.gently), Target(target.path, False, True)
-
-
-def _recall_mesh(model: Model, fractions: Fractions) -> Model:
-    """The model with the element ends of a file that is gone on with; as it is if that is of other curves, which is
-    told where all of both is compared."""
-    try:
-        return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None)
-    except ValueError:
-        return model
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pbem.errors import ConvergenceError, PbemError
 from pbem.geometry.junction import format_point
 from pbem.mesh.generate import generate_mesh
 from pbem.model.model import Model
-from pbem.model.refinement import bisect_elements, count_elements, mark_near
+from pbem.model.refinement import Fractions, bisect_elements, count_elements, impose_fractions, mark_near
 from pbem.results.accuracy import Pass
 from pbem.wording import count
 
@@ -71,6 +71,15 @@ def _list_places(model: Model, places: Sequence[complex]) -> str:
     named = ", ".join(format_point(z + model.origin) for z in places[:MOST_NAMED])
     more = len(places) - MOST_NAMED
     return named + (f" and {count(more, 'more place')}" if more > 0 else "")
+
+
+def recall_mesh(model: Model, fractions: Fractions) -> Model:
+    """The model with the element ends of a file that is gone on with; as it is if that is of other curves, which is
+    told where all of both is compared."""
+    try:
+        return replace(impose_fractions(model, fractions), refined=model.analysis.accuracy is None)
+    except ValueError:
+        return model
 
 
 def blame_tries(error: ConvergenceError, tries: int, unknowns: int) -> ConvergenceError:

@@ -46,6 +46,48 @@ static int has_items(const Buffers *all, int at, Py_ssize_t items, size_t size)
     return 0;
 }
 
+/* Whether all numbers of an argument are from least on and below end. */
+static int are_within(const Buffers *all, int at, int64_t least, int64_t end)
+{
+    const int64_t *number = all->b[at].buf;
+    const Py_ssize_t count = all->b[at].len / (Py_ssize_t)sizeof *number;
+    for (Py_ssize_t j = 0; j < count; j++)
+        if (number[j] < least || number[j] >= end) {
+            PyErr_Format(PyExc_IndexError, "argument %d has %lld in place %zd, expected %lld to %lld", at,
+                         (long long)number[j], j, (long long)least, (long long)end - 1);
+            return 0;
+        }
+    return 1;
+}
+
+/* Whether numbers of an argument rise from 0 on, up to end at most: where each of several ranges begins. */
+static int are_ranges(const Buffers *all, int at, int64_t end)
+{
+    const int64_t *first = all->b[at].buf;
+    const Py_ssize_t count = all->b[at].len / (Py_ssize_t)sizeof *first;
+    if (!are_within(all, at, 0, end + 1)) return 0;
+    for (Py_ssize_t j = 1; j < count; j++)
+        if (first[j] < first[j - 1]) {
+            PyErr_Format(PyExc_ValueError, "argument %d falls in place %zd, expected rising numbers", at, j);
+            return 0;
+        }
+    return 1;
+}
+
+/* Whether parents, of which -1 is none, come before their children. */
+static int come_before(const Buffers *all, int at)
+{
+    const int64_t *parent = all->b[at].buf;
+    const Py_ssize_t count = all->b[at].len / (Py_ssize_t)sizeof *parent;
+    for (Py_ssize_t j = 0; j < count; j++)
+        if (parent[j] < -1 || parent[j] >= j) {
+            PyErr_Format(PyExc_IndexError, "argument %d has %lld in place %zd, expected -1 to %zd", at,
+                         (long long)parent[j], j, j - 1);
+            return 0;
+        }
+    return 1;
+}
+
 static int check_terms(Py_ssize_t terms)
 {
     if (terms > 0 && terms < MOST_POWERS - 1) return 1;
@@ -61,6 +103,26 @@ PyDoc_STRVAR(sum_doc,
 
 enum { BEGIN, POINTS, SHAPES, NUMBER, FAMILY, X, Y, DX, DY, WEIGHT, SHAPE, LENGTH, CROWD, FIRST, CENTER, RADIUS, KAPPA,
        MODULUS, VALUES, SUMS_OUT, SUMS_BUFFERS };
+
+/* Whether the integration points and nodes of all elements are there. */
+static int has_elements(const Buffers *all, const Elements *e, Py_ssize_t m)
+{
+    const Py_ssize_t points = all->b[X].len / (Py_ssize_t)sizeof(double);
+    const Py_ssize_t weights = all->b[WEIGHT].len / (Py_ssize_t)sizeof(double);
+    for (int i = X; i < WEIGHT; i++)
+        if (!has_items(all, i, points, sizeof(double))) return 0;
+    if (!has_items(all, SHAPE, e->nodes * weights, sizeof(double)) ||
+        !are_within(all, POINTS, 0, points + 1) || !are_within(all, BEGIN, 0, points + 1) ||
+        !are_within(all, SHAPES, 0, e->nodes * weights + 1) || !are_within(all, NUMBER, 0, e->all_nodes / e->nodes))
+        return 0;
+    for (Py_ssize_t at = 0; at < m; at++)
+        if (e->points[at] % LANES || e->begin[at] > points - e->points[at] ||
+            e->shapes[at] > e->nodes * (weights - e->points[at])) {
+            PyErr_Format(PyExc_IndexError, "integration points of element %zd are not there", at);
+            return 0;
+        }
+    return 1;
+}
 
 static PyObject *py_sum_moments(PyObject *Py_UNUSED(self), PyObject *args)
 {
@@ -89,6 +151,7 @@ static PyObject *py_sum_moments(PyObject *Py_UNUSED(self), PyObject *args)
         .weight = b[WEIGHT].buf, .shape = b[SHAPE].buf, .length = b[LENGTH].buf, .crowd = b[CROWD].buf,
         .nodes = (int)nodes, .all_nodes = b[VALUES].len / (4 * (Py_ssize_t)sizeof(double)),
     };
+    if (!has_elements(&all, &e, m) || !are_ranges(&all, FIRST, m)) goto end;
     const int64_t *first = b[FIRST].buf;
     const cplx *center = b[CENTER].buf;
     const double *radius = b[RADIUS].buf, *kappa = b[KAPPA].buf, *modulus = b[MODULUS].buf, *v = b[VALUES].buf;
@@ -116,7 +179,7 @@ static PyObject *py_lift(PyObject *Py_UNUSED(self), PyObject *args)
     if (!take_buffers(&all, args, 4, 1)) goto end;
     const Py_ssize_t terms = take_number(args, 4), count = all.b[0].len / (Py_ssize_t)sizeof(int64_t);
     if (!check_terms(terms) || !has_items(&all, 1, count, sizeof(cplx)) || !has_items(&all, 2, count, sizeof(double)) ||
-        !has_items(&all, 3, 2 * (terms + 1) * count, sizeof(cplx)))
+        !has_items(&all, 3, 2 * (terms + 1) * count, sizeof(cplx)) || !come_before(&all, 0))
         goto end;
     const int64_t *parent = all.b[0].buf;
     const cplx *center = all.b[1].buf;
@@ -147,7 +210,8 @@ static PyObject *py_lower(PyObject *Py_UNUSED(self), PyObject *args)
     if (!take_buffers(&all, args, 5, 1)) goto end;
     const Py_ssize_t terms = take_number(args, 5), count = all.b[0].len / (Py_ssize_t)sizeof(int64_t);
     if (!check_terms(terms) || !has_items(&all, 1, count, 1) || !has_items(&all, 2, count, sizeof(cplx)) ||
-        !has_items(&all, 3, count, sizeof(double)) || !has_items(&all, 4, 2 * (terms + 1) * count, sizeof(cplx)))
+        !has_items(&all, 3, count, sizeof(double)) || !has_items(&all, 4, 2 * (terms + 1) * count, sizeof(cplx)) ||
+        !come_before(&all, 0))
         goto end;
     const int64_t *parent = all.b[0].buf;
     const char *wanted = all.b[1].buf;
@@ -192,7 +256,8 @@ static PyObject *py_carry(PyObject *Py_UNUSED(self), PyObject *args)
         !has_items(&all, SOURCE_RADIUS, sources, sizeof(double)) ||
         !has_items(&all, WEIGHTS, (terms + 2) * (terms + 1), sizeof(double)) ||
         !has_items(&all, MOMENTS, size * sources, sizeof(cplx)) ||
-        !has_items(&all, FIELDS, size * targets, sizeof(cplx)))
+        !has_items(&all, FIELDS, size * targets, sizeof(cplx)) || !are_within(&all, TARGET, 0, targets) ||
+        !are_within(&all, SOURCE, 0, sources))
         goto end;
     const int64_t *target = b[TARGET].buf, *source = b[SOURCE].buf;
     const cplx *to = b[TARGET_CENTER].buf, *from = b[SOURCE_CENTER].buf, *moments = b[MOMENTS].buf;
@@ -235,7 +300,8 @@ static PyObject *py_evaluate(PyObject *Py_UNUSED(self), PyObject *args)
         !has_items(&all, NORMAL, points, sizeof(cplx)) || !has_items(&all, ALL_RADIUS, clusters, sizeof(double)) ||
         !has_items(&all, OWN_KAPPA, count, sizeof(double)) || !has_items(&all, OWN_MODULUS, count, sizeof(double)) ||
         !has_items(&all, FIELD, 2 * (terms + 1) * clusters, sizeof(cplx)) ||
-        !has_items(&all, OUT, points, sizeof(cplx)))
+        !has_items(&all, OUT, points, sizeof(cplx)) || !are_within(&all, CLUSTER, 0, clusters) ||
+        !are_ranges(&all, AT, points))
         goto end;
     const int64_t *cluster = b[CLUSTER].buf, *first = b[AT].buf;
     const cplx *point = b[POINT].buf, *normal = b[NORMAL].buf, *center = b[ALL_CENTER].buf, *fields = b[FIELD].buf;

@@ -160,6 +160,55 @@ def test_arguments_of_wrong_lengths_are_refused() -> None:
         densities.sum_up(make_values(mesh), first, center, np.ones(1), kappa, modulus, 5)
 
 
+@pytest.mark.parametrize("at", [-1, 1])
+def test_numbers_of_what_is_not_there_are_refused(at: int) -> None:
+    """One before the first and one behind the last of what there is."""
+    targets, sources, met = make_trees(np.random.default_rng(0))
+    terms, ends = 7, np.array([0, 3, 5])
+    moments = np.zeros((sources.clusters, 2, terms + 1), dtype=complex)
+    fields = np.zeros((targets.clusters, 2, terms + 1), dtype=complex)
+
+    def move(numbers: np.ndarray, count: int) -> np.ndarray:
+        moved = numbers.copy()
+        moved[-1] = -1 if at < 0 else count
+        return moved
+
+    length = np.ones(targets.clusters)
+    for target, source in ((move(met.far_target, targets.clusters), met.far_source),
+                           (met.far_target, move(met.far_source, sources.clusters))):
+        with pytest.raises(IndexError, match="argument"):
+            carry(targets, length, target, sources, source, moments, fields)
+    wrong = replace(sources, parent=np.where(sources.parent < 0, -2 if at < 0 else sources.clusters, sources.parent))
+    with pytest.raises(IndexError, match="expected -1 to"):
+        lift(wrong, moments)
+    with pytest.raises(IndexError, match="expected -1 to"):
+        lower(wrong, np.ones(sources.clusters, dtype=bool), moments)
+    points = FieldPoints(np.array([1, 2]), ends, np.zeros(5, complex), np.zeros(5, complex), np.ones(2), np.ones(2))
+    for changed in ({"cluster": move(points.cluster, targets.clusters)}, {"first": move(ends, 6)}):
+        with pytest.raises(IndexError, match="argument"):
+            replace(points, **changed).evaluate(fields, targets)
+    with pytest.raises(ValueError, match="falls"):
+        replace(points, first=np.array([4, 3, 5])).evaluate(fields, targets)
+
+
+@pytest.mark.parametrize("key", ["begin", "points", "shapes", "number", "first"])
+@pytest.mark.parametrize("below", [True, False])
+def test_elements_that_are_not_there_are_refused(key: str, below: bool) -> None:
+    mesh, materials, _ = make_mesh("cracks", 2)
+    densities, first, ones = place_densities(mesh, np.arange(3), 5), np.array([0, 3]), np.ones(1)
+    arguments = (np.zeros(1, dtype=complex), ones, ones, ones, 5)
+    densities.sum_up(make_values(mesh), first, *arguments)
+    changed = (first if key == "first" else getattr(densities, key)).copy()
+    beyond = {"number": mesh.elements, "first": 4}.get(key, 4000)
+    changed[-1] = -4 if below else beyond
+    if key == "first":
+        first = changed
+    else:
+        densities = replace(densities, **{key: changed})
+    with pytest.raises(IndexError, match="argument|integration points"):
+        densities.sum_up(make_values(mesh), first, *arguments)
+
+
 def test_weak_entries_lose_less_than_a_part_in_ten_billion_of_the_largest() -> None:
     random = np.random.default_rng(5)
     rows, elements, width = 10, 30, 6

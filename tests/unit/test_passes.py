@@ -194,7 +194,7 @@ def test_numbers_of_what_is_not_there_are_refused(at: int) -> None:
 @pytest.mark.parametrize("key", ["begin", "points", "shapes", "number", "first"])
 @pytest.mark.parametrize("below", [True, False])
 def test_elements_that_are_not_there_are_refused(key: str, below: bool) -> None:
-    mesh, materials, _ = make_mesh("cracks", 2)
+    mesh, _, _ = make_mesh("cracks", 2)
     densities, first, ones = place_densities(mesh, np.arange(3), 5), np.array([0, 3]), np.ones(1)
     arguments = (np.zeros(1, dtype=complex), ones, ones, ones, 5)
     densities.sum_up(make_values(mesh), first, *arguments)
@@ -205,7 +205,7 @@ def test_elements_that_are_not_there_are_refused(key: str, below: bool) -> None:
         first = changed
     else:
         densities = replace(densities, **{key: changed})
-    with pytest.raises(IndexError, match="argument|integration points"):
+    with pytest.raises(IndexError, match=r"argument|integration points"):
         densities.sum_up(make_values(mesh), first, *arguments)
 
 

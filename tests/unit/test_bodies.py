@@ -147,6 +147,16 @@ def test_a_singular_operator_has_no_factors(monkeypatch: pytest.MonkeyPatch) -> 
     tangent.destroy()
 
 
+def test_options_that_ask_for_no_factors_leave_it_to_the_groups() -> None:
+    problem = assemble_text(LAYERS)
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and tangent.preconditioner.whole
+    with petsc_options({"bodies_pc_type": "jacobi"}):
+        tangent.preconditioner.update(constrain(problem, None))
+    assert not tangent.preconditioner.whole
+    tangent.destroy()
+
+
 def test_what_one_rank_lacks_alone_is_not_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others would wait for it where all of them factorise."""
     problem = assemble_text(LAYERS)

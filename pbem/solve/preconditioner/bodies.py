@@ -69,8 +69,9 @@ class BodyFactors:
     def factorise(self, constraints: sparse.csr_matrix) -> bool:
         """Factorise K = B M for a constraint map M, with the anchors that act with it (theory, 119).
 
-        Returns on all ranks alike whether there are factors: not of a singular K, or without memory for them. Too
-        little memory to form K, which one rank can lack alone, is raised.
+        Returns on all ranks alike whether there are factors: not of a singular K, without memory for them, or where
+        the user's options put something else in their place. Too little memory to form K, which one rank can lack
+        alone, is raised.
         """
         free = (self._local.free[number_components(self._nodes)] @ constraints).tocsr()
         begin, end = self._first, self._first + 2 * len(self._nodes)
@@ -92,7 +93,7 @@ class BodyFactors:
             self._solver.factorise()
         except (ConvergenceError, MemoryError):
             return False
-        return True
+        return self._solver.factored
 
     def _form(self, block: Block, places: Integer, moved: tuple[Integer, Integer, Real]) -> Real:
         """A block's rows of K (2 k, c) without free terms in the columns of unknowns at places (c,).

@@ -92,7 +92,7 @@ class KrylovTangent(TangentOperator):
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
         self._space = MinimalResidual(problem.comm, Rows(self), MOST_ITERATIONS)
-        self.recycled = RecycledSpace(problem.comm, 0 if nearby else MOST_KEPT)
+        self.recycled = _choose_recycled(problem)
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
@@ -337,7 +337,7 @@ class KrylovTangent(TangentOperator):
         self.problem, self.expected, self._sweeps = problem, None, None
         self.preconditioner.most_drift = MOST_DRIFT
         self._space.forget()
-        self.recycled.drop()
+        self.recycled = _choose_recycled(problem)
 
     def destroy(self) -> None:
         """See TangentOperator."""
@@ -346,6 +346,13 @@ class KrylovTangent(TangentOperator):
         self.preconditioner.drop_inverses()
         for item in (self._solver, self._matrix, self._right, self._left):
             item.destroy()
+
+
+def _choose_recycled(problem: Problem) -> RecycledSpace:
+    """Directions of former systems are not kept of networks of cracks, nor where faces dilate: the columns of all pairs
+    that slip then change at once and by much, and what is left of the directions leads astray."""
+    dilates = any(group.law.dilates for group in problem.laws.strengths)
+    return RecycledSpace(problem.comm, 0 if dilates or answers_nearby(problem) else MOST_KEPT)
 
 
 def _choose_options() -> dict[str, str]:

@@ -11,7 +11,7 @@ from mpi4py import MPI
 import pbem
 from pbem.solve.nonlinear import forcing
 from pbem.solve.petsc.minimal_residual import MinimalResidual
-from pbem.solve.petsc.session import PETSc
+from pbem.solve.petsc.session import PETSc, pass_over_divergence
 from pbem.solve.preconditioner import subdomains as groups
 from tests.identities.kelvin import Real
 from tests.unit.far_sample import INCLUSIONS
@@ -123,6 +123,28 @@ def test_directions_serve_for_other_right_hand_sides() -> None:
     assert system.products <= before + 1
     expected = np.linalg.solve(system.matrix, system.turn(both))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+def test_what_is_no_number_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Directions that overflow end a solution where it began, with a reason that is not that of PETSc's arguments."""
+    system, right = Dense(40, 0), np.random.default_rng(3).normal(size=40)
+    space = MinimalResidual(MPI.COMM_SELF, system, 100)
+    add = MinimalResidual._add
+
+    def overflow(self: MinimalResidual, given: Real) -> bool:
+        added = add(self, given)
+        if self._count == 5:
+            self._products[0, 4] = np.nan
+        return added
+
+    monkeypatch.setattr(MinimalResidual, "_add", overflow)
+    with pass_over_divergence(), pytest.raises(AssertionError):
+        solve(system, space, right, 1e-12)
+    np.testing.assert_allclose(space.residual, right, rtol=0, atol=1e-13)
+    monkeypatch.undo()
+    found = solve(system, space, right, 1e-12)
+    expected = np.linalg.solve(system.matrix, system.turn(right))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
 
 @pytest.fixture

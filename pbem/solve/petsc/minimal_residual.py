@@ -77,7 +77,7 @@ class MinimalResidual:
 
     def solve(self, solver: PETSc.KSP, right: PETSc.Vec, left: PETSc.Vec) -> None:
         """What PETSc asks of a Krylov method; begins at zero (theory, 87)."""
-        residual = self._rows.turn(np.array(right.getArray(readonly=True)))
+        begun = residual = self._rows.turn(np.array(right.getArray(readonly=True)))
         judged = self._rows.judged
         if self._count >= self._most:
             self.forget()
@@ -103,6 +103,9 @@ class MinimalResidual:
             if not reason and self._count >= self._most:
                 reason = PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
         solver.setConvergedReason(reason)
+        if reason == PETSc.KSP.ConvergedReason.DIVERGED_NANORINF:  # nothing of it can be used
+            self.forget()
+            shares, residual = np.zeros(0), begun
         parts = solve_triangular(self._factor[: self._count, : self._count], shares) if self._count else shares
         left.setArray(self._directions[:, : self._count] @ parts if self._count else np.zeros(len(residual)))
         self.residual = self._rows.turn_back(residual)
@@ -150,13 +153,13 @@ class MinimalResidual:
 
 def _ask(solver: PETSc.KSP, number: int, norm: float, first: float) -> int:
     """PETSc's reason to end after so many iterations, 0 for none; tells its monitors. first: the norm at the start."""
+    reasons = PETSc.KSP.ConvergedReason
     solver.setIterationNumber(number)
+    if not np.isfinite(norm):  # which PETSc refuses to be told
+        return int(reasons.DIVERGED_NANORINF)
     solver.setResidualNorm(norm)
     solver.monitor(number, norm)
     relative, absolute, _, most = solver.getTolerances()
-    reasons = PETSc.KSP.ConvergedReason
-    if not np.isfinite(norm):
-        return int(reasons.DIVERGED_NANORINF)
     if norm <= absolute:
         return int(reasons.CONVERGED_ATOL)
     if norm <= relative * first:

@@ -22,6 +22,7 @@ from pbem.solve.steps.ceiling import SAFE, Ceiling
 from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, find_reason, refuse_load
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
+from pbem.solve.steps.softly import solve_softly
 from pbem.solve.steps.step_notes import note_imbalance, note_nonlinearity, note_passing
 from pbem.solve.steps.values import refuse_without_value
 
@@ -151,9 +152,9 @@ def _advance(
     while True:
         reporter.start_step(stage, reached, target)
         refuse_without_value(problem, stage, reached, target)
+        load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
+        begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
         try:
-            load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
-            begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
             guessed = guess and guess(stage, target, begin, load.pressure)
             with note_place(stage, target):
                 solution = _solve_guessed(problem, tangent, begin, load, reporter, guessed)
@@ -165,6 +166,11 @@ def _advance(
         except ConvergenceError as failure:
             error = find_reason(problem, memory, stage, target, failure)
             balanced = find_balanced(problem, memory, stage, reached, target)
+            if balanced >= target and not hurried:
+                with note_place(stage, target):
+                    solution = solve_softly(problem, tangent, begin, load, reporter, error)
+                if solution is not None:
+                    return solution, target, ceiling.pass_by(target)
             if proportional():
                 if balanced < target and error.reason != "free motion":
                     ceiling = ceiling.lower(target, balanced, error)

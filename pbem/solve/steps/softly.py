@@ -1,0 +1,63 @@
+"""The statuses of a contact that is made stiffer in steps, for load steps whose own search does not settle.
+
+Blocks that rest on single pairs, as voussoirs and blocks that topple do near the largest load, are nearly free: an
+iteration turns them by far more than there is room for, and takes the statuses of all around with them. With a
+compliance in front of the law of every pair, as of an elastic joint, they sink into what they touch until several pairs
+hold them, and the statuses come to rest. From these the true contact is searched for in the end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pbem.contact.laws import Memory, find_linear
+from pbem.contact.loads import Load
+from pbem.errors import ConvergenceError
+from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import Iteration, Reporter
+from pbem.solve.problem.tangent import TangentOperator
+
+# Compliances of the pairs, one after the other, in lengths of the pair over the modulus beside it.
+SOFTNESS = (1.0, 0.03, 0.001)
+# What a search can end with that did not settle.
+UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh")
+
+
+def solve_softly(
+    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Reporter, error: ConvergenceError
+) -> Solution | None:
+    """A load step whose search has ended with an error, by statuses of softer contacts; None if these do not settle.
+
+    The solution is one of the true laws, found by their own search. Its iterations are those of all contacts. None,
+    too, for crack networks and large models, whose groups settle by themselves, for laws that are not linear in each
+    status, and for other errors.
+    """
+    if error.reason not in UNSETTLED or tangent.settling.nearby or not find_linear(problem.laws).all():
+        return None
+    iterations: list[Iteration] = []
+    guess = begin
+    try:
+        for each in (*(soften(problem, softness) for softness in SOFTNESS), problem):
+            found = solve_step(each, tangent, guess, load, reporter, hurried=True, once=True)
+            iterations += [replace(one, number=len(iterations) + k) for k, one in enumerate(found.iterations, 1)]
+            guess = replace(begin, modes=found.modes)
+    except ConvergenceError:
+        return None
+    if problem.comm.rank == 0:
+        reporter.note(
+            "Statuses of the contacts did not settle by themselves; they were found from those of contacts that were "
+            "made stiffer in steps."
+        )
+    return replace(found, memory=replace(found.memory, modes=begin.modes), iterations=tuple(iterations))
+
+
+def soften(problem: Problem, softness: float) -> Problem:
+    """The problem with soft pairs (theory, 121); what is known of its bodies stays known."""
+    laws = problem.laws
+    compliance = softness / laws.own_stiffness
+    result = replace(problem, laws=replace(
+        laws, compliance_n=laws.compliance_n + compliance, compliance_s=laws.compliance_s + compliance,
+    ))  # fmt: skip
+    vars(result).update({name: value for name, value in vars(problem).items() if name not in vars(result)})
+    return result

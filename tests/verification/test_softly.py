@@ -1,0 +1,71 @@
+"""Statuses by way of softer contacts: they lead to the solution of the true laws, and to no other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbem.case.build import parse_model
+from pbem.contact.laws import SLIP, STICK, commit, start_memory
+from pbem.errors import ConvergenceError
+from pbem.mesh.generate import generate_mesh
+from pbem.parallel import world
+from pbem.solve.nonlinear.newton import solve_step
+from pbem.solve.steps.softly import SOFTNESS, soften, solve_softly
+from pbem.solve.system.assembly import assemble_problem
+from tests.verification.test_limit_load import write_pushed_block
+from tests.verification.test_settling import Listener
+
+CYCLE = ConvergenceError("mode cycle", "pairs that still change")
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+@pytest.mark.parametrize("stage", [0, 1])
+def test_the_solution_is_that_of_the_true_laws(stage: int, unit: float) -> None:
+    """From rest, and after a step that the pairs remember."""
+    law = {"friction": 0.25, "cohesion": 0.01}
+    model = parse_model(write_pushed_block(0.2, law, unit))[1]
+    problem, listener = assemble_problem(model, generate_mesh(model), world), Listener()
+    tangent = problem.make_tangent()
+    memory = start_memory(problem.laws)
+    for before in range(stage):
+        pressed = problem.evaluate_load(before, 1.0)
+        done = solve_step(problem, tangent, memory, pressed, listener)
+        memory = commit(problem.laws, done.memory, done.modes, done.pairs, pressed.pressure)
+    load = problem.evaluate_load(stage, 1.0)
+    own = solve_step(problem, tangent, memory, load, listener)
+    softly = solve_softly(problem, tangent, memory, load, listener, CYCLE)
+    assert softly is not None
+    np.testing.assert_array_equal(softly.modes.mode, own.modes.mode)
+    assert stage == 0 or {SLIP, STICK} <= set(own.modes.mode)
+    for name in ("p_n", "p_s"):
+        np.testing.assert_allclose(getattr(softly.pairs, name), getattr(own.pairs, name), atol=1e-9)
+    np.testing.assert_allclose(softly.v, own.v, atol=1e-9 * np.abs(own.v).max())
+    np.testing.assert_array_equal(softly.memory.modes.mode, memory.modes.mode)
+    assert [each.number for each in softly.iterations] == list(range(1, len(softly.iterations) + 1))
+    assert len(softly.iterations) > len(SOFTNESS)
+    assert any("made stiffer in steps" in note for note in listener.notes)
+
+
+def test_other_errors_and_laws_are_left_alone() -> None:
+    for law, error in (
+        ({"friction": 0.25}, ConvergenceError("free motion", "nothing holds it")),
+        ({"friction": 0.25, "friction_dynamic": 0.1, "slip_distance": 1.0}, CYCLE),
+    ):
+        model = parse_model(write_pushed_block(0.2, law))[1]
+        problem = assemble_problem(model, generate_mesh(model), world)
+        tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
+        assert solve_softly(problem, tangent, start_memory(problem.laws), load, Listener(), error) is None
+
+
+def test_a_soft_contact_gives_way_by_its_traction() -> None:
+    """Uniform pressure: the faces of all pairs sink in by c times the pressure, with their own c."""
+    model = parse_model(write_pushed_block(0.0, {"friction": 0.25}))[1]
+    problem = assemble_problem(model, generate_mesh(model), world)
+    soft = soften(problem, 0.5)
+    done = solve_step(soft, problem.make_tangent(), start_memory(problem.laws),
+                      problem.evaluate_load(0, 1.0), Listener())  # fmt: skip
+    expected = 0.5 * done.pairs.p_n / problem.laws.own_stiffness
+    assert np.abs(expected).max() > 0
+    np.testing.assert_allclose(done.pairs.g_n, expected, atol=1e-12 * np.abs(expected).max() + 1e-15)
+    assert problem.laws.compliance_n.max() == 0

@@ -13,7 +13,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import world
 from pbem.solve.nonlinear.unsettled import Unsettled
-from pbem.solve.steps import march
+from pbem.solve.steps import march, softly
 from pbem.solve.steps.ends import find_reason
 from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
 from pbem.solve.system.assembly import assemble_problem
@@ -95,12 +95,13 @@ def test_a_run_comes_to_its_limit_load_in_a_few_steps() -> None:
 
 def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: pytest.MonkeyPatch) -> None:
     # What forces could balance is then the whole step, however little it is more than what was reached.
-    def fail(*_: object) -> None:
+    def fail(*_: object, **__: object) -> None:
         raise ConvergenceError("mode cycle", "as it is made to")
 
     problem = parse_model(write_pushed_block(0.2, {"friction": 0.25}))[1]
     assembled = assemble_problem(problem, generate_mesh(problem), world)
-    monkeypatch.setattr(march, "solve_step", fail)
+    for searches in (march, softly):
+        monkeypatch.setattr(searches, "solve_step", fail)
     start = replace(march.start_from_rest(assembled), number=2, stage=1, factor=0.499)
     with pytest.raises(ConvergenceError) as caught:
         next(march.march(assembled, Listener(), start))
@@ -110,10 +111,10 @@ def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: 
 @pytest.mark.parametrize("steps", [1, 2, 7])
 def test_a_search_that_fails_far_below_the_bound_keeps_its_reason(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
     # Friction bears 0.25 of 0.7; the search is made to fail at 0.2 and above.
-    def fail(*arguments: object) -> object:
+    def fail(*arguments: object, **options: object) -> object:
         if listener.target > 0.2:
             raise ConvergenceError("mode cycle", "as it is made to")
-        return solve(*arguments)  # type: ignore[arg-type]
+        return solve(*arguments, **options)  # type: ignore[arg-type]
 
     class Told(Listener):
         target = 0.0
@@ -123,7 +124,8 @@ def test_a_search_that_fails_far_below_the_bound_keeps_its_reason(steps: int, mo
             self.target = target if stage else 0.0
 
     solve, listener = march.solve_step, Told()
-    monkeypatch.setattr(march, "solve_step", fail)
+    for searches in (march, softly):
+        monkeypatch.setattr(searches, "solve_step", fail)
     with pytest.raises(ConvergenceError, match=r"as it is made to; no forces .* beyond 0\.35") as caught:
         run(write_pushed_block(0.7, {"friction": 0.25}).replace("steps = 2", f"steps = {steps}"), listener)
     assert caught.value.reason == "mode cycle"

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
 from pbem.errors import CaseError
+from pbem.model.varying import Places, evaluate
 
 BLOCKS = """
 materials.m = { young = 1e3, poisson = 0.3, expansion = 1e-5 }
@@ -77,14 +82,22 @@ def test_a_wrong_condition_is_told(text: str, place: str, pieces: list[str]) -> 
         assert piece in str(fault)
 
 
-@pytest.mark.parametrize("text", [
-    '[boundary.left1]\nforce = { how = "linear" }\n[[stages]]\n[stages.boundary.left1]\nforce = { moment = 1.0 }',
-    "[boundary.left1]\nforce = {}\n[[stages]]\n[[stages]]\n[stages.boundary.left1]\nforce = { fy = 1.0 }",
-    "[point_loads.p]\nat = [1.0, 1.5]\n[[stages]]\n[stages.point_loads.p]\nfx = 1.0",
-    "[boundary.left1]\nrigid = {}",
+# The beginning of the curve left1.
+END = Places(np.array([2j]), np.zeros(1))
+
+
+@pytest.mark.parametrize(("text", "find", "expected"), [
+    ('[boundary.left1]\nforce = { how = "linear" }\n[[stages]]\n[stages.boundary.left1]\nforce = { moment = 1.0 }',
+     # A linear traction of the moment 1 on the length 1: 12 times the distance from the middle, 6 at its end.
+     lambda stages: [abs(evaluate(stages[-1].boundary["left1"][0], END).item())], [6.0]),
+    ("[boundary.left1]\nforce = {}\n[[stages]]\n[[stages]]\n[stages.boundary.left1]\nforce = { fy = 1.0 }",
+     lambda stages: [each.boundary["left1"] for each in stages], [(0.0, 0.0), (0.0, 1.0)]),
+    ("[point_loads.p]\nat = [1.0, 1.5]\n[[stages]]\n[stages.point_loads.p]\nfx = 1.0",
+     lambda stages: [each.point_forces["p"] for each in stages], [(1.0, 0.0, 0.0)]),
+    ("[boundary.left1]\nrigid = {}", lambda stages: [each.rigid["left1"] for each in stages], [(0.0, 0.0, 0.0)]),
 ])  # fmt: skip
-def test_values_may_come_with_the_stages(text: str) -> None:
-    parse_model(BLOCKS + text)
+def test_values_may_come_with_the_stages(text: str, find: Callable[[Any], list[Any]], expected: list[Any]) -> None:
+    assert find(parse_model(BLOCKS + text)[1].stages) == pytest.approx(expected)
 
 
 PULLS = {

@@ -1,0 +1,40 @@
+"""The same case on several numbers of ranks: run, and held against the first of them."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pbem.results.reader import Results, open_results
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def run_hierarchical(
+    mpirun: Launch, folder: Path, text: str, ranks: Sequence[int], *options: str
+) -> list[Results]:
+    """The results of a case by the hierarchical operator, on each of these numbers of ranks; options: of PETSc."""
+    (folder / "case.toml").write_text(text)
+    results = []
+    for count in ranks:
+        done = mpirun(count, "run", "case.toml", "-o", f"{count}.h5", "--quiet", "--operator", "hierarchical",
+                      *options, cwd=folder)  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        results.append(open_results(folder / f"{count}.h5"))
+    return results
+
+
+def expect_same_search(results: Sequence[Results]) -> None:
+    """Products and statuses are the same, and there are several statuses; fields agree to the tolerance of products."""
+    alone = results[0]
+    assert any(np.ptp(each.mode[-1]) > 0 for each in alone.contact.values())
+    for other in results[1:]:
+        np.testing.assert_array_equal(other.convergence["products"], alone.convergence["products"])
+        for name, contact in alone.contact.items():
+            np.testing.assert_array_equal(other.contact[name].mode, contact.mode)
+        for field in ("displacement", "traction"):
+            values = getattr(alone, field)
+            np.testing.assert_allclose(getattr(other, field), values, rtol=0, atol=1e-9 * np.abs(values).max())

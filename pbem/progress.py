@@ -14,7 +14,7 @@ from pbem.model.model import Model, Stage
 from pbem.solve.problem.step import Iteration, Reporter, SilentReporter, Step
 
 
-class Plan:
+class PlannedSteps:
     """The planned steps of all stages, and where in them a run is."""
 
     def __init__(self, stages: tuple[Stage, ...]) -> None:
@@ -39,7 +39,7 @@ class LogReporter:
         self._begun: float | None = None
 
     def begin(self, model: Model) -> None:
-        self._plan, self._number = Plan(model.stages), None
+        self._plan, self._number = PlannedSteps(model.stages), None
 
     def note(self, text: str) -> None:
         self._say(f"note: {text}")
@@ -87,7 +87,7 @@ class BarReporter:
     def begin(self, model: Model) -> None:
         from tqdm import tqdm
 
-        self._plan = Plan(model.stages)
+        self._plan = PlannedSteps(model.stages)
         self._name = ""
         self._bar = tqdm(
             total=self._plan.steps, file=self._stream, unit="step", dynamic_ncols=True, mininterval=0.1, leave=True,

@@ -45,17 +45,17 @@ def evaluate_hoop_stress(
     stress = np.empty(len(region))
     order = np.argsort(region, kind="stable")
     bounds = np.searchsorted(region[order], np.arange(len(initial) + 1))
-    for number, background in enumerate(initial):
+    for number, particular in enumerate(initial):
         own = order[bounds[number] : bounds[number + 1]]
         n, e = normal[own], direction[own]
-        at_rest = ParticularSolution(background.material, initial=background.initial)
+        at_rest = ParticularSolution(particular.material, initial=particular.initial)
         rest_n = (np.conj(n) * at_rest.traction(position[own], n)).real
         rest_s = (np.conj(e) * at_rest.traction(position[own], e)).real
-        elastic = strain[own] - background.swelling.strain_along(position[own], e)
-        kappa = background.material.kappa
+        elastic = strain[own] - particular.swelling.strain_along(position[own], e)
+        kappa = particular.material.kappa
         lateral = (3 - kappa) / (1 + kappa)  # Poisson's ratio of the plane problem
         pressed = (np.conj(n) * traction[own]).real - rest_n
-        stress[own] = rest_s + background.material.plane_modulus * elastic + lateral * pressed
+        stress[own] = rest_s + particular.material.plane_modulus * elastic + lateral * pressed
     return stress
 
 
@@ -69,19 +69,19 @@ class PointFields:
     hoop_stress: Real
 
 
-def sample_points(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> PointFields | None:
+def sample_points(mesh: Mesh, particulars: Sequence[ParticularSolution]) -> PointFields | None:
     """The fields of the regions' point loads on all faces; None if there are none."""
-    if not any(each.points for each in backgrounds):
+    if not any(each.points for each in particulars):
         return None
     second = second_face_nodes(mesh)
     region = np.concatenate([mesh.node_region, mesh.node_region[second]])
     position = np.concatenate([mesh.position, mesh.position[second]])
     normal = np.concatenate([mesh.normal, -mesh.normal[second]])
     moved, carried, along = np.zeros(len(region), complex), np.zeros(len(region), complex), np.zeros(len(region))
-    for number, background in enumerate(backgrounds):
+    for number, particular in enumerate(particulars):
         own = np.flatnonzero(region == number)
-        if background.points and len(own):
-            fields, n = background.of_points, normal[own]
+        if particular.points and len(own):
+            fields, n = particular.of_points, normal[own]
             moved[own] = fields.displacement(position[own])
             carried[own] = fields.traction(position[own], n)
             along[own] = (np.conj(1j * n) * fields.traction(position[own], 1j * n)).real

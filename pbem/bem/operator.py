@@ -29,7 +29,7 @@ CHUNK_BYTES = 2_000_000
 
 
 @dataclass(frozen=True)
-class Block:
+class RegionRows:
     """Dense rows of one region: rows (2 k,) from this rank's first row on; columns index v; matrix (2 k, columns)."""
 
     region: int
@@ -44,7 +44,7 @@ class RowOperator:
 
     first_node: int
     last_node: int
-    blocks: tuple[Block, ...]
+    blocks: tuple[RegionRows, ...]
     free: sparse.csr_matrix
 
     @property
@@ -63,7 +63,7 @@ class RowOperator:
             result[block.rows] += block.matrix @ v[block.columns]
         return result
 
-    def multiply_block(self, block: Block, constraints: sparse.csr_matrix, columns: Integer) -> Real:
+    def multiply_block(self, block: RegionRows, constraints: sparse.csr_matrix, columns: Integer) -> Real:
         """A block's rows of B M, dense, in the given columns of the constraint map M."""
         chosen = constraints[:, columns]
         product: Real = (chosen[block.columns].T @ block.matrix.T).T
@@ -112,7 +112,7 @@ def assemble_rows(
             whole = form_rigid_rows(mesh, int(region), materials[region])
             matrix = whole[np.ix_(number_components(own - _region_nodes(mesh, int(region))[0]), _own_columns(
                 mesh, int(region), columns))]
-            blocks.append(Block(int(region), rows, columns, matrix))
+            blocks.append(RegionRows(int(region), rows, columns, matrix))
             continue
         matrix = np.empty((2 * len(own), len(columns)))
         scratch = _allocate_scratch(sources[region])
@@ -120,14 +120,16 @@ def assemble_rows(
             traction = bool(mesh.traction_equation[part[0]])
             values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction, scratch)
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
-        blocks.append(Block(int(region), rows, columns, matrix))
+        blocks.append(RegionRows(int(region), rows, columns, matrix))
     return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
 
 
-def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes: Integer, needed: Bool) -> list[Block]:
+def assemble_displacement_rows(
+    mesh: Mesh, materials: Sequence[Material], nodes: Integer, needed: Bool
+) -> list[RegionRows]:
     """Blocks whose product with v is the displacement -int T u + int U t at the given crack nodes (theory, 13).
 
-    There it is the mean displacement of the two faces. Block.rows count from the first of the given nodes.
+    There it is the mean displacement of the two faces. RegionRows.rows count from the first of the given nodes.
     """
     sources = collect_sources(mesh, materials)
     node_region = mesh.node_region
@@ -139,7 +141,7 @@ def assemble_displacement_rows(mesh: Mesh, materials: Sequence[Material], nodes:
         scratch = _allocate_scratch(sources[region])
         for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), scratch):
             matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False, scratch)
-        blocks.append(Block(int(region), number_components(at), columns, matrix))
+        blocks.append(RegionRows(int(region), number_components(at), columns, matrix))
     return blocks
 
 

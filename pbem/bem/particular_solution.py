@@ -1,8 +1,9 @@
 """Fields that satisfy equilibrium by themselves: linear stress and gravity. They enter the equations as known parts.
 
-The field of a region under them is total = background + elastic, and only the elastic part obeys the integral
-equations without source. In a finite region the background is the in-situ stress (without displacement) and gravity.
-In an infinite region the remote stress, with the displacement of its strain, is what the equations tend to far away.
+The field of a region under them is total = particular solution + elastic, and only the elastic part obeys the
+integral equations without source. In a finite region the particular solution is the in-situ stress (without
+displacement) and gravity. In an infinite region the remote stress, with the displacement of its strain, is what
+the equations tend to far away.
 """
 
 from __future__ import annotations

@@ -46,8 +46,8 @@ class Load:
 
     known (4 nodes,): displacements and tractions of the fields in finite balance (in-situ stress, gravity), which the
     integral equations do not see. far (2, nodes) complex: displacement and traction of the remote field at every node.
-    background (nodes,): displacement of both kinds of field at every node (at a crack's, of both its faces).
-    of_points (nodes,): the displacement of point loads' fields, a part of the background. net_force: of those on an
+    particular (nodes,): displacement of both particular solutions at every node (at a crack's, of both its faces).
+    of_points (nodes,): the displacement of point loads' fields, a part of these. net_force: of those on an
     infinite region, that of their fields far away (complex).
     rigid (b, 3): of all rigid bodies the forces or motions.
     carried (m, 2): traction, along n and s, that faces which a stage opens still carry in it.
@@ -57,7 +57,7 @@ class Load:
     pressure: Real
     known: Real
     far: Complex
-    background: Complex
+    particular: Complex
     of_points: Complex
     rigid: Real
     carried: Real
@@ -117,12 +117,12 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     if after.ends:
         values += outer.stiffness * evaluate_ends(model, outer, stage, factor)
     remote = interpolate(before.remote, after.remote)
-    backgrounds = [balanced_background(model, region, stage, factor) for region in model.regions]
-    balanced = _sample(mesh, backgrounds)
-    points = [each for region, background in zip(model.regions, backgrounds, strict=True) if region.infinite
-              for each in background.points]
-    far = _sample(mesh, [far_background(model, region, remote) for region in model.regions])
-    background = balanced[0] + far[0]
+    particulars = [balanced_solution(model, region, stage, factor) for region in model.regions]
+    balanced = _sample(mesh, particulars)
+    points = [each for region, particular in zip(model.regions, particulars, strict=True) if region.infinite
+              for each in particular.points]
+    far = _sample(mesh, [far_solution(model, region, remote) for region in model.regions])
+    particular = balanced[0] + far[0]
     rigid = evaluate_rigid(model, stage, factor)
     for number, given in enumerate(rigid):
         _load_tool(model, mesh, number, given, far[0])
@@ -132,8 +132,8 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         pressure=evaluate_pressure(model, mesh, stage, factor),
         known=np.stack([known.real, known.imag], axis=2).ravel(),
         far=far,
-        background=background,
-        of_points=_sample(mesh, [each.of_points for each in backgrounds])[0],
+        particular=particular,
+        of_points=_sample(mesh, [each.of_points for each in particulars])[0],
         net_force=sum((each.net_force for each in points), 0j),
         rigid=rigid,
         carried=np.zeros((mesh.pairs.count, 2)),
@@ -192,19 +192,19 @@ def _blend_all(values: Sequence[tuple[Value, Value]], owner: Integer, places: Pl
     return result
 
 
-def _sample(mesh: Mesh, backgrounds: Sequence[ParticularSolution]) -> Complex:
-    """Displacement and traction (2, nodes) of the regions' background fields at all nodes."""
+def _sample(mesh: Mesh, particulars: Sequence[ParticularSolution]) -> Complex:
+    """Displacement and traction (2, nodes) of the regions' particular solutions at all nodes."""
     fields = np.zeros((2, mesh.nodes), dtype=complex)
-    ends = np.searchsorted(mesh.node_region, np.arange(len(backgrounds) + 1))
-    for region, background in enumerate(backgrounds):
-        if not background.is_zero:
+    ends = np.searchsorted(mesh.node_region, np.arange(len(particulars) + 1))
+    for region, particular in enumerate(particulars):
+        if not particular.is_zero:
             own = slice(ends[region], ends[region + 1])
-            fields[0, own] = background.displacement(mesh.position[own])
-            fields[1, own] = background.traction(mesh.position[own], mesh.normal[own])
+            fields[0, own] = particular.displacement(mesh.position[own])
+            fields[1, own] = particular.traction(mesh.position[own], mesh.normal[own])
     return fields
 
 
-def balanced_background(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:
+def balanced_solution(model: Model, region: Region, stage: int, factor: float) -> ParticularSolution:
     """In-situ stress, weight, swelling and point loads of a region at the fraction `factor` of a stage.
 
     Where the stress grows with the coordinates it balances a weight that acts from the start (theory, 6).
@@ -250,7 +250,7 @@ def _find_center(model: Model, region: Region) -> complex:
     return complex(0.5 * (min(x) + max(x)), 0.5 * (min(y) + max(y)))
 
 
-def far_background(model: Model, region: Region, remote: Real) -> ParticularSolution:
+def far_solution(model: Model, region: Region, remote: Real) -> ParticularSolution:
     """The field to which an infinite region tends; none in a finite region.
 
     Its displacement is that about the middle of all curves, wherever the model lies.

@@ -17,7 +17,7 @@ from pbem.geometry.sampling import sample_side
 from pbem.model.model import Contact, Law, Model
 from pbem.model.resultants import measure_power
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
-from pbem.model.sight import OVERLAP, Surroundings
+from pbem.model.sight import OVERLAP, Obstacles
 from pbem.model.touching import find_foot
 from pbem.model.varying import Places, Varying, evaluate
 
@@ -63,7 +63,7 @@ def _sample_openings(
     sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
     points, normals = sample_side(model.curves, sides[curve])
     shorter = min(model.curves[curve].length, model.curves[other].length)
-    around = Surroundings(side_legs(model.curves, sides[other]))
+    around = Obstacles(side_legs(model.curves, sides[other]))
     seen = around.look_along(points, normals, -OVERLAP * shorter)
     faced = (seen.leg >= 0) & (seen.product < 0)
     points, normals, distance = points[faced], normals[faced], seen.distance[faced]

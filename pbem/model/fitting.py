@@ -13,7 +13,7 @@ from pbem.model.lengths import count_elements
 from pbem.model.model import Region
 from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
-from pbem.model.slot import Side
+from pbem.model.slot import SlotSide
 from pbem.wording import list_names
 
 # Curves and corners that are named in one note.
@@ -42,8 +42,8 @@ def fit_curves(
     kept = frozenset(name for name, table in case.curves.items() if table.grading != "auto")
     with_elements = tips if case.analysis.tips else {}
     sides = [
-        [Side(side.curve, side.forward) for loop in region.loops for side in loop.sides]
-        + [Side(crack, None) for crack in region.cracks]
+        [SlotSide(side.curve, side.forward) for loop in region.loops for side in loop.sides]
+        + [SlotSide(crack, None) for crack in region.cracks]
         for region in regions
     ]
     sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order)

@@ -21,7 +21,7 @@ from pbem.model.point_supports import read_support_values
 from pbem.model.rigid_body import RigidLoading, read_rigid_loading
 from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
-from pbem.model.stress_fields import Backgrounds, read_backgrounds
+from pbem.model.stress_fields import StressFields, read_stress_fields
 from pbem.model.swelling import read_swellings
 from pbem.model.varying import Value, negate
 
@@ -85,8 +85,8 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         contacts[name] = Contact(name, first, second, law)
         faults += wrong
     joints = {name: each.law for name, each in interfaces.items()} | {name: each.law for name, each in contacts.items()}
-    backgrounds = read_backgrounds(case)
-    faults += backgrounds.faults
+    stress_fields = read_stress_fields(case)
+    faults += stress_fields.faults
     swellings = read_swellings(case, find_corners(case))
     faults += swellings.faults
     point_forces, wrong = read_point_forces(case)
@@ -99,13 +99,13 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         replace(stage, swelling=swelling, point_forces=forces, support_values=shifts, remote_growth=growth,
                 rigid={name: values[name] for name in rigid.bodies}, construction=there)
         for stage, swelling, forces, shifts, growth, values, there in zip(
-            _find_stages(case, conditions, joints, backgrounds), swellings.stages, point_forces,
-            support_values, backgrounds.remote, rigid.stages, construction, strict=True,
+            _find_stages(case, conditions, joints, stress_fields), swellings.stages, point_forces,
+            support_values, stress_fields.remote, rigid.stages, construction, strict=True,
         )
     )
     faults += _check_durations(case, joints, stages)
-    return Loading(conditions, interfaces, contacts, stages, rigid, backgrounds.initial_stress,
-                   backgrounds.rest_gravity, tuple(faults))
+    return Loading(conditions, interfaces, contacts, stages, rigid, stress_fields.initial_stress,
+                   stress_fields.rest_gravity, tuple(faults))
 
 
 def _given(table: StageConditionTable) -> dict[str, Value]:
@@ -274,7 +274,7 @@ def _is_late(case: Case, curve: str, order: int) -> bool:
 
 
 def _find_stages(
-    case: Case, conditions: Mapping[str, Condition], joints: Collection[str], backgrounds: Backgrounds
+    case: Case, conditions: Mapping[str, Condition], joints: Collection[str], stress_fields: StressFields
 ) -> tuple[Stage, ...]:
     """joints: names of the interfaces, cracks and contacts."""
     values: dict[str, list[Value]] = {name: [0.0, 0.0] for name in conditions}
@@ -287,7 +287,8 @@ def _find_stages(
     for name in joints:
         if name in laws:
             pressure[name] = _read(laws[name].pressure)
-    fields = [(stress.value, gravity) for stress, gravity in zip(backgrounds.remote, backgrounds.gravity, strict=True)]
+    fields = [(stress.value, gravity)
+              for stress, gravity in zip(stress_fields.remote, stress_fields.gravity, strict=True)]
     if not case.stages:
         return (Stage("load", case.analysis.steps, _freeze(values), dict(pressure), *fields[0], ends=_freeze(ends)),)
     stages = []

@@ -64,7 +64,7 @@ class Strip:
     inside: bool
 
 
-class Surroundings:
+class Obstacles:
     """Legs, travelled with their region on the left, that rays may meet."""
 
     def __init__(self, legs: Sequence[Leg]) -> None:
@@ -108,7 +108,7 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
     """Whether a normal of either curve meets the other one from outside, before any other part of the two bodies."""
     shorter = min(model.curves[contact.first].length, model.curves[contact.second].length)
     for curve, other in ((contact.first, contact.second), (contact.second, contact.first)):
-        facing = Surroundings(side_legs(model.curves, sides[other]))
+        facing = Obstacles(side_legs(model.curves, sides[other]))
         for leg in side_legs(model.curves, sides[curve]):
             points = inner_points(leg, max(SAMPLES, 4 * leg.elements))
             seen = facing.look_along(points, leg.normals(points), -max(OVERLAP * shorter, REACH * contact.overlap))
@@ -196,7 +196,7 @@ def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]])
         name, leg, near = names[at], legs[at], nearby[at]
         if name not in wanted:
             continue
-        around = Surroundings([legs[number] for number in near])
+        around = Obstacles([legs[number] for number in near])
         points = inner_points(leg, SAMPLES)
         for inside, normals in ((False, leg.normals(points)), (True, -leg.normals(points))):
             seen = around.look_along(points, normals, 1e-12 * model.size)

@@ -23,7 +23,7 @@ from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.nearness import Surroundings
 from pbem.model.lengths import Cells, LengthField
 from pbem.model.sliver import Wedges, find_wedges
-from pbem.model.slot import Side, divide_alike, find_slots
+from pbem.model.slot import SlotSide, divide_alike, find_slots
 
 # A model is refused when the rule would add more elements than this, and more than ten times those asked for.
 MOST_ADDED = 100_000
@@ -62,7 +62,7 @@ class Sizes:
 
 def fit_lengths(
     curves: Mapping[str, Curve],
-    regions: Sequence[Sequence[Side]],
+    regions: Sequence[Sequence[SlotSide]],
     tips: Mapping[str, tuple[bool, bool]],
     kept: frozenset[str],
     order: int,

@@ -19,7 +19,7 @@ NARROW = 0.5
 
 
 @dataclass(frozen=True)
-class Side:
+class SlotSide:
     """A curve of a region; forward: travelled in its own direction with the region on the left; None: a crack."""
 
     curve: str
@@ -35,7 +35,7 @@ class Slot:
     turned: bool
 
 
-def find_slots(legs: Sequence[Leg], names: Sequence[str], regions: Sequence[Sequence[Side]]) -> tuple[Slot, ...]:
+def find_slots(legs: Sequence[Leg], names: Sequence[str], regions: Sequence[Sequence[SlotSide]]) -> tuple[Slot, ...]:
     """The narrow slots between legs (with the names of their curves) of one region."""
     numbers: dict[str, list[int]] = {}
     for number, name in enumerate(names):

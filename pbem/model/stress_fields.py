@@ -15,7 +15,7 @@ from pbem.model.shaping import find_corners
 
 
 @dataclass(frozen=True)
-class Backgrounds:
+class StressFields:
     """remote, gravity: values at the end of every stage; initial_stress: by the names of materials; rest_gravity: of
     [gravity], with which stress that grows with the coordinates is in balance."""
 
@@ -26,7 +26,7 @@ class Backgrounds:
     faults: tuple[Fault, ...]
 
 
-def read_backgrounds(case: Case) -> Backgrounds:
+def read_stress_fields(case: Case) -> StressFields:
     """Complete values for every stage; what a stage leaves out keeps the value reached before."""
     given: dict[str, float | ExpressionTable] = dict.fromkeys(COMPONENTS, 0.0)
     gravity = [0.0, 0.0]
@@ -57,7 +57,7 @@ def read_backgrounds(case: Case) -> Backgrounds:
         if name in case.materials and not wrong:
             faults += _check_rest(case, name, initial[name], at_rest)
     faults = faults or [*_check_infinite(case, stresses, accelerations, initial)]
-    return Backgrounds(tuple(stresses), tuple(accelerations), initial, at_rest, tuple(faults))
+    return StressFields(tuple(stresses), tuple(accelerations), initial, at_rest, tuple(faults))
 
 
 def _check_rest(case: Case, name: str, stress: LinearStress, at_rest: complex) -> Iterator[Fault]:

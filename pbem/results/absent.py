@@ -14,7 +14,7 @@ from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.loads import OuterNodes
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
-from pbem.solve.problem.step import ContactState, Interior, Step
+from pbem.solve.problem.step import ContactState, InteriorValues, Step
 
 NOTHING = complex(np.nan, np.nan)
 
@@ -59,7 +59,7 @@ class Absence:
         interior = step.interior
         if interior is not None:
             gone = (self._interior >= 0) & there.regions[self._interior]
-            interior = Interior(np.where(gone, NOTHING, interior.displacement),
+            interior = InteriorValues(np.where(gone, NOTHING, interior.displacement),
                                 np.where(gone[:, None], np.nan, interior.stress))
         return replace(
             step, displacement=np.where(faces, 0.0, step.displacement),

@@ -283,16 +283,16 @@ class EnergyBalance:
         self, traction: Complex, displacement: Complex, stage: int, factor: float, pairs: PairRecord
     ) -> _State:
         """The energy that is stored, and what weights and far stresses work on (theory, 73, 74)."""
-        backgrounds = evaluate_particular_solutions(self._model, stage, factor)
+        particulars = evaluate_particular_solutions(self._model, stage, factor)
         elastic = traction - self._in_situ
         loads, conjugates = [np.zeros(0)], [np.zeros(0)]
-        swollen = self._sample_swelling([balanced for balanced, _ in backgrounds])
+        swollen = self._sample_swelling([balanced for balanced, _ in particulars])
         displacement = displacement - swollen
         point_forces = np.zeros(0)
         if self._model.point_loads:
             point_forces = measure_point_forces(self._model, stage, factor)
             moved = measure_point_motions(
-                self._model, self._mesh, self._faces, self._weight, (displacement, traction), backgrounds
+                self._model, self._mesh, self._faces, self._weight, (displacement, traction), particulars
             )
             acting = np.repeat(self._find_acting_points(), 3)
             point_forces, moved = np.where(acting, point_forces, 0.0), np.where(acting, moved, 0.0)
@@ -306,7 +306,7 @@ class EnergyBalance:
                 loads.append(np.zeros(2))
                 conjugates.append(np.zeros(2))
                 continue
-            balanced, _ = backgrounds[self._faces.region[reference.faces[0]]]
+            balanced, _ = particulars[self._faces.region[reference.faces[0]]]
             moved = reference.conjugate(self._weight, elastic, displacement, point_forces)
             moved += (np.conj(balanced.force) * reference.integral).real
             weight = balanced.force + balanced.carried
@@ -316,7 +316,7 @@ class EnergyBalance:
             both = weight + balanced.carried
             stored += 0.5 * float(np.array([both.real, both.imag]) @ moved)
         for reference in self._stresses:
-            balanced, far = backgrounds[self._faces.region[reference.faces[0]]]
+            balanced, far = particulars[self._faces.region[reference.faces[0]]]
             initial, remote = np.array(balanced.initial.value), np.array(far.remote)
             strained = reference.conjugate(self._weight, elastic, displacement, point_forces)
             loads.append(initial + remote)
@@ -352,10 +352,10 @@ class EnergyBalance:
             traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
         return traction
 
-    def _sample_swelling(self, backgrounds: Sequence[ParticularSolution]) -> Complex:
+    def _sample_swelling(self, particulars: Sequence[ParticularSolution]) -> Complex:
         """Displacement of the strain without stress on all faces (f,)."""
         moved = np.zeros(len(self._weight), dtype=complex)
-        for number, balanced in enumerate(backgrounds):
+        for number, balanced in enumerate(particulars):
             if not balanced.swelling.is_zero:
                 own = self._find_faces(number)
                 moved[own] = balanced.swelling.displacement(self._faces.position[own])

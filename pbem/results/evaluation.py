@@ -124,7 +124,7 @@ class Evaluator:
     def _evaluate_steps(
         self, points: Complex, where: Whereabouts, field: InteriorRows | PointRows, steps: Sequence[int]
     ) -> list[Values]:
-        """The whole field at the points, step by step: backgrounds, what the representation makes, limits."""
+        """The whole field at the points, step by step: particular solutions, what the representation makes, limits."""
         run = self._run
         mesh, crack = run.mesh, run.mesh.node_crack
         inside = np.flatnonzero((where.region >= 0) & (where.face < 0))
@@ -140,13 +140,13 @@ class Evaluator:
             first, opposite = split_faces(mesh, moved)
             u, t = np.where(crack, first - opposite, first), np.where(crack, 0.0, traction[: mesh.nodes])
             stage, factor = int(self._steps.stage[at]), float(self._steps.factor[at])
-            backgrounds = evaluate_particular_solutions(run.model, stage, factor)
-            of_points = sample_points(mesh, [balanced for balanced, _ in backgrounds])
+            particulars = evaluate_particular_solutions(run.model, stage, factor)
+            of_points = sample_points(mesh, [balanced for balanced, _ in particulars])
             if of_points is not None:
                 moved, traction = moved - of_points.displacement, traction - of_points.traction
                 hoop_stress = hoop_stress - of_points.hoop_stress
             total = evaluate_face_limits(run, where, points, moved, traction, hoop_stress)
-            for region, (balanced, far) in enumerate(backgrounds):
+            for region, (balanced, far) in enumerate(particulars):
                 on = np.flatnonzero((where.face >= 0) & (where.region == region))
                 if balanced.points and len(on):
                     total.displacement[on] += balanced.of_points.displacement(points[on])
@@ -156,10 +156,10 @@ class Evaluator:
                     u[nodes] -= balanced.displacement(mesh.position[nodes])
                     t[nodes] -= balanced.traction(mesh.position[nodes], mesh.normal[nodes])
                 own = by_region[last[region] : last[region + 1]]
-                for background in (balanced, far):
-                    if len(own) and not background.is_zero:
-                        total.displacement[own] += background.displacement(points[own])
-                        total.stress[own] += background.stress(points[own])
+                for particular in (balanced, far):
+                    if len(own) and not particular.is_zero:
+                        total.displacement[own] += particular.displacement(points[own])
+                        total.stress[own] += particular.stress(points[own])
             densities.append((self._fine.displacement @ u, self._fine.traction @ t))
             totals.append(total)
         for total, elastic in zip(totals, self._represent(field, densities), strict=True):

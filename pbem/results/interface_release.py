@@ -61,8 +61,8 @@ class InterfaceRelease:
         J = np.full(len(self.tips), np.nan)
         if self.rows is None:
             return J
-        backgrounds = evaluate_particular_solutions(self.model, step.stage, step.factor)
-        moved, carried = self._take_off(step, [balanced for balanced, _ in backgrounds])
+        particulars = evaluate_particular_solutions(self.model, step.stage, step.factor)
+        moved, carried = self._take_off(step, [balanced for balanced, _ in particulars])
         inside = self.rows.evaluate(moved, carried)
         materials = [region.material for region in self.model.regions]
         for number, tip in enumerate(self.tips):
@@ -74,7 +74,7 @@ class InterfaceRelease:
             nearest = nodes[np.argsort(np.abs(self.mesh.position[nodes] - tip.point))[: len(tied)]]
             rest = complex(split_faces(self.mesh, step.displacement)[0][nearest].mean())
             for side, (region, leaving, arriving) in enumerate(tip.sides):
-                balanced, far = backgrounds[region]
+                balanced, far = particulars[region]
                 here = slice((2 * number + side) * ON_ARC, (2 * number + side + 1) * ON_ARC)
                 displacement = inside.displacement[here] + far.displacement(self.points[here])
                 stress = inside.stress[here] + far.stress(self.points[here])

@@ -151,7 +151,7 @@ class JoinedContact(Contact):
 
 
 @dataclass(frozen=True)
-class Interior:
+class InteriorPoints:
     """The q interior points: position (q, 2); region (q,), index into `Nodes.region_names`, -1 outside of all.
 
     displacement (k, q, 2), stress (k, q, 3): sxx, syy, sxy, NaN outside of all regions; loaded at first use.

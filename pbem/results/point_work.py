@@ -29,7 +29,7 @@ def measure_point_forces(model: Model, stage: int, factor: float) -> Real:
 
 def measure_point_motions(
     model: Model, mesh: Mesh, faces: Faces, weight: Real, fields: tuple[Complex, Complex],
-    backgrounds: list[tuple[ParticularSolution, ParticularSolution]],
+    particulars: list[tuple[ParticularSolution, ParticularSolution]],
 ) -> Real:
     """Displacement along x and y and rotation (3 c,) at all point loads, without what each makes itself (theory, 101).
 
@@ -40,7 +40,7 @@ def measure_point_motions(
     moved = []
     for load in model.point_loads.values():
         number = numbers[load.region]
-        balanced, far = backgrounds[number]
+        balanced, far = particulars[number]
         unswollen = replace(balanced, swelling=ParticularSolution(balanced.material).swelling)
         own = np.flatnonzero(faces.region == number)
         z, n = faces.position[own], faces.normal[own]

@@ -29,7 +29,7 @@ from pbem.results.lazy import (
     AllPairs,
     Contact,
     Interfaces,
-    Interior,
+    InteriorPoints,
     freeze,
     open_quietly,
     read_names,
@@ -80,7 +80,7 @@ class Results:
     energy: Energies
     balance: Balances | None
     linearity: Linearities | None
-    interior: Interior | None
+    interior: InteriorPoints | None
     convergence: NDArray[Any] = field(repr=False)
     rigid: Mapping[str, RigidMotion] = field(default_factory=dict)
 
@@ -366,11 +366,11 @@ def _read_errors(file: h5py.File, steps: int) -> Errors:
     )  # fmt: skip
 
 
-def _read_interior(path: Path, file: h5py.File, steps: int) -> Interior | None:
+def _read_interior(path: Path, file: h5py.File, steps: int) -> InteriorPoints | None:
     if "interior" not in file:
         return None
     group = file["interior"]
-    return Interior(path, freeze(group["position"][...]), _read_indices(group, "region"), steps)
+    return InteriorPoints(path, freeze(group["position"][...]), _read_indices(group, "region"), steps)
 
 
 def _read_indices(group: h5py.GeneratedGroup, name: str) -> Integer:

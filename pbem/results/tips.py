@@ -110,7 +110,7 @@ class TipRules:
         T = self._start()
         first, opposite = split_faces(self.mesh, step.displacement)
         mean = 0.5 * (first + opposite)[self.mesh.pairs.first]
-        backgrounds = evaluate_particular_solutions(self.model, step.stage, step.factor)
+        particulars = evaluate_particular_solutions(self.model, step.stage, step.factor)
         for group in self.groups:
             forms, material = group.forms, group.material
             modulus = material.plane_modulus
@@ -122,10 +122,10 @@ class TipRules:
             value = modulus / group.length * (jumps @ forms.parallel + moved.real)
             value += step.contact.traction_n[near] @ forms.of_normal
             value -= modulus * np.array([
-                backgrounds[region][0].swelling.strain_along(at[None], along[None])[0]
+                particulars[region][0].swelling.strain_along(at[None], along[None])[0]
                 for region, at, along in zip(group.region, group.place, group.direction, strict=True)
             ])
-            T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in backgrounds])
+            T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in particulars])
         return T.reshape(-1, 2)
 
     def _start(self) -> Real:
@@ -138,10 +138,10 @@ class TipRules:
         turned = jump * group.sense * np.conj(group.direction)[:, None]
         return np.stack([turned.real, turned.imag], axis=2).reshape(len(turned), -1)
 
-    def _evaluate_initial(self, group: _Alike, backgrounds: list[ParticularSolution]) -> Real:
+    def _evaluate_initial(self, group: _Alike, particulars: list[ParticularSolution]) -> Real:
         """In-situ stress, which has no displacement: what Hooke's law leaves out of the stress along the crack."""
         kappa = group.material.kappa
-        initial = [backgrounds[region].initial.evaluate(place[None])[0]
+        initial = [particulars[region].initial.evaluate(place[None])[0]
                    for region, place in zip(group.region, group.place, strict=True)]
         sxx, syy, sxy = np.array(initial).T
         turned = 0.5 * (sxx - syy) - 1j * sxy  # (s_tt - s_nn)/2 along a direction d: its product with d^2

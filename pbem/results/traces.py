@@ -15,7 +15,7 @@ from pbem.results.trace_names import name_trace
 
 
 @dataclass(frozen=True)
-class Trace:
+class TraceTotals:
     """pieces: how many interfaces it is made of. length; mean_slip, mean_opening: over the length, slip with its sign;
     largest_slip, largest_opening: of all pairs, without sign. moment: shear modulus times the integral of the slip,
     stress times length squared (per unit of thickness), with its sign."""
@@ -30,7 +30,7 @@ class Trace:
     moment: float
 
 
-def list_traces(results: Results, step: int = -1) -> list[Trace]:
+def list_traces(results: Results, step: int = -1) -> list[TraceTotals]:
     """All traces at a stored step (its place in the file), those of the largest moments first.
 
     The shear modulus is that of the region of the first side; NaN in files of earlier versions.
@@ -53,7 +53,7 @@ def list_traces(results: Results, step: int = -1) -> list[Trace]:
         np.maximum.at(kept, trace, np.abs(values))
     pieces = np.bincount(of, minlength=count)
     found = [
-        Trace(name, int(pieces[i]), float(length[i]), float(integral[i] / length[i]), float(largest[0][i]),
+        TraceTotals(name, int(pieces[i]), float(length[i]), float(integral[i] / length[i]), float(largest[0][i]),
               float(volume[i] / length[i]), float(largest[1][i]), float(moment[i]))
         for name, i in numbers.items()
     ]

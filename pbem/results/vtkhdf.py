@@ -42,7 +42,7 @@ class Growing:
 
 
 @dataclass(frozen=True)
-class Block:
+class Grid:
     """points (n, 2); static: arrays (n,) or (n, 2) at the points; of_cells: arrays (c,); words: lists of names."""
 
     name: str
@@ -86,7 +86,7 @@ def export_vtkhdf(results: Results, target: Path, copy: bool = False) -> Exporte
     return Exported(tuple(block.name for block in blocks), len(results.steps), refers)
 
 
-def list_blocks(results: Results, source: h5py.File) -> list[Block]:
+def list_blocks(results: Results, source: h5py.File) -> list[Grid]:
     """What the file shows, as far as the results have it."""
     blocks = [_make_faces(results, source)]
     if results.pairs.names:
@@ -97,12 +97,12 @@ def list_blocks(results: Results, source: h5py.File) -> list[Block]:
         interior = results.interior
         growing = tuple(Growing(name, f"interior/{name}") for name in ("displacement", "stress"))
         cells = join_grid(results.configuration, interior.region)
-        blocks.append(Block("interior", interior.position, cells, growing, {"region": interior.region.astype("i4")},
+        blocks.append(Grid("interior", interior.position, cells, growing, {"region": interior.region.astype("i4")},
                             words={"region_names": results.nodes.region_names}))
     return blocks
 
 
-def _make_faces(results: Results, source: h5py.File) -> Block:
+def _make_faces(results: Results, source: h5py.File) -> Grid:
     nodes = results.nodes
     growing = [Growing(name, f"fields/{name}") for name in ("displacement", "traction", "hoop_stress")
                if f"fields/{name}" in source]
@@ -113,34 +113,34 @@ def _make_faces(results: Results, source: h5py.File) -> Block:
     words = {"region_names": nodes.region_names, "curve_names": nodes.curve_names}
     of_cells = {name: getattr(results.elements, name).astype("i4") for name in ("region", "curve")}
     cells = join_faces(results.elements, nodes, results.tips)
-    return Block("faces", nodes.position, cells, tuple(growing), static, of_cells, words)
+    return Grid("faces", nodes.position, cells, tuple(growing), static, of_cells, words)
 
 
 def _list_quantities(source: h5py.File) -> list[str]:
     return [name for name in ("mode", "opening", "slip", "traction_n", "traction_s") if f"all/contact/{name}" in source]
 
 
-def _make_contact(results: Results, source: h5py.File) -> Block:
+def _make_contact(results: Results, source: h5py.File) -> Grid:
     pairs = results.pairs
     growing = tuple(Growing(name, f"all/contact/{name}") for name in source["all/contact"]
                     if source["all/contact"][name].maxshape[0] is None)
     static = {"interface": pairs.interface.astype("i4"), "arc_length": pairs.arc_length, "normal": pairs.normal}
-    return Block("contact", pairs.position, join_pairs(pairs.interface), growing, static,
+    return Grid("contact", pairs.position, join_pairs(pairs.interface), growing, static,
                  {"interface": np.unique(pairs.interface).astype("i4")}, {"interface_names": pairs.names})
 
 
-def _make_tips(results: Results) -> Block:
+def _make_tips(results: Results) -> Grid:
     """Both ends of every crack, those that are no tips with NaN."""
     names = tuple(results.tips)
     places = np.array([results.find_curve_ends(name) for name in names]).reshape(-1, 2)
     static = {"crack": np.repeat(np.arange(len(names)), 2).astype("i4"),
               "end": np.tile([0, 1], len(names)).astype("i4")}
     growing = tuple(Growing(kind, f"all/tips/{kind}") for kind in TIPS)
-    return Block("tips", places, Cells.vertices(len(places)), growing, static, words={"crack_names": names})
+    return Grid("tips", places, Cells.vertices(len(places)), growing, static, words={"crack_names": names})
 
 
 def _write(
-    file: h5py.File, results: Results, source: h5py.File, blocks: Sequence[Block], folder: Path | None
+    file: h5py.File, results: Results, source: h5py.File, blocks: Sequence[Grid], folder: Path | None
 ) -> None:
     """folder: that of the file, if arrays are to refer to the result file."""
     root = file.create_group("VTKHDF", track_order=True)
@@ -198,7 +198,7 @@ def _write_steps(group: h5py.Group, results: Results) -> h5py.Group:
     return steps
 
 
-def _write_words(group: h5py.Group, steps: h5py.Group, results: Results, block: Block) -> None:
+def _write_words(group: h5py.Group, steps: h5py.Group, results: Results, block: Grid) -> None:
     """Names, by their numbers; and the number of the load step."""
     k = len(results.steps)
     for name, words in block.words.items():

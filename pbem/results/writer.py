@@ -48,7 +48,7 @@ from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.results.unfinished import drop_unfinished, read_unfinished, write_unfinished
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
-from pbem.solve.problem.step import Interior, Iteration, Step, Unfinished
+from pbem.solve.problem.step import InteriorValues, Iteration, Step, Unfinished
 
 # What ends a run though nothing is wrong with it.
 STOPPED = (MemoryError, StorageError, BrokenPipeError)
@@ -198,7 +198,7 @@ class ResultWriter:
         except OSError as error:
             raise StorageError(str(self.path), f"no room for {what} ({error.strerror or error})") from error
 
-    def complete(self, interior: Interior) -> None:
+    def complete(self, interior: InteriorValues) -> None:
         """The interior points of the step that was appended last, if it was not its turn to be stored."""
         if self._pending is not None:
             self._pending = replace(self._pending, interior=interior)
@@ -216,7 +216,7 @@ class ResultWriter:
         append_row(file["fields/hoop_stress"], hoop_stress)
         if "interior" in file:
             count = len(self._model.interior_points)
-            none = Interior(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
+            none = InteriorValues(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
             interior = step.interior or none
             append_row(file["interior/displacement"], to_columns(interior.displacement))
             append_row(file["interior/stress"], interior.stress)

@@ -61,14 +61,14 @@ class Share:
     blocks: bool
 
     @contextmanager
-    def open(self, comm: Comm) -> Iterator[Group]:
+    def open(self, comm: Comm) -> Iterator[RankGroup]:
         """The group of ranks in which this rank computes cases."""
         if comm.size == 1 or not self.single:
-            yield Group(comm, comm, self.blocks)
+            yield RankGroup(comm, comm, self.blocks)
             return
         own: Comm = comm.Dup()  # type: ignore[assignment]
         try:
-            yield Group(alone, own, self.blocks)
+            yield RankGroup(alone, own, self.blocks)
         finally:
             own.Free()
 
@@ -84,7 +84,7 @@ def choose_share(model: Model, mesh: Mesh, comm: Comm, count: int, several: Mapp
 
 
 @dataclass(frozen=True)
-class Group:
+class RankGroup:
     """comm: of the ranks that compute a case together; all: of those that share the cases."""
 
     comm: Comm

@@ -37,7 +37,7 @@ from pbem.sweeps.files import name_results
 from pbem.sweeps.outcome import AbsentNameError, Names, Outcome, list_quantity_names
 from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
-from pbem.sweeps.table import Row, Table, TableFile
+from pbem.sweeps.table import Row, SweepTable, TableFile
 from pbem.sweeps.values import check_combinations, check_values, combine, find_place, write_cell
 from pbem.wording import show
 
@@ -95,7 +95,7 @@ def sweep(
     listener: Listener | None = None,
     label: Label = label_key,
     option: str = "",
-) -> Table:
+) -> SweepTable:
     """Compute a case with all combinations of values, and return a table with one row each.
 
     case: as of `pbem.run`. values: by keys, as of `Case.replace`, those that each key takes; the last key changes
@@ -380,10 +380,10 @@ def _run_with_file(setting: Setting, values: dict[str, Any], outcome: Outcome, k
         compute(Path(do_on_first(kept.comm, PbemError, lambda: folder)) / "case.h5")
 
 
-def _make_table(several: Mapping[str, Sequence[Any]], titles: Sequence[str], rows: Sequence[Row]) -> Table:
+def _make_table(several: Mapping[str, Sequence[Any]], titles: Sequence[str], rows: Sequence[Row]) -> SweepTable:
     filled = [
         {**values, **dict(zip(titles, row.quantities, strict=True)), "status": row.status,
          "iterations": row.iterations, "seconds": row.seconds, "reason": row.reason}
         for values, row in zip(combine(several), rows, strict=True)
     ]
-    return Table(several, titles, filled)
+    return SweepTable(several, titles, filled)

@@ -42,7 +42,7 @@ class Row:
                 " ".join(printable(self.reason).split()), mark]
 
 
-class Table:
+class SweepTable:
     """One row a case: the values that were set, the quantities, status, iterations, seconds, reason.
 
         table["reactions.top.x"]     # a column: an array, NaN where a case did not converge

@@ -17,7 +17,7 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.petsc.linear import LinearSolver
-from pbem.solve.petsc.refactoring import Effort, Work
+from pbem.solve.petsc.refactoring import Effort, FactorWork
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved
 from pbem.solve.system.assembly import assemble_problem
@@ -158,7 +158,7 @@ def test_many_pairs_are_solved_by_columns_of_those_that_change_or_by_new_factors
 
 
 def test_old_factors_are_given_up_when_they_have_cost_as_much_as_new_ones() -> None:
-    work = Work(factors=1e12, call=5e9, column=1e9, iteration=0.0)
+    work = FactorWork(factors=1e12, call=5e9, column=1e9, iteration=0.0)
     effort = Effort(1, work, limited=True)
     assert effort.allows(400, 0) and effort.spend(400).allows(400, 0) and not effort.spend(800).allows(200, 0)
     assert effort.spend(400).spend(400).spent == 2 * 405e9 and effort.spend(0).spent == 0.0  # a call costs as well

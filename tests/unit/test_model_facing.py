@@ -12,7 +12,7 @@ from pbem.geometry.curve import Leg
 from pbem.mesh.equations import choose_equations
 from pbem.mesh.generate import generate_mesh
 from pbem.model.rigid_body_modes import find_rigid_body_modes
-from pbem.model.sight import Surroundings
+from pbem.model.sight import Obstacles
 from pbem.results.coverage import describe_sparse_contacts
 from tests.unit.case_sample import MATERIAL, SQUARE, add_curves, build, change, find_only_fault
 
@@ -93,7 +93,7 @@ def test_a_ray_meets_the_first_leg(radius: float | None) -> None:
     leg = Leg(begin, end, 1) if radius is None else Leg(-1j, 1j, 1, center=0j, sweep=math.pi)
     far = Leg(3 - 3j, 3 + 3j, 1)
     points, normals = np.array([-2 + 0.5j, -2 + 2j, -2 + 9j]), np.ones(3, dtype=complex)
-    seen = Surroundings([far, leg]).look_along(points, normals, 0.0)
+    seen = Obstacles([far, leg]).look_along(points, normals, 0.0)
     assert seen.leg.tolist() == [1, 0, -1]
     exact = 3.0 if radius is None else 2 + math.sqrt(1 - 0.25)
     np.testing.assert_allclose(seen.distance[:2], [exact, 5.0], rtol=1e-12)

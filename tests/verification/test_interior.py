@@ -29,7 +29,7 @@ from pbem.parallel import world
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
-from pbem.solve.problem.step import ContactState, Interior, SilentReporter, Step
+from pbem.solve.problem.step import ContactState, InteriorValues, SilentReporter, Step
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
@@ -44,7 +44,7 @@ GRAIN = Material("grain", 3e3, 0.3)
 HEAVY = Material("heavy", 1e3, 0.25, density=2.0)
 
 
-def find_interior(model: Model) -> tuple[Mesh, Step, Interior]:
+def find_interior(model: Model) -> tuple[Mesh, Step, InteriorValues]:
     mesh, steps = solve(model)
     return mesh, steps[-1], InteriorField(model, mesh, world).evaluate(steps[-1])
 
@@ -54,7 +54,7 @@ def find_hoop_stress(model: Model, mesh: Mesh, step: Step) -> Real:
     return evaluate_hoop_stress(mesh, initial, step.displacement, step.traction)
 
 
-def expect_field(found: Interior, exact: PlaneField, points: Complex, tolerance: float) -> None:
+def expect_field(found: InteriorValues, exact: PlaneField, points: Complex, tolerance: float) -> None:
     """Relative to the largest displacement and stress."""
     for values, expected in ((found.displacement, exact.displacement(points)), (found.stress, exact.stress(points).T)):
         assert np.abs(values - expected).max() <= tolerance * np.abs(expected).max()

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from pbem.arrays import Integer, Real
 from pbem.errors import ConvergenceError
 from pbem.parallel import gather_parts
-from pbem.solve.petsc.refactoring import Work
+from pbem.solve.petsc.refactoring import FactorWork
 from pbem.solve.petsc.session import PREFIX, PETSc, factor_in_place, pass_over_divergence
 from pbem.solve.petsc.shares import change_shares, find_own_blocks, share_equally
 
@@ -70,7 +70,7 @@ class LinearSolver:
         self.multiply = multiply
         self.operator.setUp()
         self.right, self.left = self.operator.createVecs()
-        self.work = Work(0.0, 0.0, 0.0, 0.0)
+        self.work = FactorWork(0.0, 0.0, 0.0, 0.0)
         self.iterations = 0
 
     @property
@@ -149,7 +149,7 @@ class LinearSolver:
         else:
             self.solver.setOperators(self.operator, self.matrix)
 
-    def _count_work(self) -> Work:
+    def _count_work(self) -> FactorWork:
         """Of the factors there are; the same on all ranks."""
         assert self.solver is not None and self.matrix is not None
         rows = float(self.shape[0][1])
@@ -162,7 +162,7 @@ class LinearSolver:
                 size = factor.getMumpsInfog(29)  # below zero: in millions
                 stored, operations = float(size if size >= 0 else -1e6 * size), factor.getMumpsRinfog(3)
         # A product is one of known and unknown values: twice the matrix's entries.
-        return Work(
+        return FactorWork(
             operations + OPERATIONS_OF_AN_ENTRY * entries,
             OPERATIONS_OF_A_CALL + SINGLE * 2.0 * stored,
             2.0 * stored * (MANY if self.comm.size == 1 else MANY_BY_RANKS),

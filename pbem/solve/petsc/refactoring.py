@@ -9,7 +9,7 @@ SMALL = 2.0
 
 
 @dataclass(frozen=True)
-class Work:
+class FactorWork:
     """What factors have cost and what is done with them costs, in operations of a large LU factorisation.
 
     factors: to form and factorise the operator; call: of columns, however many, and column: each of them; iteration:
@@ -31,7 +31,7 @@ class Effort:
     """
 
     ranks: int
-    work: Work
+    work: FactorWork
     limited: bool
     spent: float = 0.0
 

@@ -38,7 +38,7 @@ FEW_CHANGED = 6
 
 
 @dataclass(frozen=True)
-class Block:
+class BodyRows:
     """Rows of B of a region's nodes on this rank, without free terms and anchors.
 
     rows (2 k,): places among this rank's rows. nodes (k,), seen (s,): of the rows, and of the region. columns (c,): of
@@ -95,7 +95,7 @@ class BodyFactors:
             return False
         return self._solver.factored
 
-    def _form(self, block: Block, places: Integer, moved: tuple[Integer, Integer, Real]) -> Real:
+    def _form(self, block: BodyRows, places: Integer, moved: tuple[Integer, Integer, Real]) -> Real:
         """A block's rows of K (2 k, c) without free terms in the columns of unknowns at places (c,).
 
         moved: entries of the constraint map in the block's columns: which of them, unknown, value.
@@ -175,10 +175,10 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         result[:] = size * self._factors.solve(residual[self._rows] / size)
 
 
-def _make_block(mesh: Mesh, local: LocalOperator, nodes: Integer, region: int) -> Block:
+def _make_block(mesh: Mesh, local: LocalOperator, nodes: Integer, region: int) -> BodyRows:
     at = np.flatnonzero(mesh.node_region[nodes] == region)
     elements = np.flatnonzero(mesh.region == region)
     values, columns = local.evaluate_unheld(region, elements, nodes[at])
-    return Block(
+    return BodyRows(
         region, number_components(at), nodes[at], list_nodes(mesh, elements), columns, np.ascontiguousarray(values.T)
     )

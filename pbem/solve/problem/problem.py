@@ -264,7 +264,7 @@ class Problem:
         (theory, 13)
         """
         whole = gather_parts(self.comm, self.system.recover(v - load.known))
-        return whole[0::2] + 1j * whole[1::2] + load.background[self.all_crack_nodes]
+        return whole[0::2] + 1j * whole[1::2] + load.particular[self.all_crack_nodes]
 
     def make_tangent(self) -> TangentOperator:
         """The tangent operator that belongs to the system."""

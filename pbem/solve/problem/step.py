@@ -114,7 +114,7 @@ class Linearity:
 
 
 @dataclass(frozen=True)
-class Interior:
+class InteriorValues:
     """At the model's interior points (q,): displacement (q,) complex; stress sxx, syy, sxy (q, 3). NaN outside."""
 
     displacement: Complex
@@ -140,7 +140,7 @@ class Step:
     displacement: Complex
     traction: Complex
     contact: ContactState
-    interior: Interior | None = None
+    interior: InteriorValues | None = None
     balance: Balance | None = None
     linearity: Linearity | None = None
     duration: float = 0.0

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.interior import InteriorRows
 from pbem.bem.location import Location
-from pbem.bem.operator import Block, RowOperator, add_anchor, assemble_displacement_rows, assemble_rows
+from pbem.bem.operator import RegionRows, RowOperator, add_anchor, assemble_displacement_rows, assemble_rows
 from pbem.bem.rigid_motions import find_rigid_motions, free_rotations, need_rotations
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -44,7 +44,7 @@ class DenseSystem:
 
     operator: RowOperator
     block_unknowns: tuple[Integer, ...]
-    crack_rows: tuple[Block, ...]
+    crack_rows: tuple[RegionRows, ...]
 
     @staticmethod
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:

@@ -18,7 +18,7 @@ from pbem.model.model import Model
 from pbem.parallel import gather_parts
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.problem import InteriorRows, System
-from pbem.solve.problem.step import Interior, Step
+from pbem.solve.problem.step import InteriorValues, Step
 from pbem.solve.system.dense import place_directly
 
 PlaceInterior = Callable[[Model, Mesh, Complex, Location], InteriorRows]
@@ -54,42 +54,42 @@ class InteriorField:
     def _rows(self) -> InteriorRows:
         return self._place(self._model, self._mesh, self._points, self._location)
 
-    def evaluate(self, step: Step) -> Interior:
+    def evaluate(self, step: Step) -> InteriorValues:
         """Displacement and stress at all points after a step, on every rank; all ranks call this together.
 
-        Inside, the sum of the region's backgrounds and of what the representation makes of the boundary values less the
-        balanced background. The far field is not taken from them: it goes on through the holes, so that from outside
-        the representation makes nothing of its part. On the boundary, the limits of the nodes' values.
+        Inside, the sum of the region's particular solutions and of what the representation makes of the boundary
+        values less the balanced one. The far field is not taken from them: it goes on through the holes, so that from
+        outside the representation makes nothing of its part. On the boundary, the limits of the nodes' values.
         """
-        mesh, backgrounds = self._mesh, evaluate_particular_solutions(self._model, step.stage, step.factor)
+        mesh, particulars = self._mesh, evaluate_particular_solutions(self._model, step.stage, step.factor)
         first, opposite = split_faces(mesh, step.displacement)
         displacement = np.where(mesh.node_crack, first - opposite, first)
         traction = step.traction[: mesh.nodes].copy()
         moved, stress = np.zeros_like(self._points), np.zeros((len(self._points), 3))
         # There can be thousands of regions: each finds its nodes and its points without looking at all of them.
-        ends = np.searchsorted(mesh.region, np.arange(len(backgrounds) + 1)) * (mesh.order + 1)
+        ends = np.searchsorted(mesh.region, np.arange(len(particulars) + 1)) * (mesh.order + 1)
         crack = mesh.node_crack
         points = np.flatnonzero(self._location.element < 0)
         points = points[np.argsort(self._location.region[points], kind="stable")]
-        last = np.searchsorted(self._location.region[points], np.arange(len(backgrounds) + 1))
-        for region, (balanced, far) in enumerate(backgrounds):
+        last = np.searchsorted(self._location.region[points], np.arange(len(particulars) + 1))
+        for region, (balanced, far) in enumerate(particulars):
             if not balanced.is_zero:
                 nodes = ends[region] + np.flatnonzero(~crack[ends[region] : ends[region + 1]])
                 displacement[nodes] -= balanced.displacement(mesh.position[nodes])
                 traction[nodes] -= balanced.traction(mesh.position[nodes], mesh.normal[nodes])
             inside = points[last[region] : last[region + 1]]
-            for background in (balanced, far):
-                if len(inside) and not background.is_zero:
-                    moved[inside] += background.displacement(self._points[inside])
-                    stress[inside] += background.stress(self._points[inside])
+            for particular in (balanced, far):
+                if len(inside) and not particular.is_zero:
+                    moved[inside] += particular.displacement(self._points[inside])
+                    stress[inside] += particular.stress(self._points[inside])
         elastic = self._rows.evaluate(displacement, traction)
-        hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in backgrounds], step.displacement, step.traction)
+        hoop_stress = evaluate_hoop_stress(mesh, [each for each, _ in particulars], step.displacement, step.traction)
         moved_limit, carried_limit = step.displacement, step.traction
-        of_points = sample_points(mesh, [each for each, _ in backgrounds])
+        of_points = sample_points(mesh, [each for each, _ in particulars])
         if of_points is not None:
             moved_limit, carried_limit = moved_limit - of_points.displacement, carried_limit - of_points.traction
             hoop_stress = hoop_stress - of_points.hoop_stress
-            for region, (balanced, _) in enumerate(backgrounds):
+            for region, (balanced, _) in enumerate(particulars):
                 on = np.flatnonzero((self._location.element >= 0) & (self._location.region == region))
                 if balanced.points and len(on):
                     moved[on] += balanced.of_points.displacement(self._points[on])
@@ -98,12 +98,12 @@ class InteriorField:
         return self._gather(Values(moved + elastic.displacement + limit.displacement,
                                    stress + elastic.stress + limit.stress))
 
-    def _gather(self, part: Values) -> Interior:
+    def _gather(self, part: Values) -> InteriorValues:
         flat = np.column_stack([part.displacement.real, part.displacement.imag, part.stress])
         whole = gather_parts(self._comm, flat.ravel()).reshape(-1, 5)
         whole[self.location.region < 0] = np.nan  # both parts of a complex number, which sums may lose
         whole[self._at_tip, 2:] = np.nan  # infinite, whatever the elements beside the tip make of it
-        return Interior(whole[:, :2].copy().view(np.complex128)[:, 0], whole[:, 2:])
+        return InteriorValues(whole[:, :2].copy().view(np.complex128)[:, 0], whole[:, 2:])
 
 
 def _find_tips(model: Model, mesh: Mesh, points: Complex, location: Location) -> Bool:

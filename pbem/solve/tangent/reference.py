@@ -18,7 +18,7 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
-from pbem.bem.operator import Block, RowOperator
+from pbem.bem.operator import RegionRows, RowOperator
 from pbem.clock import clock
 from pbem.parallel import gather_parts
 from pbem.solve.petsc.linear import LinearSolver, choose_method
@@ -29,7 +29,7 @@ COLUMNS_AT_ONCE = 512
 
 
 def form_columns(
-    operator: RowOperator, block: Block, constraints: sparse.csr_matrix, columns: Integer, wanted: Integer
+    operator: RowOperator, block: RegionRows, constraints: sparse.csr_matrix, columns: Integer, wanted: Integer
 ) -> Real:
     """Some of a block's rows of B M, dense (wanted, columns), in some columns of the constraint map M.
 

@@ -19,7 +19,7 @@ from pbem.parallel import world
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.tips import collect_tip_rules
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
-from pbem.solve.problem.step import Interior, SilentReporter, Step
+from pbem.solve.problem.step import InteriorValues, SilentReporter, Step
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
@@ -86,7 +86,7 @@ class Solved:
         nodes = self.nodes(curve)
         return complex(self.mesh.weight[nodes] @ self.steps[step].traction[nodes])
 
-    def interior(self, points: Complex, step: int = -1) -> Interior:
+    def interior(self, points: Complex, step: int = -1) -> InteriorValues:
         """Displacement and stress at points (q,)."""
         model = replace(self.model, interior_points=tuple(complex(point) for point in points))
         return InteriorField(model, self.mesh, world).evaluate(self.steps[step])

@@ -32,7 +32,7 @@ def check(case: Path, changes: Mapping[str, Any], ranks: int, as_json: bool, plo
     Raises CaseError with all its faults, LaunchError where there is not the memory for it.
     """
     from pbem.case.build import read_checked_model
-    from pbem.environment import is_set
+    from pbem.environment import count_cores, is_set, read_site
     from pbem.forecast.forecast import make_forecast, refuse_memory
     from pbem.forecast.limits import OVERRIDE, read_limits
     from pbem.mesh.generate import generate_mesh
@@ -44,7 +44,7 @@ def check(case: Path, changes: Mapping[str, Any], ranks: int, as_json: bool, plo
     if plot:
         check_picture_path(plot)
     mesh = generate_mesh(model)
-    forecast = make_forecast(model, mesh, ranks)
+    forecast = make_forecast(model, mesh, ranks, cores=count_cores([read_site(os.environ)]))
     refusal = refuse_memory(forecast, ranks, read_limits(os.environ))
     if refusal and not is_set(os.environ, OVERRIDE):
         raise LaunchError(f"{case}: {refusal}")

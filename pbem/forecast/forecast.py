@@ -39,7 +39,7 @@ class Forecast:
     memory: bytes of all ranks together, by what they are for; rank_memory: of the rank that has most. seconds: of wall
     time on a core for each rank, by piece; disk: bytes of the result file. passes: whether `analysis.accuracy` asks for
     further solutions on finer meshes, which are not forecast. speed: None where it was not measured, and there are no
-    seconds.
+    seconds. cores: of the machine at hand, None where they were not counted.
     """
 
     ranks: int
@@ -51,6 +51,12 @@ class Forecast:
     disk: float
     passes: bool
     speed: Speed | None = None
+    cores: float | None = None
+
+    @property
+    def turns(self) -> float:
+        """Ranks that share a core of the machine at hand; 1 where each has one, or may have one elsewhere."""
+        return max(1.0, self.ranks / self.cores) if self.cores else 1.0
 
     @property
     def whole_memory(self) -> float:
@@ -62,12 +68,18 @@ class Forecast:
         return {
             "ranks": self.ranks, "unknowns": self.unknowns, "operator": self.operator, "memory": self.whole_memory,
             "memory_by_use": self.memory, "rank_memory": self.rank_memory, "seconds": sum(self.seconds.values()),
+            "cores": self.ranks, "cores_here": self.cores, "seconds_here": self.turns * sum(self.seconds.values()),
             "seconds_by_piece": self.seconds, "disk": self.disk, "first_pass_only": self.passes,
         }  # fmt: skip
 
 
-def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> Forecast:
-    """Forecast a run on so many ranks; timed: with seconds, for which the machine's speed is measured."""
+def make_forecast(
+    model: Model, mesh: Mesh, ranks: int, timed: bool = True, cores: float | None = None
+) -> Forecast:
+    """Forecast a run on so many ranks; timed: with seconds, for which the machine's speed is measured.
+
+    cores: that the ranks could use on the machine at hand.
+    """
     size = measure_size(model, mesh.nodes)
     work = count_work(model, mesh)
     coarse = coarsen_model(model)
@@ -80,7 +92,9 @@ def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> F
     settled = Changes(float(size.steps), 0.0)
     memory = {"programs and libraries": STARTED * ranks, **list_memory(work, ranks, changes.part)}
     if second is not None:
-        memory["second solution, for the estimate"] = sum(list_memory(second, ranks, 0.0).values())
+        # What is there only while groups are formed is there for one solution at a time.
+        beside = replace(second, groups=replace(second.groups, largest=0.0))
+        memory["second solution, for the estimate"] = sum(list_memory(beside, ranks, 0.0).values())
     speed = measure_speed(model, mesh) if timed else None
     seconds: dict[str, float] = {}
     if speed is not None:
@@ -90,7 +104,7 @@ def make_forecast(model: Model, mesh: Mesh, ranks: int, timed: bool = True) -> F
     return Forecast(
         ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
         memory=memory, rank_memory=sum(memory.values()) / ranks, seconds=seconds, disk=count_disk(model, mesh),
-        passes=model.analysis.accuracy is not None, speed=speed,
+        passes=model.analysis.accuracy is not None, speed=speed, cores=cores,
     )  # fmt: skip
 
 

@@ -49,7 +49,7 @@ START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 0.85e-
 PLACED = 40e-6
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
 ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 2.0, 110.0, 0.5, 1.0, 0.5
-SPARSE, SPARSE_SHARED = 2.0, 3.5
+SPARSE, SPARSE_SHARED, GROUPED = 2.0, 3.5, 1.0
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,8 @@ def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
         inverses = INVERSES * work.factored
     if work.hierarchical:
         near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
-        return {"operator": 8 * near * work.entries, "preconditioner": 8 * inverses,
+        return {"operator": 8 * near * work.entries, "preconditioner": 8 * (inverses + work.groups.kept),
+                "groups, while they are formed": 8 * work.groups.largest * min(ranks, work.groups.count),
                 "mesh and vectors": EVERYWHERE_FAR * ranks * work.unknowns}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
     factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
@@ -144,7 +145,8 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
     vectors = python * VECTOR * iterations * work.unknowns
     if work.hierarchical:
         products = iterations * ((1.0 if work.sparse else GMRES if changes.part else GMRES_SETTLED) + PRODUCTS)
-        inverses = python * work.unknowns * INVERSE * share
+        groups = ENTRY * speed.entry * work.groups.entries + GROUPED * speed.operation * work.groups.operations
+        inverses = python * work.unknowns * INVERSE * share + groups / max(1, min(ranks, work.groups.count))
         if work.sparse:
             inverses = speed.operation * SPARSE * share * work.operations + CALL * python
         return {

@@ -15,6 +15,7 @@ from pbem.bem.tree import find_interactions
 from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import PairLaws, collect_laws
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
+from pbem.forecast.groups import NO_GROUPS, Groups, count_groups
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
@@ -30,7 +31,8 @@ class Work:
     the displacements of cracks; formed: of the tangent operator as it is
     filled, in numbers of 8 bytes; factored: of its factors; operations: to factorise it, multiplications and additions.
     columns: of pairs, computed once for all. hierarchical, sparse: kind of the operator and of its factors; of the
-    hierarchical one these are of all bodies together, and `besides` is of the rows that they are made of.
+    hierarchical one these are of all bodies together, and `besides` is of the rows that they are made of. groups: of
+    bodies, in the preconditioner of the hierarchical one.
     """
 
     unknowns: int
@@ -43,6 +45,7 @@ class Work:
     columns: float
     hierarchical: bool
     sparse: bool
+    groups: Groups = NO_GROUPS
 
 
 def count_work(model: Model, mesh: Mesh) -> Work:
@@ -54,7 +57,8 @@ def count_work(model: Model, mesh: Mesh) -> Work:
         entries, inner = _count_hierarchical(model, mesh, find_needed_columns(model, mesh, outer))
         bodies = choose_body_factors(mesh)
         if bodies is None:
-            return Work(unknowns, varying, entries, 0.0, inner, inner, 0.0, 0.0, True, False)
+            return Work(unknowns, varying, entries, 0.0, inner, inner, 0.0, 0.0, True, False,
+                        count_groups(mesh))
         return Work(unknowns, varying, entries, bodies.rows, bodies.formed, bodies.factored, bodies.operations, 0.0,
                     True, True)
     entries, besides = _count_dense(model, mesh, find_needed_columns(model, mesh, outer))

@@ -249,12 +249,20 @@ def describe_forecast(forecast: Forecast) -> list[str]:
         f"on {count(forecast.ranks, 'rank')}, a core for each:",
         f"memory of all ranks {format_bytes(forecast.whole_memory)} ({uses}), of one rank at most "
         f"{format_bytes(forecast.rank_memory)}",
-        f"time {format_seconds(sum(forecast.seconds.values()))} (seconds: {pieces})",
+        f"time {format_seconds(sum(forecast.seconds.values()))}{_tell_turns(forecast)} (seconds: {pieces})",
         f"disk {format_bytes(forecast.disk)}",
     ]
     if forecast.passes:
         lines.append("of the first pass: analysis.accuracy may ask for further ones, on finer meshes")
     return lines
+
+
+def _tell_turns(forecast: Forecast) -> str:
+    """How long it takes here, where ranks have to take turns on the cores of the machine."""
+    if forecast.turns == 1.0:
+        return ""
+    seconds = format_seconds(forecast.turns * sum(forecast.seconds.values()))
+    return f", or {seconds} on the {forecast.cores:g} cores here, on which the ranks take turns"
 
 
 def format_seconds(seconds: float) -> str:

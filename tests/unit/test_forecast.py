@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -11,19 +12,25 @@ from pbem.bem import operator_choice
 from pbem.bem.body_factors import choose_body_factors
 from pbem.case.build import parse_model
 from pbem.contact.dependence import find_unknowns_of_regions
-from pbem.contact.laws import collect_laws
+from pbem.contact.laws import OPEN, SLIP, ModeState, collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.forecast import groups as counted
 from pbem.forecast.disk import count_disk, count_stored_steps
 from pbem.forecast.forecast import make_forecast
+from pbem.forecast.groups import count_groups
 from pbem.forecast.usual import expect_changes, list_memory
 from pbem.forecast.work import _eliminate, _make_blocks, count_work
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import world
+from pbem.results.model_text import describe_forecast
 from pbem.solve.estimate.coarser_mesh import put_beside
+from pbem.solve.preconditioner import schwarz, subdomains
 from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent.krylov import KrylovTangent
 from scripts.bench_connected import write_layers
+from tests.identities.solving import linearise_pairs
 from tests.unit.case_sample import BLOCKS
 
 TILTED = """
@@ -152,3 +159,72 @@ def test_the_second_solution_has_the_operator_of_the_run(monkeypatch: pytest.Mon
     assert found.operator == "hierarchical" and beside is not None
     expected = sum(list_memory(count_work(beside.model, beside.mesh), 1, 0.0).values())
     assert found.memory["second solution, for the estimate"] == pytest.approx(expected, rel=1e-12)
+
+
+PLATE = """
+[materials.rock]
+young = 1000.0
+poisson = 0.25
+[curves]
+rim = { points = [[0, 0], [40, 0], [40, 40], [0, 40], [0, 0]], elements = 24 }
+[regions.plate]
+material = "rock"
+boundary = ["rim"]
+[[generate]]
+kind = "cracks"
+name = "crack"
+count = 30
+half_length = 1.0
+distance = 0.1
+elements = 16
+seed = 5
+region = "plate"
+box = [0, 0, 40, 40]
+friction = 0.4
+[boundary]
+rim = { ux = 0.0, uy = 0.0 }
+[solver]
+operator = "hierarchical"
+"""
+
+
+def test_memory_of_groups_of_bodies_is_that_while_they_are_formed() -> None:
+    """The rim is one group, with the nearest cracks around it; entries of B are not there all at once."""
+    model, mesh = read(PLATE)
+    groups = count_groups(mesh)
+    problem = assemble_problem(model, mesh, world)
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent) and groups.count == 1
+    pairs = np.arange(mesh.pairs.count)
+    modes = ModeState(np.where(pairs % 5 < 3, SLIP, OPEN).astype(np.int8), np.ones(len(pairs)))
+    constraints = problem.constrain(linearise_pairs(problem, modes), problem.evaluate_load(0, 1.0))
+    tracemalloc.start()
+    tangent.preconditioner.update(constraints)
+    kept, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    rim = max(tangent.preconditioner.inverses, key=lambda each: 0 if each.matrix is None else each.matrix.nbytes)
+    assert not mesh.crack[rim.group.elements].any() and rim.matrix is not None
+    assert rim.matrix.size == pytest.approx(groups.kept, rel=0.15)
+    assert most - kept < 1.2 * 8 * groups.largest
+    assert most > 0.7 * 8 * (groups.largest + groups.kept)
+    work = count_work(model, mesh)
+    assert work.groups == groups
+    one, four = (list_memory(work, ranks, 0.0)["groups, while they are formed"] for ranks in (1, 4))
+    assert one == four == 8 * groups.largest
+
+
+def test_sizes_of_groups_are_those_of_the_preconditioner() -> None:
+    for name in ("GROUP_ELEMENTS", "BODY_ELEMENTS", "BODY_SHARE", "NEIGHBOUR_UNKNOWNS", "NEIGHBOUR_SHARE"):
+        assert getattr(counted, name) == getattr(subdomains, name)
+    assert (counted.MOST_LEFT, counted.MOST_TIMES) == (schwarz.MOST_LEFT_OF_BODIES, schwarz.MOST_TIMES)
+
+
+def test_ranks_without_cores_take_turns() -> None:
+    model, mesh = read(TILTED.format(sxx=0, syy=-1))
+    two, eight, away = (replace(make_forecast(model, mesh, ranks, timed=False, cores=cores), seconds={"steps": 3.0})
+                        for ranks, cores in ((2, 4.0), (8, 4.0), (8, None)))
+    assert (two.turns, eight.turns, away.turns) == (1.0, 2.0, 1.0)
+    told = eight.to_plain()
+    assert (told["seconds"], told["seconds_here"], told["cores"], told["cores_here"]) == (3.0, 6.0, 8, 4.0)
+    assert "time 3 s, or 6 s on the 4 cores here" in "\n".join(describe_forecast(eight))
+    assert "here" not in "\n".join(describe_forecast(two))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Bool, Complex, Integer, Real
-from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
+from pbem.bem.operator import CHUNK_BYTES, collect_free_terms, collect_sources, scale_equations
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.bem.rigid_region import form_rigid_rows
 from pbem.bem.rows import Sources, evaluate_rows
@@ -19,6 +19,8 @@ from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination
 
+# Nodes whose equations are turned at a time.
+TURNED = 64
 # Anchors that act by no more than this part do not act.
 NOTHING = 1e-12
 
@@ -68,13 +70,35 @@ class LocalOperator:
             seen = sources[mesh.region[sources] == region]
             if not len(own) or not len(seen):
                 continue
-            values, places = self.evaluate(int(region), seen, nodes[own])
-            place, known = find_places(places, row)
-            entries = (value[known], (place[known], column[known]))
-            chosen = sparse.csr_matrix(entries, shape=(len(places), len(left)))
-            formed[number_components(own)] += (chosen.T @ values.T).T
-        turned = formed if less is None else less.turn[nodes] @ formed.reshape(len(nodes), 2, -1)
-        return np.asarray(turned.reshape(2 * len(nodes), -1)[np.searchsorted(number_components(nodes), around[rows])])
+            self._add_products(formed, int(region), seen, nodes, own, (row, column, value))
+        for begin in range(0, len(nodes) if less is not None else 0, TURNED):
+            part = formed.reshape(len(nodes), 2, -1)[begin : begin + TURNED]
+            part[:] = less.turn[nodes[begin : begin + TURNED]] @ part  # type: ignore[union-attr]
+        at = np.searchsorted(number_components(nodes), around[rows])
+        return formed if len(at) == len(formed) else formed[at]
+
+    def _add_products(
+        self, formed: Real, region: int, seen: Integer, nodes: Integer, own: Integer,
+        constraints: tuple[Integer, Integer, Real],
+    ) -> None:
+        """Add to the rows of nodes[own] of a region what elements seen do, as the constraint map's entries combine it.
+
+        formed (2 nodes, columns); constraints: entry of v, column, and value of each entry. Some rows at a time: all
+        entries of B of a large group would take several times what is formed of them.
+        """
+        row, column, value = constraints
+        step = max(1, CHUNK_BYTES // (8 * 2 * 4 * (self._mesh.order + 1) * len(seen)))
+        if self._materials[region].rigid is not None:
+            step = len(own)
+        chosen = None
+        for begin in range(0, len(own), step):
+            part = own[begin : begin + step]
+            values, places = self.evaluate(region, seen, nodes[part])
+            if chosen is None:
+                place, known = find_places(places, row)
+                entries = (value[known], (column[known], place[known]))
+                chosen = sparse.csr_matrix(entries, shape=(formed.shape[1], len(places)))
+            formed[number_components(part)] += (chosen @ values.T).T
 
     def evaluate(self, region: int, elements: Integer, nodes: Integer) -> tuple[Real, Integer]:
         """Rows of B of nodes, less the free terms, on the entries of v of elements of the same region; and these."""

@@ -191,7 +191,6 @@ class SchwarzPreconditioner:
         left = np.flatnonzero(~local)
         whole = self._local.form(elements, around, rows, left, constraints, free, less)
         rest = ~first[rows]
-        factors, pivots, zero_pivot = lapack.dgetrf(np.asfortranarray(whole[rest]), overwrite_a=True)
         # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
         at = np.flatnonzero(~rest)
         effect = np.zeros((len(inside), len(left)))
@@ -200,9 +199,12 @@ class SchwarzPreconditioner:
         wanted = -(back @ effect.reshape(len(back), 2, -1)).reshape(effect.shape)
         kept = np.flatnonzero(~local[inside])
         wanted[kept, np.searchsorted(left, inside[kept])] = 1.0
+        # The transposed matrix is factorised where it is: of large groups every copy is tens of megabytes.
+        whole = whole if rest.all() else whole[rest]
+        factors, pivots, zero_pivot = lapack.dgetrf(whole.T, overwrite_a=True)
         inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
         if not zero_pivot:
-            matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, trans=1)[0].T
+            matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, overwrite_b=True)[0].T
             # All groups together are much of what is stored: of large models in single precision.
             stored: Real | Single = np.ascontiguousarray(matrix)
             if len(around) < 2 * self._mesh.nodes >= SINGLE:

@@ -10,7 +10,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import find_parts
 from pbem.model.model import Model
 from pbem.results.contents import Balances
-from pbem.results.lazy import freeze, read_names
+from pbem.results.opening import freeze, read_names
 from pbem.solve.problem.step import Step
 
 # Quantities of the regions; of the parts that cracks cut off; of the whole.

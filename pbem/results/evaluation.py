@@ -21,7 +21,7 @@ from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions, take_off_ri
 from pbem.mesh.interpolation import interpolate, interpolate_tips, split_faces
 from pbem.mesh.numbering import split_components
 from pbem.results.contents import Elements, Nodes, Steps
-from pbem.results.lazy import open_quietly
+from pbem.results.opening import open_quietly
 from pbem.results.rebuilt import RebuiltRun, find_opposite_faces, rebuild_run
 from pbem.results.resampling import Resampling, resample
 from pbem.results.whereabouts import Whereabouts, find_points

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Integer, Real
-from pbem.errors import ResultFileError
 from pbem.results.contents import Elements
-from pbem.results.journal import OverlaidFile
+from pbem.results.opening import freeze, open_quietly
 from pbem.results.pair_weights import JUMPS, weigh_pairs
-from pbem.results.tail import DamageError, find_unapplied
 from pbem.results.trace_names import is_piece, number_piece
 from pbem.wording import suggest
 
@@ -292,70 +288,3 @@ def _read_contact(path: Path, file: h5py.File, name: str, steps: int) -> Contact
         path=path, name=name, first=str(group.attrs["first"]), second=str(group.attrs["second"]) or None, law=law,
         steps=steps, pairs=len(group["arc_length"]),
     )
-
-
-@contextmanager
-def open_quietly(path: Path) -> Iterator[h5py.File]:
-    """A file to be read, without locks: a run that is going on may be looked at, and goes on writing.
-
-    Raises ResultFileError where the file is damaged.
-    """
-    with refuse_damage(path), _open(path) as file:
-        yield file
-
-
-def has_journal(path: Path) -> bool:
-    """Whether pages of the file are still on their way to their places: its run was killed while it wrote them."""
-    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        return find_unapplied(disk) is not None
-    finally:
-        os.close(disk)
-
-
-@contextmanager
-def _open(path: Path) -> Iterator[h5py.File]:
-    disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        tail = find_unapplied(disk)
-    finally:
-        os.close(disk)
-    if tail is None:
-        with h5py.File(path, "r", locking=False) as file:
-            yield file
-        return
-    # Its run was killed while it wrote the pages of its journal to their places.
-    with closing(OverlaidFile(path, tail)) as committed, h5py.File(committed, "r") as file:
-        yield file
-
-
-@contextmanager
-def refuse_damage(path: Path) -> Iterator[None]:
-    """Raise ResultFileError for what h5py raises in the block when a file is none of HDF5's, cut off or damaged."""
-    try:
-        yield
-    except DamageError as error:
-        raise ResultFileError(str(path), str(error.strerror)) from error
-    except OSError as error:
-        raise ResultFileError(str(path), f"is not an HDF5 file, or is cut off ({_shorten(error)})") from error
-    except DAMAGE as error:
-        raise ResultFileError(str(path), f"is not a complete result file ({_shorten(error)})") from error
-
-
-def _shorten(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
-
-
-# What h5py and NumPy raise when a file holds other kinds of things than it should.
-DAMAGE = (KeyError, ValueError, RuntimeError, TypeError, AttributeError, IndexError, MemoryError, OverflowError)
-
-
-def read_names(item: h5py.HLObject) -> tuple[str, ...]:
-    """Its attribute `names`."""
-    return tuple(str(name) for name in item.attrs["names"])
-
-
-def freeze(array: NDArray[Any]) -> NDArray[Any]:
-    """The same array, read-only."""
-    array.setflags(write=False)
-    return array

@@ -7,7 +7,7 @@ import numpy as np
 
 from pbem.mesh.mesh import Mesh
 from pbem.results.contents import Linearities
-from pbem.results.lazy import freeze, read_names
+from pbem.results.opening import freeze, read_names
 from pbem.solve.problem.step import Linearity, Step
 from pbem.solve.steps.linearity import describe_nonlinearity
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pbem.errors import ResultFileError
-from pbem.results.lazy import open_quietly, refuse_damage
+from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.tail import SIGNATURE
 from pbem.results.trial import check_contents
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pbem.case.overrides import read_overrides, write_overrides
 from pbem.errors import CaseError, ResultFileError
-from pbem.results.lazy import open_quietly, refuse_damage
+from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.trial import check_contents
 
 

@@ -14,7 +14,7 @@ from pbem.model.refinement import Fractions
 from pbem.results.accuracy import Pass
 from pbem.results.journal import lock
 from pbem.results.layout import read_fractions
-from pbem.results.lazy import open_quietly, refuse_damage
+from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
 from pbem.results.trial import check_contents
 

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pbem.arrays import Bool, Integer, Real
+from pbem.arrays import Bool, Real
 from pbem.description.generation import GeneratedGroup
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
@@ -24,20 +24,21 @@ from pbem.results.balance import read_balance
 from pbem.results.contents import Balances, Elements, Energies, Errors, Linearities, Nodes, Steps, Tips, Units
 from pbem.results.evaluation import Evaluation, Evaluator, Side
 from pbem.results.journal import is_being_written
-from pbem.results.layout import ENERGIES, TIP_DATASETS, count_steps, read_fractions
-from pbem.results.lazy import (
-    AllPairs,
-    Contact,
-    Interfaces,
-    InteriorPoints,
-    freeze,
-    open_quietly,
-    read_names,
-    refuse_damage,
-)
+from pbem.results.layout import ENERGIES, read_fractions
+from pbem.results.lazy import AllPairs, Contact, Interfaces, InteriorPoints
 from pbem.results.linearity import read_linearity
+from pbem.results.opening import freeze, open_quietly, read_names, refuse_damage
 from pbem.results.outline import find_tips
 from pbem.results.rigid import RigidMotion, read_rigid
+from pbem.results.sections import (
+    read_energy,
+    read_errors,
+    read_indices,
+    read_interior,
+    read_reactions,
+    read_steps,
+    read_tips,
+)
 from pbem.results.trial import check_contents
 
 STATUSES = ("running", "finished", "failed", "stopped")
@@ -109,7 +110,7 @@ class Results:
     def errors(self) -> Errors:
         """Estimated discretisation errors."""
         with open_quietly(self.path) as file:
-            return _read_errors(file, len(self.steps))
+            return read_errors(file, len(self.steps))
 
     def displacement_at(self, step: int) -> Real:
         """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
@@ -259,7 +260,7 @@ def _open(path: Path) -> Results:
 
 def _read(path: Path, file: h5py.File) -> Results:
     attributes = dict(file.attrs)
-    steps = _read_steps(file)
+    steps = read_steps(file)
     k = len(steps)
     nodes, elements = file["nodes"], file["elements"]
     return Results(
@@ -271,26 +272,26 @@ def _read(path: Path, file: h5py.File) -> Results:
         units=Units(str(attributes["units_length"]), str(attributes["units_stress"])),
         nodes=Nodes(
             position=freeze(nodes["position"][...]), normal=freeze(nodes["normal"][...]),
-            **{name: _read_indices(nodes, name) for name in ("region", "curve", "element")},
+            **{name: read_indices(nodes, name) for name in ("region", "curve", "element")},
             order=int(nodes.attrs["order"]), region_names=read_names(nodes["region"]),
             curve_names=read_names(nodes["curve"]),
         ),
         elements=Elements(
             vertices=freeze(elements["vertices"][...]), sweep=freeze(elements["sweep"][...]),
-            region=_read_indices(elements, "region"),
-            curve=_read_indices(elements, "curve"), crack=freeze(elements["crack"][...].astype(bool)),
-            tip=_read_indices(elements, "tip"),
+            region=read_indices(elements, "region"),
+            curve=read_indices(elements, "curve"), crack=freeze(elements["crack"][...].astype(bool)),
+            tip=read_indices(elements, "tip"),
         ),
         steps=steps,
-        reactions=_read_reactions(file, k),
+        reactions=read_reactions(file, k),
         contact=Interfaces(path, read_names(file["contact"]), k),
         pairs=AllPairs(path, read_names(file["contact"]), k),
         groups=tuple(GeneratedGroup(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
-        tips=_read_tips(file, k),
-        energy=Energies(*(freeze(_read_energy(file, kind, k)) for kind in ENERGIES)),
+        tips=read_tips(file, k),
+        energy=Energies(*(freeze(read_energy(file, kind, k)) for kind in ENERGIES)),
         balance=read_balance(file, k),
         linearity=read_linearity(file, k),
-        interior=_read_interior(path, file, k),
+        interior=read_interior(path, file, k),
         convergence=freeze(file["convergence"][...]),
         rigid=read_rigid(file, k),
     )
@@ -302,76 +303,3 @@ def _read_status(path: Path, attributes: Mapping[str, Any]) -> str:
     if status not in STATUSES:
         raise ValueError(f"unknown status {status}")
     return "stopped" if status == "running" and not is_being_written(path) else status
-
-
-def _read_energy(file: h5py.File, kind: str, k: int) -> Real:
-    """Files of earlier versions tell nothing of what was released, which they added to the rest, or removed."""
-    group = file["energy"]
-    return np.asarray(group[kind][:k]) if kind in group or kind not in ("released", "removed") else np.zeros(k)
-
-
-def _read_steps(file: h5py.File) -> Steps:
-    group = file["steps"]
-    columns = ("number", "stage", "factor", "iterations", "residual")
-    k = count_steps(file)
-    values = {name: freeze(group[name][:k].astype(float if name in ("factor", "residual") else int))
-              for name in columns}
-    removed = json.loads(str(group["stage"].attrs.get("removed", "[]")))
-    return Steps(**values, stage_names=read_names(group["stage"]), removed=tuple(map(tuple, removed)))
-
-
-def _read_reactions(file: h5py.File, steps: int) -> dict[str, Real]:
-    names = read_names(file["reactions"])
-    if not names:
-        return {}
-    together = freeze(file["all/reactions"][:steps])
-    return {name: together[:, number] for number, name in enumerate(names)}
-
-
-def _read_tips(file: h5py.File, steps: int) -> dict[str, Tips]:
-    names = read_names(file["tips"])
-    if not names:
-        return {}
-    group = file["all/tips"]
-    unknown = np.full((steps, len(names), 2), np.nan)  # to older versions
-    values = {kind: freeze(group[kind][:steps]) if kind in group else unknown for kind in TIP_DATASETS}
-    moduli = group["plane_modulus"][...] if "plane_modulus" in group else np.full(len(names), np.nan)
-    return {
-        name: Tips(**{kind: each[:, number] for kind, each in values.items()}, plane_modulus=float(moduli[number]))
-        for number, name in enumerate(names)
-    }
-
-
-def _read_errors(file: h5py.File, steps: int) -> Errors:
-    """Empty where the file has none."""
-    nothing = np.full(steps, np.nan)
-    if "estimates" not in file:
-        return Errors({}, {}, {}, {}, {}, {}, {}, nothing, {}, "written by a version that estimates no errors")
-    group = file["estimates"]
-
-    def read(quantity: str, names: str) -> dict[str, Real]:
-        if quantity not in group:
-            return {}
-        values = freeze(group[quantity][:steps])
-        return {str(name): values[:, number] for number, name in enumerate(group.attrs[names])}
-
-    return Errors(
-        reactions=read("reactions", "curves"),
-        **{name: read(name, "interfaces") for name in ("opening", "slip", "traction_n", "traction_s")},
-        **{name: read(name, "cracks") for name in ("KI", "KII")},
-        displacement=freeze(group["displacement"][:steps]),
-        relative={name.removeprefix("relative_"): freeze(data[:steps]) for name, data in group.items()
-                  if name.startswith("relative_")},
-        missing=str(group.attrs["missing"]),
-    )  # fmt: skip
-
-
-def _read_interior(path: Path, file: h5py.File, steps: int) -> InteriorPoints | None:
-    if "interior" not in file:
-        return None
-    group = file["interior"]
-    return InteriorPoints(path, freeze(group["position"][...]), _read_indices(group, "region"), steps)
-
-
-def _read_indices(group: h5py.GeneratedGroup, name: str) -> Integer:
-    return freeze(group[name][...].astype(np.int64))

@@ -12,7 +12,7 @@ from pbem.arrays import Complex, Real
 from pbem.mesh.mesh import Faces
 from pbem.model.model import Model
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference, unit_motions
-from pbem.results.lazy import freeze, read_names
+from pbem.results.opening import freeze, read_names
 
 # Unknown moments and rotations of a single point are told apart from nothing below this part.
 SINGULAR = 1e-12

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pbem.arrays import Integer, Real
 from pbem.errors import ResultFileError
 from pbem.results.journal import is_being_written
-from pbem.results.lazy import has_journal, open_quietly
+from pbem.results.opening import has_journal, open_quietly
 from pbem.results.reader import Results
 from pbem.results.vtk_cells import Cells, join_faces, join_grid, join_pairs, match_pairs
 

@@ -38,8 +38,8 @@ from pbem.results.layout import (
     write_attributes,
     write_header,
 )
-from pbem.results.lazy import refuse_damage
 from pbem.results.linearity import append_linearity
+from pbem.results.opening import refuse_damage
 from pbem.results.output import check_output_path
 from pbem.results.resume import check_same_case, read_last_energy, read_last_step, truncate
 from pbem.results.rigid import append_rigid

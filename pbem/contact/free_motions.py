@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.anchor import Anchor, group_motions, see_motions
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairLaws, follow_leaders, resists_slip
 from pbem.mesh.mesh import Mesh
@@ -129,21 +129,24 @@ CLOSED_AT_LEAST = 3
 
 
 def close_nearest_pairs(
-    mesh: Mesh, laws: PairLaws, modes: ModeState, opening: Real, least: int = CLOSED_AT_LEAST
+    mesh: Mesh, laws: PairLaws, modes: ModeState, opening: Real, least: int = CLOSED_AT_LEAST,
+    left: Bool | None = None,
 ) -> ModeState:
     """Modes with the nearest pairs of every interface on which fewer than `least` are closed, for a body that is free.
 
     A body that is pressed against another one by forces alone has no equilibrium until they touch somewhere; opening
-    (m,): the present openings.
+    (m,): the present openings. left (m,): pairs that a body rolls away from, which are the last to come into question;
+    where it is given, what is closed may slip, as a body that rolls only comes to touch there.
     """
     mode = modes.mode.copy()
-    closed = np.where(resists_slip(laws), STICK, SLIP)
+    closed = np.where(resists_slip(laws) & (left is None), STICK, SLIP)
     may_close = np.flatnonzero(~laws.parted & ~mesh.pairs.crack)
     of = mesh.pairs.interface[may_close]
     count = np.bincount(of[mode[may_close] != OPEN], minlength=len(mesh.interface_names))
     own = may_close[(mode[may_close] == OPEN) & (count[of] < least)]
     # By interface, then by opening: the first few of each interface are its nearest pairs.
-    own = own[np.lexsort((opening[own], mesh.pairs.interface[own]))]
+    late = np.zeros(len(own), dtype=bool) if left is None else left[own]
+    own = own[np.lexsort((opening[own], late, mesh.pairs.interface[own]))]
     of = mesh.pairs.interface[own]
     nearest = own[np.arange(len(own)) - np.searchsorted(of, of) < least - count[of]]
     mode[nearest] = closed[nearest]

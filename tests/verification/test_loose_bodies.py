@@ -155,3 +155,49 @@ def test_a_disc_that_the_mesh_would_turn_is_told_to_be_free(load: float, tmp_pat
     with pytest.raises(ConvergenceError, match=r"rotation about .* of 'disc'.*shorter elements") as caught:
         run_disc(tmp_path, load, 0.1)
     assert caught.value.reason == "free motion"
+
+
+# What each pair alone of a coarse mesh sees: elements of pin and hole, clearance, multiple of half an element towards
+# which the force acts, friction, force over modulus and clearance; in mm and MPa, away from the origin.
+LIGHT = [(32, 1e-2, 5, 0.6, 2.5e-4, "SST", "pin"), (24, 2.5e-3, 40, 0.3, 8e-4, "DBEM", "tool"),
+         (12, 4e-4, 18, 0.6, 2.3e-3, "SST", "pin"), (24, 2.3e-3, 11, 0.6, 1e-3, "THST", "tool")]  # fmt: skip
+
+
+@pytest.mark.parametrize(("elements", "clearance", "half", "friction", "load", "scheme", "kind"), LIGHT)
+def test_a_light_pin_rests_on_the_pairs_beneath_its_force(
+    elements: int, clearance: float, half: int, friction: float, load: float, scheme: str, kind: str, tmp_path: Path
+) -> None:
+    """A contact that is shorter than an element turns the pin at most until the next pair touches, which bears nothing:
+    the force goes through the pairs that it points to, and moves the pin along itself."""
+    size, young, at = 25.0, 2.1e5, [400.0, -150.0]
+    direction = np.exp(1j * np.pi * half / elements)
+    force = load * young / (1 - 0.3**2) * clearance * size * direction
+
+    def circle(radius: float, number: int) -> dict[str, object]:
+        return {"center": at, "radius": radius * size, "elements": number}
+
+    push = {"fx": force.real, "fy": force.imag}
+    case = {
+        "materials": {"m": {"young": young, "poisson": 0.3}},
+        "curves": {"hole": circle(1 + clearance, elements), "rim": circle(1.0, elements), "edge": circle(5.0, 16)},
+        "regions": {"plate": {"material": "m", "boundary": ["hole", "edge"]}},
+        "boundary": {"edge": {"ux": 0.0, "uy": 0.0}},
+        "contacts": {"seat": {"between": ["rim", "hole"], "friction": friction}},
+        "analysis": {"scheme": scheme, "steps": 2},
+    }
+    if kind == "tool":
+        case["tools"] = {"rim": push}
+    else:
+        case["curves"]["hub"] = circle(0.3, 12)
+        case["regions"]["pin"] = {"material": "m", "boundary": ["rim", "hub"]}
+        case["boundary"]["hub"] = {"rigid": push}
+    results = pbem.run(case, tmp_path / "pin.h5")
+    seat, body = results.contact["seat"], results.rigid["rim" if kind == "tool" else "hub"]
+    assert results.reactions["edge"][-1] @ [1, 1j] == pytest.approx(-force, rel=1e-2)
+    away = np.abs(np.angle((seat.position - at) @ [1, 1j] / direction))
+    bears = -seat.traction_n[-1] > 1e-2 * np.abs(seat.traction_n[-1]).max()
+    assert bears.any() and away[bears].max() < 2 * np.pi / elements
+    # A turn about the pair that bears moves the middle aside by as much as the next pair was off.
+    moved = body.motion[-1][:2] @ [1, 1j] / direction
+    assert clearance * size < moved.real < 1.2 * clearance * size
+    assert abs(moved.imag) < 2 * np.pi / elements * clearance * size

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.cut_parts import CutMotion
 from pbem.contact.floating import measure_space
@@ -35,6 +35,9 @@ MOST_HELD = 12
 # its sense lies between pairs, as under a symmetric load: by no more than meshes of round faces resist a turn. Once so
 # many were tried it may bear this part more than its bound.
 TRIED, BEYOND = 3, 1e-3
+# A pair that a body has rolled to until it touched may pull by this part of the largest pressure: by no more than the
+# moment of the other pairs is known to.
+SLIGHT = 1e-2
 # Gaps that differ by more than this part are not those of a symmetric contact.
 UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
@@ -64,6 +67,10 @@ class Hold:
         self.count = 0
         self.driven = False
         self.repeated = 0
+        # Whether pairs that were closed to hold a body opened again each time: then it rolls away from them.
+        self.rolls = False
+        # The sense of the friction of pairs that stuck last.
+        self.sense = np.zeros(problem.laws.count, dtype=np.int8)
         # Blocks that pairs were closed to hold; the last state of all pairs that was found; what floats in it.
         self.placed: set[int] = set()
         self.state: PairState | None = None
@@ -101,6 +108,7 @@ class Hold:
         # Pairs that hold a body only by pulling open again each time: there is no state in which they hold it.
         same = before is not None and held is not modes and held.fingerprint() == before.fingerprint()
         self.repeated = self.repeated + 1 if same else 0
+        self.rolls |= same
         if same:
             self.share = SHARES[min(self.repeated, len(SHARES) - 1)]
         if self.repeated == MOST_REPEATED:
@@ -115,14 +123,48 @@ class Hold:
         if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
+        left = None
+        if before is not None:
+            self._note_sense(before)
+        if before is not None and self.rolls:
+            modes, left = self._roll(modes, before)
         # No more than hold it: a third pair beside the two on which a round body lies would pull at it.
         for least in range(2, CLOSED_AT_LEAST + 1):
-            closed = close_nearest_pairs(mesh, laws, modes, opening, least)
+            closed = close_nearest_pairs(mesh, laws, modes, opening, least, left)
             if not self.find_free(closed):
                 return closed
+            held = self._stick_bodies(closed, slip, before, modes) if left is not None else closed
+            if held is not closed:
+                return held
+        return self._stick_bodies(closed, slip, before, modes)
+
+    def _note_sense(self, before: ModeState) -> None:
+        """Take note of the friction of pairs that stuck in the last solution."""
+        if self.state is not None:
+            stuck = (before.mode == STICK) & (self.state.p_s != 0.0)
+            self.sense[stuck] = np.sign(self.state.p_s[stuck])
+
+    def _roll(self, modes: ModeState, before: ModeState) -> tuple[ModeState, Bool]:
+        """The modes of bodies that roll, and the pairs (m,) away from which they do so, as one that sticks is left.
+
+        A body rolls about a pair that sticks: where one pair alone is left closed, it does. Pairs that are open have
+        the sense in which they were dragged when they stuck, as two that stick pull at each other.
+        """
+        pairs, count = self.problem.mesh.pairs, len(self.problem.mesh.interface_names)
+        closed = modes.mode != OPEN
+        alone = closed & (np.bincount(pairs.interface[closed], minlength=count) == 1)[pairs.interface] & ~pairs.crack
+        sticks = alone & resists_slip(self.problem.laws)
+        mode = np.where(sticks, STICK, modes.mode).astype(np.int8)
+        sign = np.where(~closed & (self.sense != 0), self.sense, modes.sign)
+        held = np.bincount(pairs.interface[sticks & (before.mode == STICK)], minlength=count) > 0
+        return ModeState(mode, sign), np.asarray((before.mode != OPEN) & ~closed & held[pairs.interface])
+
+    def _stick_bodies(self, closed: ModeState, slip: Real, before: ModeState | None, modes: ModeState) -> ModeState:
+        """The closed modes, with pairs sticking that hold the bodies; the same if nothing does."""
         if before is None or self.count >= MOST_HELD:
             return closed
-        joint = np.where(mesh.pairs.crack, -1, mesh.pairs.interface)
+        pairs = self.problem.mesh.pairs
+        joint = np.where(pairs.crack, -1, pairs.interface)
         overloaded = self._find_overloaded(before, modes)
         return self._stick(joint, closed, slip, overloaded, lambda trial: not self.find_free(trial))
 
@@ -135,12 +177,22 @@ class Hold:
         """The proposal, without a change where only a pair that holds a body is overloaded and by next to nothing,
         after its neighbours were found to be so too (see BEYOND). On the first rank, which knows what holds a body."""
         at = np.flatnonzero(proposal.changed)
+        if self.rolls and self._rests(modes, state, proposal):
+            return Proposal(modes, np.zeros_like(proposal.violation))
         if self.count < TRIED or len(at) != 1 or at[0] not in self.pairs:
             return proposal
         slips = modes.mode[at[0]] == STICK and proposal.modes.mode[at[0]] == SLIP
         if not slips or proposal.violation[at[0]] > BEYOND * abs(state.p_s[at[0]]):
             return proposal
         return Proposal(modes, np.zeros_like(proposal.violation))
+
+    def _rests(self, modes: ModeState, state: PairState, proposal: Proposal) -> bool:
+        """Whether nothing changes but that pairs open which pull by next to nothing, and without which a body would be
+        free: a round one that rests on a pair, and rolled until it touches another one."""
+        opens = proposal.changed & (modes.mode != OPEN) & (proposal.modes.mode == OPEN)
+        if not opens.any() or (opens != proposal.changed).any() or not self.find_free(proposal.modes):
+            return False
+        return bool(state.p_n[opens].max() <= SLIGHT * np.abs(state.p_n).max())
 
     def _stick(
         self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]

@@ -5,16 +5,17 @@
     .venv/bin/python scripts/fuzz.py results --count 1000
     .venv/bin/python scripts/fuzz.py values --count 1000
     .venv/bin/python scripts/fuzz.py commands --count 2000
-    .venv/bin/python scripts/fuzz.py runs --count 3000
+    .venv/bin/python scripts/fuzz.py runs --count 3000 [--records FILE]
+    .venv/bin/python scripts/fuzz.py ranks --count 200
 
 cases: what `pbem check` does, in this process. results: damaged files are read, described, drawn and resumed in
 processes of their own, since HDF5 may crash. values: keys and values of `--set`, of `Case.replace` and of sweeps, and
 quantities; what is accepted is written and read back. commands: the command line, but for runs. runs: small cases are
 computed, each in a process of its own; those that finish have no values that are not numbers, and their forces balance
-or a note says that they do not. Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints
-each new kind of failure (exception and place in the program) with the number of the mutant, which --only makes again;
-exit code 1 if there are any. Anything that takes more than a minute of processor time is a failure, and so are control
-characters in what is said.
+or a note says that they do not. ranks: what one rank does with them, two must do: end, statuses, iterations and values.
+Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind of failure (exception
+and place in the program) with the number of the mutant, which --only makes again; exit code 1 if there are any.
+Anything that takes more than a minute of processor time is a failure, and so are control characters in what is said.
 """
 
 from __future__ import annotations
@@ -598,129 +599,14 @@ def fuzz_commands(seed: int, numbers: range, failures: Failures) -> int:
     return accepted
 
 
-PRESSED = """\
-[materials]
-a = { young = 1000.0, poisson = 0.3 }
-b = { young = 400.0, poisson = 0.2 }
-[curves]
-bottom = { points = [[0, 0], [2, 0]], elements = 2 }
-sides = { points = [[2, 0], [2, 1], [1.5, 1]], elements = [2, 1] }
-seat = { points = [[0.5, 1], [1.5, 1]], elements = 4 }
-others = { points = [[0.5, 1], [0, 1], [0, 0]], elements = [1, 2] }
-right = { points = [[1.5, 1], [1.5, 2]], elements = 2 }
-top = { points = [[1.5, 2], [0.5, 2]], elements = 2 }
-left = { points = [[0.5, 2], [0.5, 1]], elements = 2 }
-[regions]
-lower = { material = "a", boundary = ["bottom", "sides", "seat", "others"] }
-upper = { material = "b", boundary = ["seat", "right", "top", "left"] }
-[boundary]
-bottom = { ux = 0.0, uy = 0.0 }
-left = { pressure = 0.01 }
-[interfaces.seat]
-law = "coulomb"
-friction = 0.4
-cohesion = 0.02
-cohesion_lost = true
-[[stages]]
-steps = 1
-boundary.top = { tx = 0.0, ty = -0.5 }
-[[stages]]
-steps = 2
-boundary.top = { tx = 0.1 }
-"""
-
-CRACKED = """\
-materials.rock = { young = 1e3, poisson = 0.2 }
-[curves]
-one = { points = [[-1, 0], [1, 0.2]], elements = 4 }
-two = { points = [[-0.5, 1], [1, 1]], elements = 4 }
-ring = { center = [0, -2], radius = 0.7, elements = 8 }
-[regions]
-plane = { material = "rock", infinite = true, boundary = ["ring"], cracks = ["one", "two"] }
-grain = { material = "rock", boundary = ["ring"] }
-[interfaces]
-one = { friction = 0.3 }
-two = { law = "frictionless", pressure = 0.1 }
-ring = { law = "coulomb", friction = 0.5, cohesion = 0.1, tensile_strength = 0.1 }
-[remote]
-syy = -1.0
-sxx = -0.3
-sxy = 0.2
-[analysis]
-steps = 2
-[output]
-points = [[0.0, 0.5], [0, -2]]
-"""
-
-LOOSE = """\
-materials.m = { young = 1.0, poisson = 0.25, plane = "stress" }
-[curves]
-b1 = { points = [[0, 0], [1, 0], [1, 1]], elements = 2 }
-t1 = { points = [[1, 1], [0, 1]], elements = 3 }
-l1 = { points = [[0, 1], [0, 0]], elements = 2 }
-b2 = { points = [[0, 1.001], [1, 1.001]], elements = 3 }
-s2 = { points = [[1, 1.001], [1, 2], [0, 2], [0, 1.001]], elements = 6 }
-b3 = { points = [[0.1, 2], [0.9, 2]], elements = 3 }
-s3 = { points = [[0.9, 2], [0.9, 3]], elements = 2 }
-t3 = { points = [[0.9, 3], [0.1, 3]], elements = 2 }
-l3 = { points = [[0.1, 3], [0.1, 2]], elements = 2 }
-[regions]
-foot = { material = "m", boundary = ["b1", "t1", "l1"] }
-middle = { material = "m", boundary = ["b2", "s2"] }
-head = { material = "m", boundary = ["b3", "s3", "t3", "l3"] }
-[contacts]
-lower = { between = ["t1", "b2"], friction = 0.3 }
-upper = { between = ["s2", "b3"], friction = 0.5 }
-[boundary]
-b1 = { ux = 0, uy = 0 }
-t3 = { ux = 0, uy = 0 }
-[[stages]]
-steps = 2
-boundary.t3 = { uy = -0.01 }
-[analysis]
-scheme = "DBEM"
-"""
-
-MADE = """\
-materials.rock = { young = 2.0e4, poisson = 0.25, density = 1e-3 }
-regions.host = { material = "rock", infinite = true }
-remote = { sxx = -2.0, syy = -1.0, sxy = 0.4 }
-analysis.steps = 1
-analysis.order = 1
-[[generate]]
-kind = "cracks"
-name = "crack"
-region = "host"
-count = 4
-elements = 4
-half_length = 1.0
-orientation = 30.0
-orientation_spread = 60.0
-density = 0.05
-distance = 0.2
-friction = 0.3
-seed = 3
-[[generate]]
-kind = "inclusions"
-name = "grain"
-region = "host"
-material = "rock"
-count = 2
-elements = 8
-radius = 0.5
-density = 0.05
-distance = 0.2
-law = "coulomb"
-friction = 0.6
-"""
-
 MOST_NODES, MOST_STEPS = 800, 40
 OUT_OF_BALANCE = 1e-2
+DIFFERENCE_OF_RANKS = 1e-6
 
 
 def read_run_seeds() -> list[str]:
     """Small cases with one of each kind of thing, of few nodes and steps, that are run."""
-    return [PRESSED, CRACKED, LOOSE, MADE]
+    return [path.read_text(encoding="utf-8") for path in sorted((ROOT / "scripts" / "fuzz_seeds").glob("*.toml"))]
 
 
 class Notes(SilentReporter):
@@ -785,8 +671,8 @@ def expect_numbers(results: Results) -> None:
         assert (known == known[:1]).all() and not np.isinf(tips.KI).any(), f"K of {name} is a number now and then"
 
 
-def fuzz_runs(seed: int, numbers: range, failures: Failures) -> int:
-    """Run so many mutants; returns how many were finished. How the others ended is printed."""
+def fuzz_runs(seed: int, numbers: range, failures: Failures, records: Path | None = None) -> int:
+    """Run so many mutants; returns how many were finished. How the others ended is printed, and added to a file."""
     import pbem  # so that each process need not
 
     assert pbem.run
@@ -808,11 +694,87 @@ def fuzz_runs(seed: int, numbers: range, failures: Failures) -> int:
             ending = "failure" if error is not None else end.read_text()
             if error is not None:
                 failures.add(number, error)
+            if records is not None:
+                with records.open("a") as file:
+                    file.write(f"{seed} {number} {ending if error is None else describe_failure(error)}\n")
             if ending != "too large" or len(numbers) == 1:
                 ends[ending] += 1
             number += 1
     print(", ".join(f"{ending} {count}" for ending, count in ends.most_common()))
     return ends["finished"]
+
+
+def compare_ranks(path: Path) -> str:
+    """Run the case on one rank and on two; how it ended, "refused" if there was nothing to be run.
+
+    Raises AssertionError if two ranks end in another way, find other statuses or iterations, or other values.
+    """
+    import pbem
+    from tests.parallel.launch import launch
+
+    ends, found = [], []
+    for ranks in (1, 2):
+        target = path.with_name(f"{ranks}.h5")
+        target.unlink(missing_ok=True)
+        done = launch(ranks, "run", path, "-o", target, "--force", timeout=10 * PATIENCE)
+        assert "Traceback" not in done.stderr, done.stderr[-1000:]
+        reason = re.search(r"not converged: ([\w ]+)", done.stderr)
+        ends.append((done.returncode, reason[1] if reason else ""))
+        if done.returncode == 2:
+            return "refused"
+        found.append(pbem.open_results(target) if target.exists() else None)
+    assert ends[0] == ends[1], f"one rank ends with {ends[0]}, two with {ends[1]}"
+    one, two = found
+    if one is not None and two is not None:
+        assert len(one.steps) == len(two.steps), f"{len(one.steps)} steps on one rank, {len(two.steps)} on two"
+        assert np.array_equal(one.steps.iterations, two.steps.iterations), "other iterations"
+        for name, contact in one.contact.items():
+            assert np.array_equal(contact.mode, two.contact[name].mode), f"other statuses of {name}"
+        for name in ("displacement", "traction"):
+            mine, yours = getattr(one, name), getattr(two, name)
+            off = float(np.abs(mine - yours).max(initial=0.0)) / max(float(np.abs(mine).max(initial=0.0)), 1e-300)
+            assert off < DIFFERENCE_OF_RANKS, f"{name} differs by {off:.1e}"
+    return ends[0][1] or "finished"
+
+
+def fuzz_ranks(seed: int, numbers: range, failures: Failures) -> int:
+    """Run so many mutants on one rank and on two; returns how many were finished. Refused ones are not counted."""
+    sys.path.insert(0, str(ROOT))
+    seeds = read_run_seeds()
+    ends: collections.Counter[str] = collections.Counter()
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "mutant.toml"
+        number = numbers.start
+        while sum(ends.values()) < len(numbers):
+            path.write_text(mutate(seed, number, seeds, CHANGES_OF_RUNS), encoding="utf-8", errors="surrogatepass")
+            ending = "refused"
+            if is_right(path) and not is_too_large(path):
+                try:
+                    ending = compare_ranks(path)
+                except (Exception, pytest_failure()) as error:
+                    failures.add(number, error)
+                    ending = "failure"
+            if ending != "refused" or len(numbers) == 1:
+                ends[ending] += 1
+            number += 1
+    print(", ".join(f"{ending} {count}" for ending, count in ends.most_common()))
+    return ends["finished"]
+
+
+def pytest_failure() -> type[BaseException]:
+    """What a launch raises that did not end in its time."""
+    import pytest
+
+    return pytest.fail.Exception
+
+
+def is_right(path: Path) -> bool:
+    """Whether the case is accepted."""
+    try:
+        read_checked_model(path)
+    except PbemError:
+        return False
+    return True
 
 
 def is_too_large(path: Path) -> bool:
@@ -827,15 +789,18 @@ def is_too_large(path: Path) -> bool:
 
 KINDS: dict[str, Callable[[int, range, Failures], int]] = {
     "cases": fuzz_cases, "values": fuzz_values, "results": fuzz_results, "commands": fuzz_commands, "runs": fuzz_runs,
+    "ranks": fuzz_ranks,
 }
 
 
-def fuzz(kind: str, count: int, seed: int, only: int | None = None) -> tuple[int, Failures]:
+def fuzz(kind: str, count: int, seed: int, only: int | None = None, records: Path | None = None,
+         first: int = 0) -> tuple[int, Failures]:
     """Mutants of one kind; how many were accepted, and what failed."""
     os.environ.setdefault("MPLBACKEND", "Agg")
     failures = Failures()
-    numbers = range(count) if only is None else range(only, only + 1)
-    return KINDS[kind](seed, numbers, failures), failures
+    numbers = range(first, first + count) if only is None else range(only, only + 1)
+    action = KINDS[kind] if records is None else partial(fuzz_runs, records=records)
+    return action(seed, numbers, failures), failures
 
 
 def main() -> int:
@@ -845,11 +810,14 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="number of one mutant; of cases and runs, its text is printed")
+    parser.add_argument("--first", type=int, default=0, help="number of the first mutant")
+    parser.add_argument("--records", type=Path, help="of runs: a file to which a line is added for each")
     options = parser.parse_args()
-    if options.only is not None and options.kind in ("cases", "runs"):
+    if options.only is not None and options.kind in ("cases", "runs", "ranks"):
         print(mutate(options.seed, options.only, read_seeds()) if options.kind == "cases" else
               mutate(options.seed, options.only, read_run_seeds(), CHANGES_OF_RUNS))
-    accepted, failures = fuzz(options.kind, options.count, options.seed, options.only)
+    records = options.records if options.kind == "runs" else None
+    accepted, failures = fuzz(options.kind, options.count, options.seed, options.only, records, options.first)
     print(f"{options.kind}: {options.count} mutants, {accepted} accepted, {failures.count} failures of "
           f"{len(failures.found)} kinds")
     return 1 if failures.count else 0

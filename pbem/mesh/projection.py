@@ -13,6 +13,8 @@ from pbem.geometry.elements import Elements
 OVERSHOOT = 1e-6
 # What crosses a normal this near to either of its ends, in parts of its length, is what it begins or ends on.
 MARGIN = 0.01
+# Points times elements that are crossed at a time: some 50 MB of arrays.
+CROSSED = 2**18
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,18 @@ def project_nodes(position: Complex, normal: Complex, elements: Elements, overla
 
     position, normal (k,): complex. Crossings with element j farther than overlap[j] (m,) behind do not count.
     """
+    found = [_project(position[part], normal[part], elements, overlap) for part in _divide(len(position), elements)]
+    return Projection(*(np.concatenate([getattr(each, name) for each in found])
+                        for name in ("element", "local", "distance")))
+
+
+def _divide(points: int, elements: Elements) -> list[slice]:
+    """Points (k,) in parts, of which the crossings with all elements take little memory; one part at least."""
+    most = max(1, CROSSED // max(1, elements.count))
+    return [slice(start, start + most) for start in range(0, max(points, 1), most)]
+
+
+def _project(position: Complex, normal: Complex, elements: Elements, overlap: Real) -> Projection:
     distance, local, facing = (each.swapaxes(0, 1) for each in elements.cross(position, normal))
     crossings = distance.shape[2]
     inside = (np.abs(local) <= 1 + OVERSHOOT) & facing & (distance >= -overlap[:, None])
@@ -50,6 +64,12 @@ def project_nodes(position: Complex, normal: Complex, elements: Elements, overla
 
 def find_hidden(position: Complex, normal: Complex, distance: Real, elements: Elements) -> Bool:
     """Whether any element crosses the normal (k,) of a point before it has gone the distance: it ends behind a body."""
+    found = [_is_hidden(position[part], normal[part], distance[part], elements)
+             for part in _divide(len(position), elements)]
+    return np.concatenate(found)
+
+
+def _is_hidden(position: Complex, normal: Complex, distance: Real, elements: Elements) -> Bool:
     at, local, _ = elements.cross(position, normal)
     on_the_way = (at > MARGIN * distance[:, None]) & (at < (1 - MARGIN) * distance[:, None])
     hidden: Bool = ((np.abs(local) < 1) & on_the_way).any(axis=(0, 2))

@@ -119,7 +119,7 @@ def run(
                 _refine_and_solve(model, Target(target, resume, force), options, watch, signals, placement, kept)
             with clock.piece("writing"):
                 results = open_results(target)
-                for note in compare_release(results) if comm.rank == 0 else ():
+                for note in do_on_first(comm, PbemError, lambda: compare_release(results)):
                     watch.note(note)
             return results
     except StopError as error:

@@ -43,6 +43,7 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
                          help="begin the search for the statuses of each case anew, not with those of another case")
     command.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     command.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    command.add_argument("--profile", metavar="FILE", help="write time, calls and bytes by piece (FILE.json: as JSON)")
 
 
 def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
@@ -55,6 +56,7 @@ def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     target = Path(options.output or case.stem + ".csv")
     load_driver()
     from pbem.parallel import world
+    from pbem.solve.launch.account import keep_account
     from pbem.sweeps.sweep import sweep
 
     begun, counts = time.perf_counter(), {"finished": 0, "failed": 0, "refused": 0}
@@ -65,11 +67,12 @@ def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
             tell(f"[{number}/{count}] {_describe(given)}: {_describe_end(row)}")
 
     try:
-        table = sweep(
-            case, values, options.quantity, out=target, keep=options.keep, petsc=petsc, operator=options.operator,
-            force=options.force, neighbours=not options.no_neighbours, listener=listen, label=label_option,
-            option="--quantity ",
-        )
+        with keep_account(world, None, options.profile, (Path(case), target)):
+            table = sweep(
+                case, values, options.quantity, out=target, keep=options.keep, petsc=petsc, operator=options.operator,
+                force=options.force, neighbours=not options.no_neighbours, listener=listen, label=label_option,
+                option="--quantity ",
+            )
     except LaunchError as error:
         return say_wrong_launch(error, world.rank, world.size)
     except (StopError, KeyboardInterrupt, StorageError) as error:

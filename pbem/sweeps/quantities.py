@@ -239,3 +239,19 @@ def _find_largest(outcome: Outcome, members: tuple[str, ...], kind: str, end: in
     values = np.concatenate([np.zeros(0), *(each if end is None else each[end : end + 1] for each in found)])
     values = values[~np.isnan(values)]
     return float(values[np.argmax(np.abs(values))]) if len(values) else math.nan
+
+
+def evaluate_all(
+    columns: Sequence[Quantity], outcome: Outcome, finished: bool, known: bool
+) -> tuple[list[float], list[str]]:
+    """The quantities of one case, NaN where they are not known, and what is to be said of those."""
+    found, absent = [], []
+    for each in columns:
+        value = float("nan")
+        if known and (finished or each.of_steps):
+            try:
+                value = float(each.evaluate(outcome))
+            except AbsentNameError as error:
+                absent.append(f"{each.title}: {error}")
+        found.append(value)
+    return found, absent

@@ -17,6 +17,7 @@ from pbem.case.case import Case
 from pbem.case.changed import Label, label_key
 from pbem.case.overrides import write_overrides
 from pbem.case.writer import write_tables
+from pbem.clock import clock
 from pbem.description import case as description
 from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
@@ -27,6 +28,7 @@ from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
+from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_kind, check_options
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.problem.step import SilentReporter
@@ -34,8 +36,8 @@ from pbem.solve.steps.march import march
 from pbem.solve.steps.prediction import Place
 from pbem.solve.system.kept import KeptProblems
 from pbem.sweeps.files import name_results
-from pbem.sweeps.outcome import AbsentNameError, Names, Outcome, list_quantity_names
-from pbem.sweeps.quantities import Quantity, choose_quantities, read_quantities
+from pbem.sweeps.outcome import Names, Outcome, list_quantity_names
+from pbem.sweeps.quantities import Quantity, choose_quantities, evaluate_all, read_quantities
 from pbem.sweeps.sharing import Share, choose_share, sort_cases
 from pbem.sweeps.table import Row, SweepTable, TableFile
 from pbem.sweeps.values import check_combinations, check_values, combine, find_place, write_cell
@@ -124,12 +126,14 @@ def sweep(
     folder = None if keep is None else Path(keep)
     setting = Setting(case, {} if set is None else set, operator, petsc or {}, folder, neighbours, label)
     try:
-        with abort_if_unexpected(comm, PbemError):
-            check_start(comm)
-            several = do_on_first(comm, PbemError, lambda: _check(values, quantities, setting.fixed))
+        with abort_if_unexpected(comm, PbemError), petsc_log(setting.name, setting.petsc):
+            with clock.piece("start"):
+                check_start(comm)
             file: list[TableFile] = []
-            plan = do_on_first(comm, PbemError, lambda: _make_plan(
-                setting, several, quantities, out, force, comm, file, option))
+            with clock.piece("reading"):
+                several = do_on_first(comm, PbemError, lambda: _check(values, quantities, setting.fixed))
+                plan = do_on_first(comm, PbemError, lambda: _make_plan(
+                    setting, several, quantities, out, force, comm, file, option))
             columns = read_quantities(plan.quantities, plan.names)
             rows = _compute_all(setting, plan, columns, comm, _Keeper(several, file, listener, len(plan.todo)))
             return _make_table(several, [each.title for each in columns], rows)
@@ -258,8 +262,9 @@ class _Keeper:
         """A case was computed."""
         self.rows[row.cells] = row
         self.new += 1
-        for file in self.file:
-            file.add(row)
+        with clock.piece("writing"):
+            for file in self.file:
+                file.add(row)
         if self.listener is not None:
             self.listener(self.new, self.count, values, row)
 
@@ -309,7 +314,8 @@ def compute_case(
     comm, status, reason = kept.comm, "finished", ""
     outcome = Outcome()
     try:
-        model = do_on_first(comm, PbemError, lambda: _make_model(setting, values))
+        with clock.piece("reading"):
+            model = do_on_first(comm, PbemError, lambda: _make_model(setting, values))
         if setting.keep is not None or model.analysis.accuracy is not None:
             _run_with_file(setting, values, outcome, kept)
         else:
@@ -319,16 +325,9 @@ def compute_case(
     except (ConvergenceError, LawError) as error:
         status, reason = "failed", str(error)
         kept.forget_factors()
-    known = comm.rank == 0 and outcome.step is not None
-    found, absent = [], []
-    for each in columns:
-        value = float("nan")
-        if known and (status == "finished" or each.of_steps):
-            try:
-                value = float(each.evaluate(outcome))
-            except AbsentNameError as error:
-                absent.append(f"{each.title}: {error}")
-        found.append(value)
+    with clock.piece("evaluation"):
+        known = comm.rank == 0 and outcome.step is not None
+        found, absent = evaluate_all(columns, outcome, status == "finished", known)
     notes = [each.rstrip(".") for each in outcome.notes]
     reason = "; ".join([*([reason] if reason else []), *absent, *notes])
     return Row(_cells(values), tuple(found), status, outcome.iterations, time.perf_counter() - begun, reason)
@@ -348,19 +347,23 @@ def _solve(
 ) -> None:
     """March through the history, without a result file."""
     comm = kept.comm
-    mesh = _mesh(setting, model)
-    check_shares(model, mesh, comm.size)
+    with clock.piece("reading"):
+        mesh = _mesh(setting, model)
+        check_shares(model, mesh, comm.size)
     if comm.rank == 0:
         outcome.expect(model, mesh)
     watch = Watch(comm, outcome if comm.rank == 0 else SilentReporter(), signals)
     with petsc_options({**model.solver.petsc, **setting.petsc}):
-        problem = kept.assemble(model, mesh)
+        with clock.piece("assembly"):
+            problem = kept.assemble(model, mesh)
         watch.look_after(problem.laws)
         watch.check()
         try:
-            tangent = kept.take_tangent(problem)
-            guess = kept.guess_modes(problem, place) if setting.neighbours else None
-            steps = march(problem, watch, None, tangent, guess, any(each.of_faces for each in columns))
+            with clock.piece("steps"):
+                tangent = kept.take_tangent(problem)
+                guess = kept.guess_modes(problem, place) if setting.neighbours else None
+            found = march(problem, watch, None, tangent, guess, any(each.of_faces for each in columns))
+            steps = clock.each("steps", found)
             kept.remember(problem, place, {(step.stage, step.factor): step.contact for step in steps})
         except ConvergenceError:
             watch.check()  # a law that failed has answered with no strength

@@ -64,6 +64,32 @@ def test_a_profile_accounts_for_all_of_the_time(folder: Path) -> None:
     check_petsc_log((folder / "petsc.txt").read_text())
 
 
+@pytest.mark.parametrize("keep", [False, True])
+def test_the_time_of_a_sweep_is_accounted_for(folder: Path, keep: bool) -> None:
+    """As of a run, in one account of all cases; with result files, too, which whole runs write."""
+    options = ["--profile", "profile.json", "-pbem_log_view", ":petsc.txt", *(["--keep", "files"] if keep else [])]
+    done = launch(1, "sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.3,0.4,0.5", *options, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    profile = json.loads((folder / "profile.json").read_text())
+    pieces = profile["ranks"][0]["pieces"]
+    assert sum(share["seconds"] for share in pieces.values()) == pytest.approx(profile["seconds"], rel=1e-9)
+    assert pieces["assembly"]["calls"] == 3 and pieces["reading"]["calls"] > 3 and pieces["steps"]["calls"] >= 3
+    assert profile["pieces"]["other"] < 0.3 * profile["seconds"]
+    text = (folder / "petsc.txt").read_text()
+    events = {name: (int(calls), float(seconds)) for name, calls, seconds in
+              re.findall(r"^pbem (\S+|start and other) +(\d+) [\d.]+ (\S+) ", text, re.MULTILINE)}
+    whole = float(re.search(r"^Time \(sec\): +(\S+)", text, re.MULTILINE)[1])  # type: ignore[index]
+    assert sum(seconds for name, (_, seconds) in events.items() if "/" not in name) >= 0.95 * whole
+    assert events["assembly"][0] == 3 and "steps/factors" in events
+
+
+def test_a_profile_of_a_sweep_replaces_neither_case_nor_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("blocks.toml", "blocks.csv"):
+        assert main(["sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.3", "--profile", name]) == 2
+        assert "would replace a file of the run" in capsys.readouterr().err
+    assert (folder / "blocks.toml").read_text() == BLOCKS and not (folder / "blocks.csv").exists()
+
+
 def check_petsc_log(text: str) -> None:
     """Stages of the outer pieces, and events of all of them, that have nearly all of the time."""
     stages = {
@@ -73,6 +99,10 @@ def check_petsc_log(text: str) -> None:
     assert {"pbem reading", "pbem assembly", "pbem steps", "pbem estimate", "pbem writing"} <= named.keys()
     assert sum(named.values()) >= 95.0, stages
     assert "steps/factors" in text
+    # Events of the outer pieces and of the rest, by the slowest rank.
+    whole = float(re.search(r"^Time \(sec\): +(\S+)", text, re.MULTILINE)[1])  # type: ignore[index]
+    events = re.findall(r"^pbem ([a-z ]+?) +\d+ [\d.]+ (\S+) ", text, re.MULTILINE)
+    assert sum(float(seconds) for _, seconds in events) >= 0.95 * whole, events
 
 
 def test_a_profile_is_a_table_too(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,11 +7,13 @@ from contextlib import contextmanager
 
 from pbem.clock import WITHIN, clock
 from pbem.errors import CaseError, ConvergenceError, Fault, StopError
-from pbem.solve.petsc.session import LOG_OPTION, PREFIX, PETSc, begin_log
+from pbem.solve.petsc.session import LOG_OPTION, PREFIX, REST, PETSc, begin_log
 
 
 class PetscLog:
-    """A stage for every outer piece, an event for every piece. file: where it goes, "" is standard output.
+    """A stage and an event for every outer piece and for the rest, an event for every piece within.
+
+    file: where it goes, "" is standard output.
 
     In PETSc's account an event has the time of those within it, in the clock's it has not.
     """
@@ -20,12 +22,13 @@ class PetscLog:
         self.file: str | None = None
 
     def obey(self, source: str, options: Mapping[str, str]) -> None:
-        """Begin if the options ask for it; source: the case, for what is said. All ranks together.
+        """Begin if the options ask for it, unless an account is being kept; source: the case, for what is said.
+        All ranks together.
 
         Raises CaseError for a value that is neither empty nor ":FILE".
         """
         value = options.get(LOG_OPTION)
-        if value is None or self.file is not None:
+        if value is None or clock.listener is not None:
             return
         kind, _, file = value.partition(":")
         if kind not in ("", "ascii") or ":" in file:
@@ -37,6 +40,7 @@ class PetscLog:
     def enter(self, path: tuple[str, ...]) -> None:
         """See pbem.clock.Listener."""
         if len(path) == 1:
+            PETSc.Log.Event(REST).end()
             PETSc.Log.Stage(f"pbem {path[0]}").push()
         _find_event(path).begin()
 
@@ -45,15 +49,25 @@ class PetscLog:
         _find_event(path).end()
         if len(path) == 1:
             PETSc.Log.Stage(f"pbem {path[0]}").pop()
+            PETSc.Log.Event(REST).begin()
 
     def show(self) -> None:
         """Write the account, if it was asked for. All ranks together."""
-        clock.listener = None
         if self.file is None:
             return
+        self.leave_off()
+        # It goes on for a further run of the same process.
+        PETSc.Log.Event(REST).end()
         viewer = PETSc.Viewer().createASCII(self.file or "stdout", "w", comm=PETSc.COMM_WORLD)
         PETSc.Log.view(viewer)
         viewer.destroy()
+        PETSc.Log.Event(REST).begin()
+
+
+    def leave_off(self) -> None:
+        """No more is kept from now on; what was stays."""
+        if clock.listener is self:
+            clock.listener = None
 
 
 def _find_event(path: tuple[str, ...]) -> PETSc.Log.Event:
@@ -71,5 +85,5 @@ def petsc_log(source: str, options: Mapping[str, str]) -> Iterator[PetscLog]:
         log.show()
         raise
     finally:
-        clock.listener = None
+        log.leave_off()
     log.show()

@@ -24,6 +24,7 @@ def begin_log() -> None:
         PETSc.Log.begin()
         _logs.append(PETSc.Log.Stage(REST))
         _logs[0].push()
+        PETSc.Log.Event(REST).begin()
 
 
 if any(argument.startswith(f"-{PREFIX}{LOG_OPTION}") for argument in sys.argv):

@@ -96,7 +96,7 @@ class CurveTable(Table):
         "auto",
         description='refine towards one end, both ends or none of each leg; `"auto"`: towards corners, changes of '
         "condition or load, ends of contact and junctions, and as short as near faces need; a grading that is given "
-        "is kept, except beside crack tips",
+        "is kept, except beside crack tips and where a crack turns",
     )
     power: Power = Field(3.0, description="element ends lie at t^power from a refined end")
 

@@ -16,6 +16,8 @@ from pbem.geometry.elements import Elements
 # Two legs that meet at less than this angle (degrees) enclose a wedge, in which lengths fall with the distance from
 # its corner; wider corners are ordinary ones, towards which legs are graded.
 WEDGE = 50.0
+# A crack that turns by less between two legs (radians) has no corner there that elements need to follow.
+KINK = math.radians(10.0)
 # An arc is seen in pieces that turn by no more than this, so that a piece does not face itself.
 WIDEST_PIECE = math.radians(60.0)
 
@@ -130,11 +132,11 @@ def _surround(pieces: Pieces) -> Boxes:
 
 @dataclass(frozen=True)
 class Corner:
-    """Legs that meet at a point and enclose wedges there, or of which one crack branches off another.
+    """Legs that meet at a point and enclose wedges there, or of which one crack branches off another, or turns.
 
     ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
     two legs `sides`; beside: further legs that end at the point, in corners that are no wedges; branching: whether
-    three ends of cracks meet, and nothing else does.
+    three ends of cracks meet, and nothing else does; turning: whether two do, of a crack that does not go on smoothly.
     """
 
     point: complex
@@ -143,6 +145,7 @@ class Corner:
     sides: tuple[int, int]
     beside: tuple[tuple[int, bool], ...] = ()
     branching: bool = False
+    turning: bool = False
 
 
 def _find_meetings(
@@ -173,14 +176,17 @@ def _find_meetings(
                     narrow.add(pair)
                     found.append((angle, *pair))
                     around |= {(one, one_end): None, (other, other_end): None}
-        branching = len(ends) == 3 == len(widest) and all(leg in cracks for leg, _, _ in ends)
-        if found or branching:
+        of_cracks = all(leg in cracks for leg, _, _ in ends)
+        branching = len(ends) == 3 == len(widest) and of_cracks
+        turning = len(ends) == 2 and len(widest) == 1 and of_cracks and widest[0][0] < math.pi - KINK
+        if found or branching or turning:
             angle, one, other = min(found or widest)
+            every = branching or turning
             beside = [
                 (leg, at_end) for leg, _, at_end in ends
-                if (leg, at_end) not in around and (branching or any(regions[leg] & regions[at] for at, _ in around))
+                if (leg, at_end) not in around and (every or any(regions[leg] & regions[at] for at, _ in around))
             ]
-            corners.append(Corner(point, tuple(around), angle, (one, other), tuple(beside), branching))
+            corners.append(Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning))
     return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
 
 

@@ -69,8 +69,8 @@ def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list
         return []
     named = [f"'{name}' {old[name]} to {new[name]}" for name in added]
     return [
-        f"Elements added near other faces, in narrow wedges or beside crack tips, {sum(old.values())} to "
-        f"{sum(new.values())} in all: {list_names(named, MOST_NAMED)}."
+        "Elements added near other faces, in narrow wedges, beside crack tips or where cracks turn, "
+        f"{sum(old.values())} to {sum(new.values())} in all: {list_names(named, MOST_NAMED)}."
     ]
 
 

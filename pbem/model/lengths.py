@@ -109,9 +109,13 @@ class LengthField:
         self._ends = [leg.element_fractions() for leg in legs]
         # Elements in a wedge are graded for it, not as for an ordinary corner.
         self._floor, self._growth = wedges.tabulate(len(legs), self.reach)
-        self._floor[self.kept] = 0.0
+        # The user's grading is kept but for where no grading does.
+        turning = np.zeros((len(legs), 2), dtype=bool)
+        for number, at_end in wedges.list_turning():
+            turning[number, int(at_end)] = True
+        self._floor[self.kept[:, None] & ~turning] = 0.0
         for number, leg in enumerate(legs):
-            if (self._floor[number] > 0).any() and self.refined[number].any():
+            if not self.kept[number] and (self._floor[number] > 0).any() and self.refined[number].any():
                 self.refined[number] &= self._floor[number] == 0
                 self._ends[number] = leg.divide(leg.elements, *self.refined[number])
         self._component = _connect(surroundings, tips)
@@ -144,14 +148,16 @@ class LengthField:
         allowed = self.reach * distance
         thin = np.isfinite(distance)
         corner = np.zeros(len(t), dtype=bool)
+        allowed = np.where(self.kept[legs], np.inf, allowed)
         for k, (r, touches) in enumerate(((t, cells.low == 0), (1 - t, cells.high == 1))):
             from_end, floor = r * self.length[legs], self._floor[legs, k]
             falling = np.full(len(t), np.inf)
             falling[thin] = FIRST * distance[thin] + GROWTH * from_end[thin]
-            allowed = np.where(self.refined[legs, k], np.minimum(allowed, falling), allowed)
+            graded = self.refined[legs, k] & ~self.kept[legs]
+            allowed = np.where(graded, np.minimum(allowed, falling), allowed)
             allowed = np.where(floor > 0, np.minimum(allowed, self._growth[legs, k] * from_end), allowed)
             corner |= touches & (floor > 0) & (length <= floor)
-        allowed = np.where(self.kept[legs], np.inf, np.where(corner, length, allowed))
+        allowed = np.where(corner, length, allowed)
         beside_tips = self._measure_from_tips(points, near.tips)
         steepest = max(self.reach, GROWTH, SLOPE)
         allowed = np.minimum(allowed, beside_tips)

@@ -78,12 +78,12 @@ def fit_lengths(
         curves, [[side.curve for side in sides] for sides in regions], [(slot.first, slot.second) for slot in slots],
         frozenset(side.curve for sides in regions for side in sides if side.forward is None),
     )
-    wedges = find_wedges(surroundings)
+    wedges = find_wedges(surroundings, kept)
     field = LengthField(surroundings, wedges, tips, kept, order)
     cells, allowed, excess = _divide(field)
     if excess is not None:
         return Sizes(curves, wedges, excess=excess)
-    legs = list(surroundings.legs)
+    legs, turning = list(surroundings.legs), wedges.list_turning()
     limits = np.minimum(cells.wanted, allowed)
     counts = cells.lengths(field.length) / limits
     changed = (allowed < cells.wanted * (1 - 1e-9)) | (cells.wanted != cells.given)
@@ -94,7 +94,7 @@ def fit_lengths(
         limit = limits[own] / field.length[number]
         begin, end = (
             wedges.grade(number, at_end, field.length[number], cells.low[own], limit, field.reach)
-            if number not in field.kept_legs else [0.0] for at_end in (False, True)
+            if number not in field.kept_legs or (number, at_end) in turning else [0.0] for at_end in (False, True)
         )
         legs[number] = _divide_evenly(legs[number], np.append(cells.low[own], 1.0), counts[own], begin, end)
     divide_alike(legs, slots, field.kept_legs)

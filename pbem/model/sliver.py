@@ -13,6 +13,11 @@ Where a crack branches off another its slip ends in the corner or opens the crac
 a small power of the distance, and what the element in the corner cannot follow spoils the slip far around it (2 to 4 %
 of the largest at 70 to 45 degrees with lengths at t^3). There lengths fall geometrically as well, unless the elements
 that are asked for are too few for it to matter.
+
+Nor do powers suffice where a crack turns sharply: the outer side of the corner is all but a crack's tip, whose square
+root the elements on both legs must follow, the less of it the shorter a leg (K of wings a tenth as long: 1 to 10 % at
+120 degrees with lengths at t^3). There lengths fall geometrically, too, and more slowly; where the grading is the
+user's, at corners that turn less as well, since nothing else is known of it.
 """
 
 from __future__ import annotations
@@ -34,6 +39,11 @@ LEAST_BIT, MOST_BIT = 5e-5, 1e-2
 # Most of it where a crack branches off another, in a wedge or in none, and the least number of elements from there to
 # the other end, or to the middle of a leg that is refined at both ends, in the mean of the three legs.
 BRANCH_BIT, LEAST_ASKED = 6e-5, 5
+# The least turn (radians) of a crack in a corner towards which lengths fall geometrically, where the grading is chosen
+# (less: powers do); the least number of elements of a leg, in the mean of both, from the corner on.
+SHARP, LEAST_AT_TURN = math.radians(60.0), 4
+# The angle between its legs (radians) below which lengths fall more slowly.
+SHARPER = math.radians(80.0)
 # Degrees: below, the last bit follows its neighbour.
 TIED = 25.0
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
@@ -62,6 +72,10 @@ class Wedges:
     bits: tuple[float, ...]
     ties: tuple[Tie, ...]
     at: Mapping[tuple[int, bool], int]
+
+    def list_turning(self) -> frozenset[tuple[int, bool]]:
+        """The ends of legs (number, whether it is the leg's end) where a crack turns sharply."""
+        return frozenset(end for end, number in self.at.items() if self.corners[number].turning)
 
     def tabulate(self, legs: int, reach: float) -> tuple[Real, Real]:
         """Per end of a leg (legs, 2): length of the last bit, and growth of lengths; zeros where no wedge is."""
@@ -103,14 +117,18 @@ def measure_growth(angle: float, reach: float) -> float:
 
 
 def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: float) -> float:
+    if corner.turning:
+        return 0.5 * reach * min(1.0, corner.angle / SHARPER)
     if end in corner.beside:
         return MOST_GROWTH if corner.ends else reach
     return measure_growth(corner.angle, reach)
 
 
-def measure_last_bit(angle: float, branching: bool = False) -> float:
-    """Length of the last bit in the corner of a wedge (radians), as a part of its shortest leg."""
-    most = BRANCH_BIT if branching else MOST_BIT
+def measure_last_bit(angle: float, singular: bool = False) -> float:
+    """Length of the last bit in the corner of a wedge (radians), as a part of its shortest leg.
+
+    singular: jumps vary with a small power of the distance there, as a crack branches or turns."""
+    most = BRANCH_BIT if singular else MOST_BIT
     return min(max(LAST_BIT * (math.degrees(angle) / AT_ANGLE) ** POWER, LEAST_BIT), most)
 
 
@@ -119,8 +137,8 @@ def _count_asked(leg: Leg) -> float:
     return leg.elements / (2 if leg.refine_start and leg.refine_end else 1)
 
 
-def find_wedges(surroundings: Surroundings) -> Wedges:
-    """The wedges of a model and what is tied in their corners."""
+def find_wedges(surroundings: Surroundings, kept: frozenset[str] = frozenset()) -> Wedges:
+    """The wedges of a model and what is tied in their corners. kept: curves whose grading is the user's."""
     legs, names = surroundings.legs, surroundings.curve
     before = [0.0]
     for number in range(1, len(legs)):
@@ -130,14 +148,20 @@ def find_wedges(surroundings: Surroundings) -> Wedges:
     corners = []
     for corner in surroundings.corners:
         ends = corner.ends or corner.beside
-        asked = np.mean([_count_asked(legs[number]) for number, _ in corner.ends + corner.beside])
-        fine = corner.branching and bool(asked >= LEAST_ASKED)
-        if not (fine or corner.ends):
+        numbers = [number for number, _ in corner.ends + corner.beside]
+        given = any(names[number] in kept for number in numbers)
+        asked = float(np.mean([legs[number].elements if given else _count_asked(legs[number]) for number in numbers]))
+        branching = corner.branching and asked >= LEAST_ASKED
+        narrow = math.degrees(corner.angle) < TIED
+        turning = corner.turning and not narrow and asked >= LEAST_AT_TURN
+        turning = turning and (given or math.pi - corner.angle >= SHARP)
+        if not (branching or turning or corner.ends):
             continue
-        corners.append(replace(corner, branching=fine))
-        bit = measure_last_bit(corner.angle, fine) * min(legs[number].length for number, _ in ends)
+        corners.append(replace(corner, branching=branching, turning=turning))
+        shortest = min(legs[number].length for number, _ in ends)
+        bit = measure_last_bit(corner.angle, branching or turning) * shortest
         bits.append(bit)
-        if math.degrees(corner.angle) >= TIED:
+        if not narrow:
             continue
         for number, at_end in corner.ends:
             first = before[number] + (legs[number].length - bit if at_end else 0.0)

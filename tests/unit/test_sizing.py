@@ -162,3 +162,30 @@ def test_lengths_fall_geometrically_where_a_crack_branches_off(scale: float) -> 
     crossing = build(scale, left="-0.8,0 0,0; elements = 8", right="0,0 1,0; elements = 8",
                      up="0,0 0.3,0.8; elements = 8", down="0,0 -0.3,-0.8; elements = 8")  # fmt: skip
     assert len(lengths(crossing, "up")) == 8
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_lengths_fall_geometrically_where_a_crack_turns_sharply(scale: float) -> None:
+    def turn(end: str, keys: str = "elements = [8, 8]") -> Model:
+        return build(scale, crack=f"-1,0 0,0 {end}; {keys}")
+
+    def measure(model: Model) -> list[np.ndarray]:
+        return [leg.length * np.diff(leg.element_fractions()) for leg in model.curves["crack"].legs]
+
+    first, wing = measure(turn("0.1,0.3"))
+    short = math.hypot(0.1, 0.3)
+    for own in (first[::-1], wing):
+        assert own[0] == pytest.approx(6e-5 * short * scale, rel=1e-9)
+        assert (own[1:] <= np.cumsum(own)[:-1] * (1 + 1e-9)).all()
+        np.testing.assert_allclose(own[:8], wing[:8], rtol=1e-9)
+    # The corner is no narrow wedge, and what turns less is graded with a power.
+    assert not turn("0.1,0.3").ties
+    assert len(measure(turn("0.3,0.3"))[1]) == 8
+    # A grading that is given is kept away from the corner, and followed where it is finer there.
+    for keys in ('grading = "none"', 'grading = "start", power = 5.0'):
+        first, wing = measure(turn("0.3,0.3", f"elements = [8, 8], {keys}"))
+        assert wing[0] == pytest.approx(6e-5 * math.hypot(0.3, 0.3) * scale, rel=1e-9)
+        assert (wing[1:] <= np.cumsum(wing)[:-1] * (1 + 1e-9)).all()
+    assert len(measure(turn("0.3,0.03", 'elements = [8, 8], grading = "none"'))[1]) == 8
+    # Three elements a leg are too coarse for that to matter.
+    assert len(measure(turn("0.1,0.3", "elements = [3, 3]"))[1]) == 3

@@ -21,8 +21,10 @@ from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.model import Law, Model, Stage
 from pbem.results.tips import collect_tip_rules
+from tests.verification.kinks import draw_kink, measure_kink, solve_tips
 from tests.verification.planes import FREE, ROCK, make_arc, make_plane, make_straight, solve
-from tests.verification.proofs.cracks import PLANE_MODULUS, solve_plate
+from tests.verification.proofs.cracks import KINK, PLANE_MODULUS, solve_plate
+from tests.verification.proofs.proof import line
 from tests.verification.ways import limit_ratios, make_arc_crack, make_griffith, make_kinked_crack, measure
 
 Factors = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
@@ -116,6 +118,33 @@ def test_kinked_crack_cut_and_graded_anyhow(seed: int) -> None:
     found = measure(way)
     assert found.KI < 5e-3 and found.KII < 5e-3, way.text
     assert found.J < 1e-2, way.text
+
+
+# Sharp corners (136 and 106 degrees), short wings, and one at each order that turns by less than the program's rule.
+@pytest.mark.parametrize("seed", [31, 27, 17, 16, 23, 36])
+def test_kinked_crack_of_a_file_cut_and_graded_anyhow(seed: int) -> None:
+    kink = draw_kink(seed)
+    found = measure_kink(kink)
+    assert found.K < 5e-3 and found.J < 1e-2, kink.text
+    found = measure_kink(kink, given=False)
+    assert found.K < 5e-3 and found.J < 1e-2, kink.text
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("grading, power", [("none", 1.0), ("start", 4.0), ("both", 2.0)])
+def test_a_short_kink_has_the_factors_of_amestoy_and_leblond_on_any_mesh(
+    order: int, grading: str, power: float
+) -> None:
+    # The terms of the series that are left out are 2e-4 at 105 degrees; the kink is a thousandth of the crack.
+    degrees, sxy = 105.0, -0.4
+    tip = 1 + 2e-3 * np.exp(1j * math.radians(degrees))
+    curves = [line(-1 + 0j, 1 + 0j, 24, grading, power), line(1 + 0j, complex(tip), 8, grading, power)]
+    KI, KII, J = solve_tips(curves, (1.0, 1.0, sxy), order)[:, 1]
+    series = [[sum(value * (degrees / 180) ** power for power, value in KINK[i, j].items()) for j in (0, 1)]
+              for i in (0, 1)]
+    exact = math.sqrt(math.pi) * np.array(series) @ np.array([1.0, sxy])
+    assert np.hypot(KI - exact[0], KII - exact[1]) < 2.5e-3 * np.hypot(*exact)
+    assert abs(J / ((KI**2 + KII**2) * (1 - 0.25**2) / 1e3) - 1) < 5e-3
 
 
 def test_a_crack_in_situ_is_as_under_remote_stress() -> None:

@@ -1,4 +1,4 @@
-"""Case files: their reader, which says every fault with its line, and what writes them."""
+"""Case files: reader and writer. Keys and their types are in `pbem.description.schema`, the model in `pbem.model`."""
 
 from pbem.case.case import Case, parse_case, read_case
 from pbem.case.reader import FileDraft, parse_draft, read_case_text

@@ -1,4 +1,4 @@
-"""The laws of all contact pairs as arrays, what pairs remember, and the states that they can be in.
+"""The laws of all contact pairs as arrays, their internal variables, and the states of the pairs.
 
 A pair's state is (p_n, p_s, g_n, g_s): traction on the first side and jump, along n and s. A joint of finite stiffness
 adds an elastic jump, compliance times traction, in front of its law; what is left of g_s is the plastic slip.

@@ -1,1 +1,1 @@
-"""What a case says: its tables and keys with their types, ranges, defaults, and the faults they can have."""
+"""The tables and keys of a case (`schema.py`), with their types, ranges, defaults and checks."""

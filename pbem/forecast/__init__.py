@@ -1,1 +1,1 @@
-"""What a run will take - memory, time, disk - and what the machine and the job grant; without MPI and PETSc."""
+"""Forecast of the memory, time and disk space of a run, and the limits of machine and job; without MPI and PETSc."""

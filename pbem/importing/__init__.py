@@ -1,1 +1,1 @@
-"""Maps of traces and meshes of other programs, read as cases."""
+"""Cases from maps of traces and from meshes: a reader for each format, entered in `importer.py`."""

@@ -1,1 +1,1 @@
-"""What is modelled: materials, curves, regions, interfaces and their laws, conditions and their history."""
+"""The model: materials, curves, regions, interfaces and laws, conditions and their history; grading of elements."""

@@ -1,1 +1,1 @@
-"""The distributed operator, linear solvers, Newton's method and the march through the load history."""
+"""The systems of equations, linear solvers and preconditioners, Newton's method, and the load stepping."""

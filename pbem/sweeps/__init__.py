@@ -1,1 +1,1 @@
-"""Many cases that differ in some values: what is computed of each, and the table of them all."""
+"""Parameter sweeps: many cases that differ in some values, the quantities computed for each, and their table."""

@@ -1,6 +1,6 @@
-"""Elements and legs of curves by their kind, straight or circular: the only place that asks which it is.
+"""Elements and legs of curves, straight or circular: the only place that asks for the kind of an element.
 
-A further kind is a class with the methods of `kind.Kind`, listed in `array.KINDS`, and its kernels (pbem.bem).
+Another kind is a class with the methods of `kind.Kind`, listed in `array.KINDS`, with its kernels in `pbem.bem`.
 """
 
 from pbem.geometry.elements.array import Elements, choose_kind

@@ -1,1 +1,1 @@
-"""PETSc's solvers and options, and how rows are shared by the ranks."""
+"""PETSc's solvers and options, and the distribution of rows over the ranks."""

@@ -1,1 +1,1 @@
-"""Subdomains that overlap, and the preconditioner made of their inverses."""
+"""The preconditioner of GMRES: overlapping subdomains (`schwarz.py`), or factors of many small bodies (`bodies.py`)."""

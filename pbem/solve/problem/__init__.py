@@ -1,1 +1,1 @@
-"""The discretised problem: what Newton's method knows of a system of equations and of its tangent operator."""
+"""The discretised problem: the interface between Newton's method and the system of equations with its tangent."""

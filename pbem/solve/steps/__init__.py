@@ -1,1 +1,1 @@
-"""Load steps: stages, cut-backs, and what is said of each step."""
+"""Load steps: stages, cut-backs, and the notes on each step."""

@@ -1,1 +1,1 @@
-"""Tangent operators: factored, condensed onto the contact pairs, and by products for GMRES."""
+"""Tangent operators: factored, condensed onto the contact pairs, or applied by products for GMRES."""

@@ -30,7 +30,8 @@ from pbem.model.model import (
 )
 from pbem.results.describe import describe_results
 from pbem.results.dissipation import PairRecord, PairWork, measure_work
-from pbem.results.energy import Energy, EnergyBalance, weigh_faces
+from pbem.results.energy import Energy, EnergyBalance
+from pbem.results.face_weights import weigh_faces
 from pbem.results.reader import open_results
 from pbem.results.runaway import Runaway
 from pbem.results.writer import ResultWriter

@@ -1,0 +1,258 @@
+"""What regions, springs and pairs store at a step, and what weights and far stresses work on (theory, 73, 74).
+
+Notation and formulas: pbem.results.energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.particular_solution import ParticularSolution
+from pbem.contact.arrangement import Arrangement, find_arrangement
+from pbem.contact.laws import collect_laws
+from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load
+from pbem.mesh.mesh import Mesh, list_faces
+from pbem.model.model import Model
+from pbem.results.dissipation import PairRecord, measure_stored, record_pairs, record_pairs_at_rest
+from pbem.results.face_weights import weigh_faces
+from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
+from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
+from pbem.solve.problem.step import Step
+
+UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+# Per region, the balanced particular solution and the one far away.
+_Particulars = list[tuple[ParticularSolution, ParticularSolution]]
+# Tractions without those of the in-situ stress and displacements (f,) on all faces, and forces of point loads (l,).
+_Fields = tuple[Complex, Complex, Real]
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """Fields of unit forces or unit stresses in one region: its faces (k,), their traction and displacement (c, k),
+    and the integral (c,) of the displacement over a finite region. at_points (c, l): what they move the model's point
+    loads by, 3 numbers each; 0 for those of other regions."""
+
+    faces: Integer
+    traction: Complex
+    displacement: Complex
+    integral: Complex
+    at_points: Real
+
+    def conjugate(self, weight: Real, traction: Complex, displacement: Complex, point_forces: Real) -> Real:
+        """Betti's sum (c,) for the field with tractions and displacements on all faces (f,); point_forces (l,)."""
+        w, t, u = weight[self.faces], traction[self.faces], displacement[self.faces]
+        on_faces = (w * (t * np.conj(self.displacement) - np.conj(self.traction) * u)).real.sum(axis=1)
+        return np.asarray(on_faces + self.at_points @ point_forces)
+
+
+@dataclass(frozen=True)
+class EnergyState:
+    """t, u (f,) on all faces; swollen (f,): of u what swelling does without stress; load and conjugate (c,): weights
+    and far stresses of all regions, and what they work on, but for swelling; stored: in the regions; springs: stored in
+    springs; pairs."""
+
+    traction: Complex
+    displacement: Complex
+    swollen: Complex
+    load: Real
+    conjugate: Real
+    stored: float
+    springs: float
+    pairs: PairRecord
+
+
+@dataclass(frozen=True)
+class _Work:
+    """load (c,) works on conjugate (c,), and so much of it is stored."""
+
+    load: Real
+    conjugate: Real
+    stored: float
+
+
+class StoredEnergy:
+    """The state of a model by its boundary values, step by step.
+
+    laws: of the pairs. outer: the nodes of outer curves. there: what a stage has taken away, None for nothing.
+    weight (f,): of the faces that are there, 0 of others.
+    """
+
+    def __init__(self, model: Model, mesh: Mesh) -> None:
+        """Begins with all that the model has; `arrange` goes to a stage."""
+        self._model, self._mesh = model, mesh
+        self.laws = collect_laws(model, mesh)
+        self.outer = collect_outer_nodes(model, mesh)
+        self._all_weight = self.weight = weigh_faces(mesh)
+        self.there: Arrangement | None = None
+        self._faces = list_faces(mesh)
+        self._by_region = np.argsort(self._faces.region, kind="stable")
+        self._bounds = np.searchsorted(self._faces.region[self._by_region], np.arange(len(model.regions) + 1))
+        self._forces = [
+            self._refer(number, [ParticularSolution(each.material, force=force) for force in (1, 1j)], within=True)
+            for number, each in enumerate(model.regions) if each.material.density and not each.infinite
+        ]  # fmt: skip
+        self._stresses = [
+            self._refer(number, [ParticularSolution(each.material, remote=stress) for stress in UNIT_STRESSES])
+            for number, each in enumerate(model.regions) if each.infinite
+        ]  # fmt: skip
+        self._is_tool = np.array([each.rigid for each in model.regions])[self._faces.region]
+        self._in_situ = self._sample_in_situ()
+
+    @property
+    def pair_weight(self) -> Real:
+        pairs = self._mesh.pairs
+        whole = np.where(pairs.crack, self.weight[pairs.first], pairs.weight)
+        return whole if self.there is None else np.where(self.there.bared, 0.0, whole)
+
+    def add_up(self, state: EnergyState) -> float:
+        """All that is stored: in the regions, in springs and in elastic joints."""
+        return state.stored + state.springs + measure_stored(self.pair_weight, state.pairs)
+
+    @property
+    def tools(self) -> Real:
+        """The weights of rigid tools alone."""
+        return np.where(self._is_tool, self.weight, 0.0)
+
+    @property
+    def _elastic(self) -> Real:
+        """The weights of what is elastic."""
+        return np.where(self._is_tool, 0.0, self.weight)
+
+    def arrange(self, stage: int) -> None:
+        """From now on sums are those of what is there in a stage."""
+        self.there = find_arrangement(self._model, self._mesh, self.outer, stage)
+        self.weight = self._all_weight
+        if self.there is not None:
+            self.weight = np.where(self.there.regions[self._faces.region], 0.0, self._all_weight)
+
+    def describe_rest(self) -> EnergyState:
+        nothing = np.zeros(len(self.weight), dtype=complex)
+        pairs = record_pairs_at_rest(self.laws, self._mesh, self._in_situ[: self._mesh.nodes])
+        return self._compose(self._in_situ, nothing, 0, 0.0, pairs)
+
+    def describe(self, step: Step) -> EnergyState:
+        pressure = evaluate_load(self._model, self._mesh, self.outer, step.stage, step.factor).pressure
+        pairs = record_pairs(self.laws, step.contact, pressure)
+        return self._compose(step.traction, step.displacement, step.stage, step.factor, pairs)
+
+    def _compose(
+        self, traction: Complex, displacement: Complex, stage: int, factor: float, pairs: PairRecord
+    ) -> EnergyState:
+        """The energy that is stored, and what weights and far stresses work on (theory, 73, 74)."""
+        particulars = evaluate_particular_solutions(self._model, stage, factor)
+        swollen = self._sample_swelling([balanced for balanced, _ in particulars])
+        strained = displacement - swollen  # by stress alone
+        point_forces, moved = self._move_points(traction, strained, stage, factor, particulars)
+        works = [_Work(point_forces, moved, 0.5 * float(point_forces @ moved))]
+        fields, whole = (traction - self._in_situ, strained, point_forces), traction + self._in_situ
+        works += [self._lift(reference, particulars, fields) for reference in self._forces]
+        works += [self._strain(reference, particulars, fields) for reference in self._stresses]
+        return EnergyState(
+            traction, displacement, swollen,
+            load=np.concatenate([each.load for each in works]),
+            conjugate=np.concatenate([each.conjugate for each in works]),
+            stored=sum((each.stored for each in works), 0.5 * sum_work(self._elastic, whole, strained)),
+            springs=0.5 * self._measure_springs(displacement, stage, factor), pairs=pairs,
+        )  # fmt: skip
+
+    def _move_points(
+        self, traction: Complex, displacement: Complex, stage: int, factor: float, particulars: _Particulars
+    ) -> tuple[Real, Real]:
+        """Forces of the point loads (l,), 3 numbers each, and what they move by; 0 where their region is gone."""
+        if not self._model.point_loads:
+            return np.zeros(0), np.zeros(0)
+        forces = measure_point_forces(self._model, stage, factor)
+        moved = measure_point_motions(
+            self._model, self._mesh, self._faces, self.weight, (displacement, traction), particulars
+        )
+        acting = np.repeat(self._find_acting_points(), 3)
+        return np.where(acting, forces, 0.0), np.where(acting, moved, 0.0)
+
+    def _lift(self, reference: _Reference, particulars: _Particulars, fields: _Fields) -> _Work:
+        """What the weight of a finite region works on, and stores; nothing where the region is gone."""
+        region = self._faces.region[reference.faces[0]]
+        if self.there is not None and self.there.regions[region]:
+            return _Work(np.zeros(2), np.zeros(2), 0.0)
+        balanced, _ = particulars[region]
+        moved = reference.conjugate(self.weight, *fields) + (np.conj(balanced.force) * reference.integral).real
+        weight = balanced.force + balanced.carried
+        # In-situ stress that carries a weight does the work of both.
+        both = weight + balanced.carried
+        return _Work(_split(weight), moved, 0.5 * float(_split(both) @ moved))
+
+    def _strain(self, reference: _Reference, particulars: _Particulars, fields: _Fields) -> _Work:
+        """What the stress far away in an infinite region works on, and stores."""
+        balanced, far = particulars[self._faces.region[reference.faces[0]]]
+        initial, remote = np.array(balanced.initial.value), np.array(far.remote)
+        strained = reference.conjugate(self.weight, *fields)
+        return _Work(initial + remote, strained, 0.5 * float((2 * initial + remote) @ strained))
+
+    def _find_acting_points(self) -> Bool:
+        """Which point loads (c,) act on regions that are there."""
+        gone = {name for name, is_gone in zip(self._mesh.region_names, self.there.regions, strict=True) if is_gone} \
+            if self.there is not None else set()
+        return np.array([load.region not in gone for load in self._model.point_loads.values()])
+
+    def _measure_springs(self, displacement: Complex, stage: int, factor: float) -> float:
+        outer = self.outer
+        along = (np.conj(outer.direction) * displacement[outer.node][:, None]).real
+        if self._model.stages[stage].ends:
+            along -= evaluate_ends(self._model, outer, stage, factor)
+        return float(self.weight[outer.node] @ (outer.stiffness * along**2).sum(axis=1))
+
+    def _sample_in_situ(self) -> Complex:
+        """Traction of the in-situ stress on all faces (f,)."""
+        traction = np.zeros(len(self.weight), dtype=complex)
+        for number, (balanced, _) in enumerate(evaluate_particular_solutions(self._model, 0, 0.0)):
+            at_rest = ParticularSolution(balanced.material, initial=balanced.initial)
+            if at_rest.is_zero:
+                continue
+            own = self._find_faces(number)
+            traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
+        return traction
+
+    def _sample_swelling(self, particulars: Sequence[ParticularSolution]) -> Complex:
+        """Displacement of the strain without stress on all faces (f,)."""
+        moved = np.zeros(len(self.weight), dtype=complex)
+        for number, balanced in enumerate(particulars):
+            if not balanced.swelling.is_zero:
+                own = self._find_faces(number)
+                moved[own] = balanced.swelling.displacement(self._faces.position[own])
+        return moved
+
+    def _find_faces(self, region: int) -> Integer:
+        return self._by_region[self._bounds[region]:self._bounds[region + 1]]
+
+    def _refer(self, region: int, fields: Sequence[ParticularSolution], within: bool = False) -> _Reference:
+        """Fields about the origin, or about a point `within` a finite region, where rounding is smallest."""
+        faces = self._find_faces(region)
+        z, n = self._faces.position[faces], self._faces.normal[faces]
+        center = complex(z.mean()) if within else 0j
+        z = z - center
+        loads = list(self._model.point_loads.values())
+        motions = evaluate_unit_motions(list(fields), center, loads, self._model.size).reshape(len(fields), -1)
+        motions *= np.repeat([load.region == self._model.regions[region].name for load in loads], 3)
+        # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
+        second_moment = 0.5 * (self.weight[faces] * n * z**2 * np.conj(z)).sum()
+        return _Reference(
+            faces,
+            np.array([field.traction(z, n) for field in fields]),
+            np.array([field.displacement(z) for field in fields]),
+            np.array([complex(field.displacement(np.array([1 + 0j]))[0]) * second_moment for field in fields]),
+            motions,
+        )
+
+
+def sum_work(weight: Real, traction: Complex, displacement: Complex) -> float:
+    """Tractions (f,) times displacements (f,), integrated by weights (f,)."""
+    return float(weight @ (traction * np.conj(displacement)).real)
+
+
+def _split(force: complex) -> Real:
+    return np.array([force.real, force.imag])

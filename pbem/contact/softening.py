@@ -57,14 +57,18 @@ def _invert_constant(trial: Real, stiffness: Real) -> Real:
 
 
 def _invert_exponential(trial: Real, stiffness: Real) -> Real:
-    """By Newton's steps from the right, where the function is convex and rises."""
-    x = np.maximum(trial, 1.0) / stiffness
+    """By Newton's steps from the right, where the function is convex and rises; 0 for trials below the strength.
+
+    For these, which need not be reached by any x, the steps would run away to the left, until exp(-x) overflows.
+    """
+    trial = np.maximum(trial, 1.0)
+    x = trial / stiffness
     for _ in range(MOST_STEPS):
         change = (np.exp(-x) + stiffness * x - trial) / (stiffness - np.exp(-x))
         x = x - change
         if np.all(np.abs(change) <= 1e-15 * np.maximum(x, 1e-3)):
             break
-    return np.maximum(x, 0.0)
+    return np.where(trial > 1.0, np.maximum(x, 0.0), 0.0)
 
 
 SOFTENINGS: dict[Shape, Softening] = {

@@ -118,8 +118,10 @@ def move_until_closed(opening: Real, rates: Real, power: Real, size: float, roug
 
 
 def _move(opening: Real, rates: Real, power: Real, most: float, stopped: bool = True) -> Real | None:
-    bounds = [(-most, most)] * len(power)
-    found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening, bounds=bounds)
-    if found.status != 0 or (stopped and -found.fun > 0.1 * most):
+    # The programme's tolerances are absolute: lengths are counted in the largest opening, whatever their units.
+    unit = float(opening.max(initial=0.0)) or most
+    bounds = [(-most / unit, most / unit)] * len(power)
+    found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening / unit, bounds=bounds)
+    if found.status != 0 or (stopped and -found.fun > 0.1 * most / unit):
         return None
-    return np.asarray(opening + rates @ found.x)
+    return np.asarray(opening + rates @ (unit * found.x))

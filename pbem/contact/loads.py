@@ -18,6 +18,7 @@ from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.model import Model, Region, Stage
 from pbem.model.swelling import NO_SWELLING
 from pbem.model.varying import Moment, Places, Value, Varying, blend
+from pbem.model.walls import Wall
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class Load:
     of_points (nodes,): the displacement of point loads' fields, a part of these. net_force: of those on an
     infinite region, that of their fields far away (complex).
     rigid (b, 3): of all rigid bodies the forces or motions.
-    carried (m, 2): traction, along n and s, that faces which a stage opens still carry in it.
+    carried (m, 2): traction, along n and s, that faces which a stage opens still carry in it, and that acts on walls
+    whose other side is gone.
     """
 
     values: Real
@@ -136,7 +138,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
         of_points=_sample(mesh, [each.of_points for each in particulars])[0],
         net_force=sum((each.net_force for each in points), 0j),
         rigid=rigid,
-        carried=np.zeros((mesh.pairs.count, 2)),
+        carried=evaluate_walls(model, mesh, stage, factor),
     )
 
 
@@ -177,6 +179,26 @@ def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Re
     moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
     places = Places(mesh.pairs.position + model.origin, mesh.pairs.arc_length)
     return _blend_all(values, mesh.pairs.interface, places, moment)
+
+
+def evaluate_walls(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
+    """Tractions (m, 2) along n and s on the sides that are left of pairs whose other side is gone."""
+    result = np.zeros((mesh.pairs.count, 2))
+    before = model.stages[stage - 1].walls if stage > 0 else {}
+    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
+    for name, wall in model.stages[stage].walls.items():
+        at = np.flatnonzero(mesh.pairs.interface == mesh.interface_names.index(name))
+        places = Places(mesh.pairs.position[at] + model.origin, mesh.pairs.arc_length[at])
+        pairs = zip(before.get(name, Wall(wall.frame)).values, wall.values, strict=True)
+        first, second = (blend(old, new, places, moment) for old, new in pairs)
+        traction = first + 1j * second
+        if wall.frame == "global":
+            # n points out of the first side; that of the second side is -n, as is its traction that of the first.
+            gone = model.regions[mesh.node_region[mesh.pairs.first[at[0]]]].name
+            outward = -1.0 if gone in model.stages[stage].construction.removed else 1.0
+            traction = outward * np.conj(mesh.pairs.normal[at]) * traction
+        result[at] = np.stack([traction.real, traction.imag], axis=1)
+    return result
 
 
 def _blend_all(values: Sequence[tuple[Value, Value]], owner: Integer, places: Places, moment: Moment) -> Real:

@@ -11,6 +11,7 @@ from pbem.geometry.curve import Curve
 from pbem.model.model import Model, Stage
 from pbem.model.touching import place_on_leg
 from pbem.model.varying import Places, Value, Varying, evaluate
+from pbem.model.walls import Wall
 from pbem.wording import list_names
 
 # Jumps below this part of the largest value of the stage are left alone.
@@ -25,6 +26,7 @@ def note_loads(model: Model) -> list[str]:
     loads = [value for stage in model.stages for value in (
         *(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
         *stage.pressure.values(), *stage.remote, not stage.remote_growth.is_zero,
+        *(each for wall in stage.walls.values() for each in wall.values),
         *(stage.gravity if weights else ()), *(each for values in stage.rigid.values() for each in values))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
@@ -65,6 +67,10 @@ def _list_changes(model: Model, last: Stage, stage: Stage) -> Iterator[tuple[str
     for name, value in stage.pressure.items():
         curve = model.contacts[name].first if name in model.contacts else name
         yield name, model.curves[curve], last.pressure.get(name, 0.0), value
+    for name, wall in stage.walls.items():
+        first = last.walls.get(name, Wall(wall.frame)).values
+        for old, new in zip(first, wall.values, strict=True):
+            yield name, model.curves[name], old, new
     for name, three in stage.rigid.items():
         for old, new in zip(last.rigid.get(name, (0.0, 0.0, 0.0)), three, strict=True):
             yield name, None, old, new

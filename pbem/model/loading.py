@@ -24,6 +24,7 @@ from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import StressFields, read_stress_fields
 from pbem.model.swelling import read_swellings
 from pbem.model.varying import Value, negate
+from pbem.model.walls import Wall, check_wall, update_wall
 
 # Key to frame, direction and quantity.
 _KEYS: Mapping[str, tuple[Literal["global", "local"], int, Quantity]] = {
@@ -148,7 +149,7 @@ def _tables(case: Case, curve: str) -> list[tuple[KeyPath, StageConditionTable]]
 
 
 def _check_names(case: Case, roles: Roles) -> list[Fault]:
-    faults = []
+    faults: list[Fault] = []
     two_sided = [*roles.shared, *roles.cracks]
     places: list[tuple[KeyPath, Iterable[str]]] = [((), case.boundary)]
     places += [(("stages", number), stage.boundary) for number, stage in enumerate(case.stages)]
@@ -156,10 +157,7 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
         for name in names:
             loc = (*prefix, "boundary", name)
             if name in two_sided and prefix and name in list_bared(roles, list_removed(case, int(prefix[1]))):
-                table = case.stages[int(prefix[1])].boundary[name]
-                if {key for key in table.model_fields_set if getattr(table, key) is not None} != {"pressure"}:
-                    found = f"conditions on '{name}', where a region is gone"
-                    faults.append(Fault.at(loc, found, "pressure = ... and nothing else"))
+                faults += check_wall(case, int(prefix[1]), name)
             elif name in two_sided:
                 kind = "an interface" if name in roles.shared else "a crack"
                 expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
@@ -292,6 +290,7 @@ def _find_stages(
     if not case.stages:
         return (Stage("load", case.analysis.steps, _freeze(values), dict(pressure), *fields[0], ends=_freeze(ends)),)
     stages = []
+    walls: dict[str, Wall] = {}
     for number, stage in enumerate(case.stages):
         for name in conditions:
             _update(values[name], stage.boundary.get(name))
@@ -301,10 +300,12 @@ def _find_stages(
         for name in joints:
             if name in changes:
                 pressure[name] = _read(changes[name].pressure or 0.0)
+        for name, table in bared.items():
+            update_wall(walls, name, table)
         name = stage.name or f"stage {number + 1}"
         duration = stage.duration or 0.0
         stages.append(Stage(name, stage.steps, _freeze(values), dict(pressure), *fields[number], duration=duration,
-                            ends=_freeze(ends)))
+                            ends=_freeze(ends), walls=dict(walls)))
     return tuple(stages)
 
 

@@ -18,6 +18,7 @@ from pbem.model.rigid_body import RigidBody, Values
 from pbem.model.sliver import Tie
 from pbem.model.swelling import Swelling
 from pbem.model.varying import Value, Varying
+from pbem.model.walls import Wall
 
 # Of a tool, for points that no number of turns is inside for.
 NO_INSIDE = -(10**6)
@@ -159,7 +160,8 @@ class Stage:
     strain without stress of the regions that have any. point_forces: force along x and y and moment of every point
     load. support_values: displacement along x and y of every point support. ends: of the curves whose springs' far ends
     move: by how much, along the normal and the curve. rigid: of every rigid body its three forces or motions, rotations
-    in degrees. construction: which faces are held otherwise than by their law, and which regions are gone.
+    in degrees. construction: which faces are held otherwise than by their law, and which regions are gone. walls:
+    tractions on the other sides of these.
     """
 
     name: str
@@ -176,6 +178,7 @@ class Stage:
     remote_growth: LinearStress = AT_REST
     rigid: Mapping[str, Values] = field(default_factory=dict)
     construction: Construction = field(default_factory=Construction)
+    walls: Mapping[str, Wall] = field(default_factory=dict)
 
 
 def list_timed(stage: Stage) -> list[Varying]:
@@ -183,6 +186,7 @@ def list_timed(stage: Stage) -> list[Varying]:
     values = [*(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
               *stage.pressure.values()]
     values += [each for values in stage.rigid.values() for each in values]
+    values += [each for wall in stage.walls.values() for each in wall.values]
     return [value for value in values if isinstance(value, Varying) and value.timed]
 
 

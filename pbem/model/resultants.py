@@ -88,7 +88,8 @@ def _list_pushes(
 
 
 def _has_expressions(stage: Stage) -> bool:
-    values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values()]
+    values = [*(each for pair in stage.boundary.values() for each in pair), *stage.pressure.values(),
+              *(each for wall in stage.walls.values() for each in wall.values)]
     return any(isinstance(value, Varying) and value.expression for value in values)
 
 
@@ -185,6 +186,9 @@ def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex
 def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[Value, Value]]:
     if curve in model.conditions:
         return model.conditions[curve], stage.boundary[curve]
+    wall = stage.walls.get(curve)
+    if wall is not None and any(wall.values):
+        return Condition(curve, wall.frame), wall.values
     name = next((name for name, one in model.contacts.items() if curve in (one.first, one.second)), curve)
     return Condition(curve, "local"), (negate(stage.pressure[name]), 0.0)
 

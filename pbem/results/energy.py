@@ -172,9 +172,8 @@ class EnergyBalance:
         return 0.5 * total
 
     def _measure_bared(self, old: EnergyState, new: EnergyState) -> tuple[float, float]:
-        """On faces whose other side is gone: work of the fluid, and what the tractions take that are released.
-
-        (theory, 97)
+        """On faces whose other side is gone: work of the fluid and of given tractions, and what those take that are
+        released. (theory, 97)
         """
         there, mesh = self._stored.there, self._mesh
         if there is None or not there.bared.any():
@@ -182,7 +181,8 @@ class EnergyBalance:
         pairs, links, count = mesh.pairs, mesh.links, mesh.nodes
         pressure = np.where(there.bared, 0.5 * (old.pairs.pressure + new.pairs.pressure), 0.0)
         pressed = np.zeros(count, dtype=complex)
-        pressed[pairs.slave] = pairs.sense * pressure * pairs.normal
+        along = 0.5 * (old.walls + new.walls) @ [1, 1j]
+        pressed[pairs.slave] = pairs.sense * np.where(there.bared, pressure - along, 0.0) * pairs.normal
         given = links.traction_weight * pressed[pairs.slave[links.traction_pair]]
         np.subtract.at(pressed, links.traction_node, given)
         at = there.bare

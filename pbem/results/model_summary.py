@@ -63,6 +63,8 @@ def summarise_model(model: Model, mesh: Mesh, forecast: Forecast) -> dict[str, A
                              for name, force in stage.point_forces.items()},
              "point_supports": {name: dict(zip(("ux", "uy"), values, strict=True))
                                 for name, values in stage.support_values.items()},
+             "walls": {name: {"frame": wall.frame, "values": [*map(to_plain, wall.values)]}
+                       for name, wall in stage.walls.items()},
              "ends": {name: [*map(to_plain, values)] for name, values in stage.ends.items()}}
             for stage in model.stages
         ],

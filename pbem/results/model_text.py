@@ -221,11 +221,15 @@ def describe_remote(stage: Stage, origin: complex) -> tuple[float | str, ...]:
     return replace(stage.remote_growth, value=stage.remote).describe(origin)
 
 
+# How the directions of values are called.
+AXES = {"local": ("n", "s"), "global": ("x", "y")}
+
+
 def _describe_boundary(model: Model, stage: Stage) -> list[str]:
     """What is prescribed on outer curves at the end of a stage, other than zero."""
     texts = []
     for curve, condition in model.conditions.items():
-        names = ("n", "s") if condition.value_frame == "local" else ("x", "y")
+        names = AXES[condition.value_frame]
         values = stage.boundary.get(curve, (0.0, 0.0))
         given = [
             f"{'u' if quantity == 'displacement' else 't'}{name} = {value:g}"
@@ -233,6 +237,9 @@ def _describe_boundary(model: Model, stage: Stage) -> list[str]:
         ]
         ends = zip("ns", stage.ends.get(curve, (0.0, 0.0)), strict=True)
         given += [f"end_{name} = {value:g}" for name, value in ends if value]
+        texts += [f"{curve}: {', '.join(given)}"] if given else []
+    for curve, wall in stage.walls.items():
+        given = [f"t{name} = {value:g}" for name, value in zip(AXES[wall.frame], wall.values, strict=True) if value]
         texts += [f"{curve}: {', '.join(given)}"] if given else []
     for name, support in model.point_supports.items():
         values = stage.support_values[name]

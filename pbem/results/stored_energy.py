@@ -14,7 +14,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.laws import collect_laws
-from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load
+from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load, evaluate_walls
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.dissipation import PairRecord, measure_stored, record_pairs, record_pairs_at_rest
@@ -55,7 +55,7 @@ class _Reference:
 class EnergyState:
     """t, u (f,) on all faces; swollen (f,): of u what swelling does without stress; load and conjugate (c,): weights
     and far stresses of all regions, and what they work on, but for swelling; stored: in the regions; springs: stored in
-    springs; pairs."""
+    springs; pairs; walls (m, 2): tractions that act where the other side is gone."""
 
     traction: Complex
     displacement: Complex
@@ -65,6 +65,7 @@ class EnergyState:
     stored: float
     springs: float
     pairs: PairRecord
+    walls: Real
 
 
 @dataclass(frozen=True)
@@ -159,6 +160,7 @@ class StoredEnergy:
             conjugate=np.concatenate([each.conjugate for each in works]),
             stored=sum((each.stored for each in works), 0.5 * sum_work(self._elastic, whole, strained)),
             springs=0.5 * self._measure_springs(displacement, stage, factor), pairs=pairs,
+            walls=evaluate_walls(self._model, self._mesh, stage, factor),
         )  # fmt: skip
 
     def _move_points(

@@ -96,6 +96,38 @@ def test_an_excavated_tunnel_is_that_of_kirsch(
     assert results.energy.removed[-1] == pytest.approx(results.energy.elastic[-1] / 2, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("scheme", "operator", "axes", "swap"),
+    [("SST", "dense", "xy", False), ("DBEM", "hierarchical", "ns", True), ("HST", "dense", "xy", True),
+     ("THST", "hierarchical", "ns", False)],
+)  # fmt: skip
+def test_tractions_on_the_wall_replace_what_the_core_carried(
+    scheme: str, operator: Any, axes: str, swap: bool, tmp_path: Path
+) -> None:
+    """Those of the rock at rest leave everything where it is; a part of them leaves that part of Kirsch's motion out."""
+    unit, (x, y) = 25.0, (300.0, -40.0)
+    mean, half = 0.5 * (HORIZONTAL + VERTICAL), 0.5 * (HORIZONTAL - VERTICAL)
+    along = f"(2*atan2(y - ({y}), x - ({x})))"
+    # The rock's own normal points into the tunnel.
+    texts = {"tx": f"{-HORIZONTAL / unit}*(x - ({x}))", "ty": f"{-VERTICAL / unit}*(y - ({y}))"} if axes == "xy" else {
+        "tn": f"{mean} + ({half})*cos({along})", "ts": f"{-half}*sin({along})"}
+    first, second = ({key: {"expression": f"{part}*({text})"} for key, text in texts.items()} for part in (1.0, 0.4))
+    stages = [REST, {**CUT, "boundary": {"wall": first}}, {"steps": 1, "boundary": {"wall": second}},
+              {"steps": 1, "boundary": {"wall": {"pressure": 0.0}}}]
+    case = make_tunnel(stages, unit, (x, y), analysis={"scheme": scheme})
+    if swap:
+        case["regions"] = dict(reversed(case["regions"].items()))
+    results = pbem.run(case, tmp_path / "wall.h5", operator=operator)
+    moved = results.displacement[:, find_own(results, "rock")]
+    tolerance = {"dense": 1e-9, "hierarchical": 1e-6}[operator] * np.abs(moved[-1]).max()
+    for step, part in enumerate((0.0, 0.0, 0.0, 0.6)):
+        np.testing.assert_allclose(moved[step], part * moved[-1], atol=tolerance)
+    shear = YOUNG / (2 * (1 + POISSON))
+    assert np.abs(moved[-1]).max() == pytest.approx(
+        unit * (abs(mean) + abs(half) * (3 - 4 * POISSON)) / (2 * shear), rel=1e-3)
+    assert lacks(results).max() < 1e-9
+
+
 def test_a_joint_beside_the_tunnel(tmp_path: Path) -> None:
     """It slips as it does where the tunnel is there from the start and the stress comes from far away; but support
     that comes after the slip does not undo it."""
@@ -239,7 +271,7 @@ def test_names_are_checked(tmp_path: Path) -> None:
     stages = [
         {"open": ["s1", "a", "s3"], "close": ["s1", "s2"], "remove": ["lover"]},
         {"release": ["s2"], "open": ["s1"], "boundary": {"s1": {"pressure": 1.0}}},
-        {"remove": ["lower"], "open": ["s2"], "boundary": {"s1": {"tx": 1.0}}},
+        {"remove": ["lower"], "open": ["s2"], "boundary": {"s1": {"ux": 1.0}}},
     ]
     with pytest.raises(pbem.CaseError) as raised:
         pbem.run(make_seam(stages, {}), tmp_path / "names.h5")
@@ -252,6 +284,16 @@ def test_names_are_checked(tmp_path: Path) -> None:
         "stages[1].close: found 's2', which is bonded by its law",
         "stages[2].boundary.s1: found conditions on 's1', an interface",
         "stages[3].open: found 's2', a curve of a region that is gone",
-        "stages[3].boundary.s1: found conditions on 's1', where a region is gone; expected pressure = ...",
+        "stages[3].boundary.s1: found conditions on 's1', where a region is gone; expected a pressure alone, or tractions",
     ):
         assert text in said
+
+
+def test_tractions_on_a_wall_keep_their_axes(tmp_path: Path) -> None:
+    mixed = [{"remove": ["lower"], "boundary": {"s1": {"tx": 1.0}, "s2": {"tn": 1.0, "ty": 2.0}}},
+             {"boundary": {"s1": {"tn": 1.0}}}]
+    with pytest.raises(pbem.CaseError) as raised:
+        pbem.run(make_seam(mixed, {}), tmp_path / "axes.h5")
+    said = str(raised.value)
+    assert "stages[1].boundary.s2.tn: found ty together with tn" in said
+    assert "stages[2].boundary.s1: found tractions on 's1' along other axes than in a stage before" in said

@@ -104,7 +104,7 @@ def test_an_excavated_tunnel_is_that_of_kirsch(
 def test_tractions_on_the_wall_replace_what_the_core_carried(
     scheme: str, operator: Any, axes: str, swap: bool, tmp_path: Path
 ) -> None:
-    """Those of the rock at rest leave everything where it is; a part of them leaves that part of Kirsch's motion out."""
+    """Those of the rock at rest leave all where it is; a part of them takes off that part of Kirsch's motion."""
     unit, (x, y) = 25.0, (300.0, -40.0)
     mean, half = 0.5 * (HORIZONTAL + VERTICAL), 0.5 * (HORIZONTAL - VERTICAL)
     along = f"(2*atan2(y - ({y}), x - ({x})))"
@@ -284,7 +284,7 @@ def test_names_are_checked(tmp_path: Path) -> None:
         "stages[1].close: found 's2', which is bonded by its law",
         "stages[2].boundary.s1: found conditions on 's1', an interface",
         "stages[3].open: found 's2', a curve of a region that is gone",
-        "stages[3].boundary.s1: found conditions on 's1', where a region is gone; expected a pressure alone, or tractions",
+        "stages[3].boundary.s1: found conditions on 's1', where a region is gone; expected a pressure alone",
     ):
         assert text in said
 

@@ -7,8 +7,8 @@
 Models, all with the hierarchical operator: a beam of 1:50 that is held at one end; 40 layers of 10 x 0.3 with friction
 between them, pressed and then sheared; a wall of 20 x 20 bricks in running bond with friction in all joints, by its
 weight, pressed and then sheared. --size scales their numbers. Traces: the middle of a map, each trace cut into 1, 4 and
-16 pieces of equal length. --without names the option that is 0 in the runs that are compared with (newton_bodies: no
-factors of all bodies together; newton_recycled: no recycled directions). --alone leaves these out.
+16 pieces of equal length. The runs that are compared with have no factors of all bodies together (-pbem_newton_bodies
+0); --alone leaves these out.
 
 A line for each run: unknowns, Newton's iterations, the most and all iterations of GMRES, products, seconds of this
 rank's processor; the last ones also over those of the run without, and of maps over those of whole
@@ -166,10 +166,10 @@ class Outcome:
     modes: NDArray[np.int8]
 
 
-def run(case: Path, folder: Path, without: str | None) -> Outcome | None:
-    """What a run takes, with an option that is 0; None but on the first rank."""
+def run(case: Path, folder: Path, bodies: bool) -> Outcome | None:
+    """What a run takes, with factors of all bodies together or without; None but on the first rank."""
     begin, counting = time.process_time(), Counting()
-    petsc = {} if without is None else {without: "0"}
+    petsc = {} if bodies else {"newton_bodies": "0"}
     results = pbem.run(case, folder / "run.h5", force=True, operator="hierarchical", reporter=counting, petsc=petsc)
     seconds = time.process_time() - begin
     if world.rank:
@@ -180,10 +180,10 @@ def run(case: Path, folder: Path, without: str | None) -> Outcome | None:
                    np.concatenate(modes))  # fmt: skip
 
 
-def compare(case: Path, folder: Path, without: str | None, whole: Outcome | None) -> Outcome | None:
-    """Print a line. without: the option that is 0 in the run that is compared with; whole: one more of these."""
-    plain = None if without is None else run(case, folder, without)
-    found = run(case, folder, None)
+def compare(case: Path, folder: Path, alone: bool, whole: Outcome | None) -> Outcome | None:
+    """Print a line. alone: without the run that is compared with; whole: one more of these."""
+    plain = None if alone else run(case, folder, False)
+    found = run(case, folder, True)
     if found is None:
         return None
     line = (f"{case.stem[:14]:14s}{found.unknowns:9d}{found.newton:8d}{found.most:7d}{found.linear:7d}"
@@ -208,10 +208,8 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=150, help="traces that are taken")
     parser.add_argument("--length", type=float, default=0.7, help="of an element at most")
     parser.add_argument("--pieces", type=int, nargs="+", default=list(PIECES))
-    parser.add_argument("--without", choices=["newton_bodies", "newton_recycled"], default="newton_bodies")
     parser.add_argument("--alone", action="store_true")
     options = parser.parse_args()
-    without = None if options.alone else options.without
     with tempfile.TemporaryDirectory() as name:
         folder = Path(world.bcast(name))
         if world.rank == 0:
@@ -224,14 +222,14 @@ def main() -> None:
             if world.rank == 0:
                 case.write_text(MODELS[model](options.size))
             world.Barrier()
-            compare(case, folder, without, None)
+            compare(case, folder, options.alone, None)
         whole = None
         for pieces in options.pieces if options.traces else ():
             case = folder / f"pieces{pieces}.toml"
             if world.rank == 0:
                 make_map_case(options.traces, folder, options.count, pieces, options.length)
             world.Barrier()
-            found = compare(case, folder, without, whole)
+            found = compare(case, folder, options.alone, whole)
             whole = whole or found
         world.Barrier()
 

@@ -41,6 +41,12 @@ class ConstraintMap:
         result: Real = self.matrix @ unknowns + self.offset
         return result
 
+    def acts_as(self, other: ConstraintMap) -> bool:
+        """Whether the tangent operators of both are the same: the columns, and the anchors that act."""
+        one, another = self.released, other.released
+        released = one is another if one is None or another is None else np.array_equal(one, another)
+        return released and (self.matrix != other.matrix).nnz == 0
+
 
 class _Entries:
     """Collects vector-valued contributions: at a node, for u or t, the complex coefficient of one unknown."""

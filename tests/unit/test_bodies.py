@@ -28,7 +28,7 @@ from tests.identities.solving import assemble_tangent, linearise_pairs
 from tests.unit.case_sample import BLOCKS
 from tests.unit.far_sample import TEXTS, read_sample
 from tests.unit.test_forcing import expect_same
-from tests.unit.test_recycled import run
+from tests.unit.test_gone_on_with import run
 
 Real = NDArray[np.float64]
 WALL, LAYERS = write_wall(0.25), write_layers(0.25)  # 5 x 5 bricks, 10 layers
@@ -98,7 +98,7 @@ def test_units_change_no_count(tmp_path: Path) -> None:
     """The wall in metres and pascals: moduli and stresses times a million, weights by volume too."""
     pascal = WALL.replace("1000.0", "1e9").replace("density = 0.05", "density = 5e4")
     pascal = pascal.replace("ty = -1.0", "ty = -1e6").replace("tx = 0.3", "tx = 3e5")
-    (found, counts), (other, further) = run(WALL, tmp_path), run(pascal, tmp_path, newton_recycled="40")
+    (found, counts), (other, further) = run(WALL, tmp_path), run(pascal, tmp_path, newton_bodies="1")
     assert counts == further
     for name, contact in found.contact.items():
         np.testing.assert_array_equal(other.contact[name].mode, contact.mode)
@@ -114,7 +114,7 @@ def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch
         return False
 
     monkeypatch.setattr(BodyFactors, "factorise", refuse)
-    by_groups, _ = run(layers, tmp_path, newton_recycled="39")
+    by_groups, _ = run(layers, tmp_path, newton_bodies="1")
     # The solution from which errors are estimated asks once, too.
     assert 1 <= len(calls) <= 2
     expect_same(found, by_groups)

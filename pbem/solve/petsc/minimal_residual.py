@@ -66,15 +66,6 @@ class MinimalResidual:
         self._directions = self._products = np.zeros((0, 0))
         self._factor = np.zeros((0, 0))
 
-    @property
-    def known(self) -> tuple[Real, Real]:
-        """Combinations (k, n) of the directions, and their turned products, which are orthonormal."""
-        if not self._count:
-            return np.zeros((0, 0)), np.zeros((0, 0))
-        factor = self._factor[: self._count, : self._count]
-        directions = solve_triangular(factor, self._directions[:, : self._count].T, trans="T").T
-        return directions, self._basis
-
     def solve(self, solver: PETSc.KSP, right: PETSc.Vec, left: PETSc.Vec) -> None:
         """What PETSc asks of a Krylov method; begins at zero (theory, 87)."""
         begun = residual = self._rows.turn(np.array(right.getArray(readonly=True)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import lapack
 
-from pbem.arrays import Bool, Integer, Real
+from pbem.arrays import Integer, Real
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -263,11 +263,6 @@ class SchwarzPreconditioner:
         around = list_nodes(self._mesh, elements)
         inside = number_components(np.searchsorted(around, list_nodes(self._mesh, own)))
         return elements, number_components(around), inside
-
-
-def find_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Bool:
-    """Columns (unknowns,) in which two constraint maps differ."""
-    return np.asarray(_measure_changes(before, matrix) > 0)
 
 
 def _measure_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix) -> Real:

@@ -14,6 +14,7 @@ from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
+from pbem.heap import give_back
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.petsc.minimal_residual import MinimalResidual
@@ -25,7 +26,6 @@ from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
-from pbem.solve.tangent.recycled import MOST_KEPT, RecycledSpace
 from pbem.solve.tangent.sweeps import Sweeps
 
 # Most iterations of GMRES for one linear system, without restart.
@@ -73,6 +73,8 @@ class KrylovTangent(TangentOperator):
         self.preconditioner = preconditioner
         self._groups, self._widen_groups = groups, widen
         self.constraints: ConstraintMap | None = None
+        # That of which GMRES has its directions.
+        self._known: ConstraintMap | None = None
         self.solution: Real | None = None
         self.law: Linearisation | None = None
         # States (m, 4) of the pairs that the next solution begins from, once; else those of the last solution.
@@ -92,7 +94,6 @@ class KrylovTangent(TangentOperator):
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
         self._space = MinimalResidual(problem.comm, Rows(self), MOST_ITERATIONS)
-        self.recycled = _choose_recycled(problem)
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
@@ -128,7 +129,7 @@ class KrylovTangent(TangentOperator):
         self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None, forcing: float = 0.0
     ) -> Solved:
         """See TangentOperator. Raises ConvergenceError: "linear solver"."""
-        self.recycled.move_on(self._space, self.preconditioner, constraints, self.problem.system.nodes)
+        self._move_on(constraints)
         self.constraints, self._space.residual = constraints, np.zeros(0)
         begin = self._carry_over(law)
         self.law = law
@@ -139,11 +140,23 @@ class KrylovTangent(TangentOperator):
             return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
         return self._solve_loosely(constraints, forcing) if loosely else self._complete(constraints, load)
 
+    def _move_on(self, constraints: ConstraintMap) -> None:
+        """Make preconditioner and GMRES ready for a constraint map; directions of the same operator serve on."""
+        if self._known is None or not constraints.acts_as(self._known):
+            self._forget()
+            give_back()
+            self._known = constraints
+        self.preconditioner.update(constraints)
+
+    def _forget(self) -> None:
+        self._known = None
+        self._space.forget()
+
     def _begin(self, constraints: ConstraintMap, load: Load, begin: Real | None, loosely: bool) -> _Iterate:
         """The first iterate, from unknowns (unknowns,) that are nearly the solution.
 
         Other loads or modes can make these much worse than none: that multiple is taken whose product is nearest to the
-        right-hand side; loosely, under the same load: as they are, if that is no worse than none.
+        right-hand side (theory, 110); loosely, under the same load: as they are, if that is no worse than none.
         """
         problem, rows = self.problem, self.problem.system.nodes
         if begin is not None:
@@ -336,8 +349,7 @@ class KrylovTangent(TangentOperator):
         """See TangentOperator."""
         self.problem, self.expected, self._sweeps = problem, None, None
         self.preconditioner.most_drift = MOST_DRIFT
-        self._space.forget()
-        self.recycled = _choose_recycled(problem)
+        self._forget()
 
     def destroy(self) -> None:
         """See TangentOperator."""
@@ -346,13 +358,6 @@ class KrylovTangent(TangentOperator):
         self.preconditioner.drop_inverses()
         for item in (self._solver, self._matrix, self._right, self._left):
             item.destroy()
-
-
-def _choose_recycled(problem: Problem) -> RecycledSpace:
-    """Directions of former systems are not kept of networks of cracks, nor where faces dilate: the columns of all pairs
-    that slip then change at once and by much, and what is left of the directions leads astray."""
-    dilates = any(group.law.dilates for group in problem.laws.strengths)
-    return RecycledSpace(problem.comm, 0 if dilates or answers_nearby(problem) else MOST_KEPT)
 
 
 def _choose_options() -> dict[str, str]:

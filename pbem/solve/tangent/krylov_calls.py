@@ -9,14 +9,12 @@ from petsc4py import PETSc
 
 from pbem.arrays import Real
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.tangent.recycled import RecycledSpace
 
 
 class Called(Protocol):
     """What is asked of the tangent operator: its parts, products, and vectors on every rank."""
 
     preconditioner: SchwarzPreconditioner
-    recycled: RecycledSpace
 
     def multiply(self, unknowns: Real) -> Real: ...
 
@@ -43,9 +41,9 @@ class Rows:
         return self._tangent.multiply(self._tangent.gather(part))
 
     def precondition(self, part: Real) -> Real:
-        (known, left), result = self._tangent.recycled.split(part, self), np.zeros(len(part))
-        self._tangent.preconditioner.apply(self._tangent.gather(left), result)
-        return known + result
+        result = np.zeros(len(part))
+        self._tangent.preconditioner.apply(self._tangent.gather(part), result)
+        return result
 
     def turn(self, part: Real) -> Real:
         return self._tangent.preconditioner.turn(part)

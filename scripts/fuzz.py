@@ -240,7 +240,7 @@ def nudge_number(chance: random.Random, text: str, seeds: list[str]) -> str:
     at = chance.choice(found)
     value = float(at[0])
     changed = value * chance.choice([0.5, 0.9, 0.99, 1.01, 1.1, 1.5, 2, 3, -1, 1e-3, 1e3])
-    whole = "." not in at[0] and chance.random() < 0.9
+    whole = "." not in at[0] and chance.random() < 0.9 and abs(changed) < 1e300
     return text[: at.start()] + (str(round(changed)) if whole else f"{changed:.12g}") + text[at.end() :]
 
 

@@ -58,7 +58,8 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     moves = np.stack([_split(_move(problem, motion.velocities)[: mesh.nodes]) for motion in motions], axis=1)
     rest = _move(problem, problem.settled_motion)[: mesh.nodes] - load.of_points
     resting = np.linalg.lstsq(functional @ moves, functional @ _split(rest), rcond=None)[0]
-    parts = choose_parts(seen, wanted, resting, weigh_turns(motions, _find_middles(problem, motions), model.size))
+    on_mesh = _see_on_mesh(problem, placed, motions)
+    parts = choose_parts(on_mesh, wanted, resting, weigh_turns(motions, _find_middles(problem, motions), model.size))
     moved = sum((part * _move(problem, motion.velocities) for part, motion in zip(parts, motions, strict=True)),
                 np.zeros(len(displacement), dtype=complex))
     reactions = none
@@ -80,29 +81,50 @@ def _find_wanted(
     problem: Problem, placed: Sequence[PlacedSupport], displacement: Complex, stage: int, factor: float
 ) -> Real:
     """What is missing of the supports' displacements (m,), x before y."""
-    mesh, model = problem.mesh, problem.model
+    model = problem.model
     before = model.stages[stage - 1].support_values if stage > 0 else {}
     after = model.stages[stage].support_values
     wanted = []
     for each in placed:
-        support = each.support
-        start, end = np.array(before.get(support.name, (0.0, 0.0))), np.array(after[support.name])
+        name = each.support.name
+        start, end = np.array(before.get(name, (0.0, 0.0))), np.array(after[name])
         value = start + factor * (end - start)
-        own = np.flatnonzero((mesh.curve == mesh.curve_names.index(each.curve))
-                             & (mesh.region == mesh.region_names.index(each.region)))
-        s = mesh.geometry.select(own).preimage(np.array([support.place])).ravel()
-        off = np.maximum(np.abs(s.imag), np.abs(s.real) - 1)
-        # At a corner or a joint of elements, the mean of what both have there.
-        near = off <= off.min() + 1e-9
-        found = []
-        for element, at in zip(own[near], np.clip(s.real[near], -1, 1), strict=True):
-            nodes = element * (mesh.order + 1) + np.arange(mesh.order + 1)
-            shapes = interpolate(locate_nodes(mesh)[element][None], np.array([[at]]))[0, 0]
-            found.append(complex(shapes @ displacement[nodes]))
-        mean = complex(np.mean(found))
-        wanted += [part for part, held in zip((value[0] - mean.real, value[1] - mean.imag), support.held, strict=True)
-                   if held]
+        wanted += _select_held(each, complex(*value) - _interpolate_at(problem, each, displacement))
     return np.array(wanted)
+
+
+def _see_on_mesh(problem: Problem, placed: Sequence[PlacedSupport], motions: Sequence[RigidBodyMode]) -> Real:
+    """What the motions (c) are at the conditions (m, c), interpolated as displacements are.
+
+    On arcs a rotation is no polynomial: taken as it is, it would leave a part of itself at the supports, which depends
+    on how far bodies had turned before.
+    """
+    rows = []
+    for motion in motions:
+        moved = _move(problem, motion.velocities)
+        rows.append([part for each in placed for part in _select_held(each, _interpolate_at(problem, each, moved))])
+    return np.array(rows).reshape(len(motions), -1).T
+
+
+def _select_held(placed: PlacedSupport, value: complex) -> list[float]:
+    """The components of a displacement that a support holds."""
+    return [part for part, held in zip((value.real, value.imag), placed.support.held, strict=True) if held]
+
+
+def _interpolate_at(problem: Problem, placed: PlacedSupport, displacement: Complex) -> complex:
+    """The displacement of a support's point: at a corner or a joint of elements, the mean of what both have there."""
+    mesh, support = problem.mesh, placed.support
+    own = np.flatnonzero((mesh.curve == mesh.curve_names.index(placed.curve))
+                         & (mesh.region == mesh.region_names.index(placed.region)))
+    s = mesh.geometry.select(own).preimage(np.array([support.place])).ravel()
+    off = np.maximum(np.abs(s.imag), np.abs(s.real) - 1)
+    near = off <= off.min() + 1e-9
+    found = []
+    for element, at in zip(own[near], np.clip(s.real[near], -1, 1), strict=True):
+        nodes = element * (mesh.order + 1) + np.arange(mesh.order + 1)
+        shapes = interpolate(locate_nodes(mesh)[element][None], np.array([[at]]))[0, 0]
+        found.append(complex(shapes @ displacement[nodes]))
+    return complex(np.mean(found))
 
 
 def _find_middles(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> dict[str, complex]:

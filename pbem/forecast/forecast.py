@@ -16,6 +16,7 @@ from pbem.forecast.calibration import Speed, measure_speed
 from pbem.forecast.disk import count_disk
 from pbem.forecast.limits import OVERRIDE, Limit
 from pbem.forecast.usual import (
+    BESIDE,
     STARTED,
     Changes,
     expect_changes,
@@ -88,24 +89,29 @@ def make_forecast(
         eased = replace(coarse.model, solver=choose_operator(model, mesh).ease(coarse.model.solver))
         second = count_work(eased, generate_mesh(eased))
     changes = expect_changes(model, mesh, work.pairs)
-    # The second solution begins from the statuses of the first.
-    settled = Changes(float(size.steps), 0.0)
-    memory = {"programs and libraries": STARTED * ranks, **list_memory(work, ranks, changes.part)}
+    # The second solution begins from the statuses of the first; some of its steps make factors anew.
+    settled = Changes(float(size.steps), 0.0, 0.75 + 0.25 * size.steps)
+    memory = {"programs and libraries": STARTED * ranks, **list_memory(work, ranks, changes.part, size.steps)}
     if second is not None:
-        # What is there only while groups are formed is there for one solution at a time.
-        beside = replace(second, groups=replace(second.groups, largest=0.0))
-        memory["second solution, for the estimate"] = sum(list_memory(beside, ranks, 0.0).values())
+        memory["second solution, for the estimate"] = sum(
+            used for name, used in list_memory(second, ranks, 0.0, size.steps).items() if name != BESIDE)
     speed = measure_speed(model, mesh) if timed else None
     seconds: dict[str, float] = {}
     if speed is not None:
         seconds = list_overhead(size, speed) | list_seconds(work, size, ranks, speed, changes)
         if second is not None:
-            seconds["estimate"] = sum(list_seconds(second, size, ranks, speed, settled).values())
+            seconds["estimate"] += sum(list_seconds(second, size, ranks, speed, settled).values())
     return Forecast(
         ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
-        memory=memory, rank_memory=sum(memory.values()) / ranks, seconds=seconds, disk=count_disk(model, mesh),
+        memory=memory, rank_memory=_find_largest(memory, ranks), seconds=seconds, disk=count_disk(model, mesh),
         passes=model.analysis.accuracy is not None, speed=speed, cores=cores,
     )  # fmt: skip
+
+
+def _find_largest(memory: dict[str, float], ranks: int) -> float:
+    """Bytes of the rank that has most."""
+    beside = memory.get(BESIDE, 0.0)
+    return (sum(memory.values()) - beside) / ranks + beside
 
 
 # Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes.

@@ -20,14 +20,16 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
 # Bytes of a process that has only started: Python and the libraries; and, for each unknown, what every rank keeps, with
-# the dense and with the hierarchical operator.
-STARTED, EVERYWHERE, EVERYWHERE_FAR = 142e6, 2300.0, 1000.0
+# the dense and with the hierarchical operator, of one step and of several, between which directions are kept.
+STARTED, EVERYWHERE, EVERYWHERE_FAR, EVERYWHERE_FAR_STEPS = 142e6, 2300.0, 850.0, 1280.0
+# With the hierarchical operator, of which all else is small: what the first rank has beside, and for each unknown.
+FIRST, FIRST_UNKNOWN, BESIDE = 17e6, 1900.0, "case, file, or groups while they are formed"
 # Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
 # pair changes, and where some do; and how their number grows with that of the ranks.
-AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.5
+AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.4
 # Of the hierarchical operator near blocks, those of large models (see pbem.bem.near), and groups' inverses, to what is
 # counted; of MUMPS' factors likewise.
-NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.4, 1.0, 1.5
+NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.4, 1.0, 1.6
 # Of all bodies' tangent operator, in PETSc's and MUMPS' copies, and of its factors beyond those.
 BODIES_FORMED, BODIES_FACTORS = 4.0, 1.3
 # Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
@@ -42,21 +44,28 @@ FACTORISATIONS, FACTORISATIONS_UNKNOWN, GMRES, GMRES_SETTLED, PRODUCTS = 2.0, 1.
 # Part of the changeable pairs whose columns are asked for at most, where they are not all computed at once.
 CHANGING = 0.35
 
-# Seconds: of the start; of a vector's entry in an iteration; of an entry in a product, shared and on every rank; of an
-# unknown in the preconditioner; of a call of a library that shares matrices; of an interior point and a node.
-START, VECTOR, PRODUCT, PRODUCT_ALONE, INVERSE, CALL, POINT = 1.3, 10e-6, 0.85e-6, 0.4e-6, 5e-6, 0.1, 0.15e-6
-# Of an unknown in the assembly of the hierarchical operator.
-PLACED = 40e-6
+# Seconds: of the start; of a vector's entry in an iteration, and with the hierarchical operator; of an entry in a
+# product, shared and on every rank; of an unknown in the preconditioner; of a call of a library that shares matrices;
+# of an interior point and a node.
+START, VECTOR, VECTOR_FAR, PRODUCT, PRODUCT_ALONE = 1.3, 10e-6, 5e-6, 0.55e-6, 0.25e-6
+INVERSE, CALL, POINT = 5e-6, 0.1, 0.15e-6
+# Of an unknown in the assembly of the hierarchical operator; of a crack in the tables and checks of the file, in the
+# estimate of errors, and there in each step.
+PLACED, CRACK_WRITTEN, CRACK_JUDGED, CRACK_JUDGED_STEP = 20e-6, 6.5e-3, 2.6e-3, 0.9e-3
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
-ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 2.0, 110.0, 0.5, 1.0, 0.5
-SPARSE, SPARSE_SHARED, GROUPED = 2.0, 3.5, 1.0
+ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 1.0, 110.0, 0.5, 1.0, 0.5
+SPARSE, SPARSE_SHARED, GROUPED = 1.4, 2.8, 0.65
+# How the rate of shared dense factors, on more ranks than two, grows with their number.
+FACTOR_RANKS = 0.7
 
 
 @dataclass(frozen=True)
 class Size:
-    """Of a model: its curves, regions, nodes, load steps, those that are stored, stages, and interior points."""
+    """Of a model: its curves, cracks, regions, nodes, load steps, those that are stored, stages, and interior points.
+    """
 
     curves: int
+    cracks: int
     regions: int
     nodes: int
     steps: int
@@ -68,8 +77,8 @@ class Size:
 def measure_size(model: Model, nodes: int) -> Size:
     """The numbers that follow from the model, and its nodes."""
     steps = sum(stage.steps for stage in model.stages)
-    return Size(len(model.curves), len(model.regions), nodes, steps, count_stored_steps(model), len(model.stages),
-                len(model.interior_points))
+    return Size(len(model.curves), len(model.crack_tips), len(model.regions), nodes, steps, count_stored_steps(model),
+                len(model.stages), len(model.interior_points))
 
 
 @dataclass(frozen=True)
@@ -114,8 +123,11 @@ def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
     return float((opens | slips).sum()) / max(int((~fixed).sum()), 1), bool(opens.any())
 
 
-def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
-    """Bytes over all ranks by use, without the processes themselves; part: of the pairs, see Changes."""
+def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, float]:
+    """Bytes over all ranks by use, without the processes themselves; part: of the pairs, see Changes. steps: of load.
+
+    BESIDE is what one rank has, the first or one that forms a group, but not at once.
+    """
     sparse = SPARSE_FACTORS if ranks == 1 else SPARSE_FACTORS_SHARED
     if work.hierarchical and work.sparse:
         inverses = work.besides + BODIES_FORMED * work.formed + BODIES_FACTORS * sparse * work.factored
@@ -123,9 +135,11 @@ def list_memory(work: Work, ranks: int, part: float) -> dict[str, float]:
         inverses = INVERSES * work.factored
     if work.hierarchical:
         near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
+        everywhere = EVERYWHERE_FAR if steps == 1 else EVERYWHERE_FAR_STEPS
+        groups = 8 * work.groups.largest * min(ranks, work.groups.count)
         return {"operator": 8 * near * work.entries, "preconditioner": 8 * (inverses + work.groups.kept),
-                "groups, while they are formed": 8 * work.groups.largest * min(ranks, work.groups.count),
-                "mesh and vectors": EVERYWHERE_FAR * ranks * work.unknowns}
+                "mesh and vectors": everywhere * ranks * work.unknowns,
+                BESIDE: max(FIRST + FIRST_UNKNOWN * work.unknowns, groups)}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
     factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
     copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
@@ -144,8 +158,9 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
     iterations = changes.iterations
     vectors = python * VECTOR * iterations * work.unknowns
     if work.hierarchical:
+        vectors = python * VECTOR_FAR * iterations * work.unknowns
         products = iterations * ((1.0 if work.sparse else GMRES if changes.part else GMRES_SETTLED) + PRODUCTS)
-        groups = ENTRY * speed.entry * work.groups.entries + GROUPED * speed.operation * work.groups.operations
+        groups = GROUPED * (ENTRY * speed.entry * work.groups.entries + speed.operation * work.groups.operations)
         inverses = python * work.unknowns * INVERSE * share + groups / max(1, min(ranks, work.groups.count))
         if work.sparse:
             inverses = speed.operation * SPARSE * share * work.operations + CALL * python
@@ -154,10 +169,11 @@ def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Chan
             "steps": vectors + python * work.unknowns * (
                 products * (PRODUCT * share + PRODUCT_ALONE)) + iterations * inverses,
         }  # fmt: skip
-    factors = 1.0 if work.columns else changes.factorisations
+    factors = changes.factorisations if changes.part == 0.0 or not work.columns else 1.0
     columns = work.columns or 2.0 * min(changes.part, CHANGING) * work.pairs
     alone, shared = (SPARSE, SPARSE_SHARED) if work.sparse else (FACTOR, FACTOR_SHARED)
-    rate = speed.operation * (alone if ranks == 1 else shared) * share
+    crowd = (max(ranks, 2) / 2) ** (0.0 if work.sparse else FACTOR_RANKS)
+    rate = speed.operation * (alone if ranks == 1 else shared * crowd) * share
     return {
         "assembly": ENTRY * speed.entry * (work.entries + work.besides) * share,
         "steps": vectors + factors * (FORMED * speed.byte * 8 * work.formed * share + rate * work.operations
@@ -171,7 +187,9 @@ def list_overhead(size: Size, speed: Speed) -> dict[str, float]:
     python = speed.python
     return {
         "start": python * START,
-        "reading": python * (1e-3 * size.curves + 15e-3 * (size.regions - 1) + 25e-6 * size.nodes),
+        "reading": python * (0.5e-3 * size.curves + 15e-3 * (size.regions - 1) + 25e-6 * size.nodes),
         "evaluation": python * size.stored * size.points * POINT * size.nodes,
-        "writing": python * (0.1 + 0.04 * size.stored + (60e-6 + 15e-6 * size.stored) * size.nodes),
+        "writing": python * (0.1 + 0.03 * size.stored + CRACK_WRITTEN * size.cracks
+                             + (20e-6 + 8e-6 * size.stored) * size.nodes),
+        "estimate": python * (CRACK_JUDGED + CRACK_JUDGED_STEP * size.steps) * size.cracks,
     }

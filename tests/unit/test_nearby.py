@@ -87,11 +87,14 @@ def test_a_solution_begins_from_the_last_one(many_groups: None) -> None:
     tangent.destroy()
 
 
-def test_nearby_elements_answer_nearly_as_the_whole_model_does(many_groups: None) -> None:
+@pytest.mark.parametrize("stuck", [False, True])
+def test_nearby_elements_answer_nearly_as_the_whole_model_does(stuck: bool, many_groups: None) -> None:
     problem = assemble()
     tangent = problem.make_tangent()
     assert isinstance(tangent, KrylovTangent) and tangent.settling.nearby and MOST_ASKED < 16
     modes = draw_modes(problem.mesh.pairs.count)
+    if stuck:
+        modes.mode[:] = STICK
     load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, modes, -1.0)
     constraints = problem.constrain(law, load)
     tangent.solve(constraints, load, law)

@@ -57,6 +57,8 @@ class LocalOperator:
         rows, left: places in around (k,), the unknowns of elements, rising.
         """
         mesh, columns = self._mesh, around[left]
+        if not len(columns):  # where all pairs stick nothing is left
+            return np.zeros((len(rows), 0))
         nodes = np.unique(around[rows] // 2)
         formed = np.zeros((2 * len(nodes), len(left)))
         row, column, value = take_entries(free, number_components(nodes))

@@ -1,4 +1,4 @@
-"""Keys of a case that say what is built, taken away or pressed into each other; parts of tables in `schema`."""
+"""Keys of a case for construction in stages and for press fits; parts of tables in `schema`."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from pbem.description.values import NotNegative, Text
 
 
 class ConstructionTable(Table):
-    """What a stage changes of what there is."""
+    """Changes of the structure in a stage."""
 
     remove: tuple[Text, ...] = Field(
-        (), description="regions that are taken away; what they carried on their interfaces is released in proportion "
-        "over the steps of the stage",
+        (), description="regions that are removed; the tractions on their interfaces are released in proportion over "
+        "the steps of the stage",
     )
     open: tuple[Text, ...] = Field(
-        (), description="interfaces, cracks and contacts that never touch from this stage on; what they carried is "
+        (), description="interfaces, cracks and contacts that never touch from this stage on; their tractions are "
         "released in proportion over its steps",
     )
     close: tuple[Text, ...] = Field(
-        (), description="interfaces, cracks and contacts that are bonded from this stage on, as they lie at its "
+        (), description="interfaces, cracks and contacts that are bonded from this stage on, with the jump at its "
         "beginning",
     )
     release: tuple[Text, ...] = Field(
-        (), description="of what stages before have closed or opened: from this stage on it follows its law"
+        (), description="interfaces, cracks and contacts closed or opened by earlier stages that follow their law again"
     )
 
 
 class FitTable(Table):
-    """How far the bodies of a contact may lie in each other."""
+    """The allowed overlap of the bodies of a contact."""
 
     overlap: NotNegative = Field(
-        0.0, description="length by which the bodies may lie in each other as they are drawn, at most, as for a press "
-        "fit; the first step drives them apart",
+        0.0, description="largest allowed overlap of the bodies as drawn, a length, as for a press fit; the first step "
+        "pushes them apart",
     )

@@ -18,7 +18,7 @@ class RemoteTable(Table):
 
 
 class InSituTable(Table):
-    """Components of the stress at rest."""
+    """Components of the in-situ stress."""
 
     sxx: LinearValue = 0.0
     syy: LinearValue = 0.0
@@ -26,12 +26,12 @@ class InSituTable(Table):
 
 
 class EigenstrainTable(Table):
-    """Strain that a region would take without stress if nothing held it."""
+    """Stress-free strain of a region."""
 
     exx: Number = 0.0
     eyy: Number = 0.0
-    exy: Number = Field(0.0, description="shear component of the tensor, half the change of the right angle")
-    ezz: Number = Field(0.0, description="across the plane; without effect in plane stress")
+    exy: Number = Field(0.0, description="shear component of the tensor, half the engineering shear strain")
+    ezz: Number = Field(0.0, description="strain normal to the plane; without effect in plane stress")
 
 
 class PointForceTable(Table):
@@ -43,7 +43,7 @@ class PointForceTable(Table):
 
 
 class PointLoadTable(PointForceTable):
-    """A force at a point inside a region or on the boundary of one. NAME is of your choice."""
+    """A force at a point inside a region or on the boundary of one."""
 
     at: Point = Field(description="x, y of the point")
 
@@ -56,7 +56,7 @@ class PointShiftTable(Table):
 
 
 class PointSupportTable(PointShiftTable):
-    """A point of a boundary whose displacement is given. NAME is of your choice."""
+    """A point of a boundary with a given displacement."""
 
     at: Point = Field(description="x, y of the point")
 

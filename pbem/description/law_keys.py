@@ -1,4 +1,4 @@
-"""Keys in the table of a law, their types and what they say: its name, and those of bonds that soften."""
+"""Keys in the table of a law, with their types and descriptions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LawName = Annotated[
     Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "barton_bandis", "custom"]
     | None,
     Field(
-        description='without this key `"bonded"` for a curve of two regions and `"coulomb"` for a crack; `"open"`: the '
+        description='default: `"bonded"` for a curve of two regions and `"coulomb"` for a crack; `"open"`: the '
         'faces never touch; `"rate_and_state"`: friction coefficient f0 + a ln(V/V0) + b ln(V0 theta/L) at the slip '
         'rate V and the state theta, with d theta/dt = 1 - V theta/L; `"cohesive"`: bonds that soften with opening and '
         'slip; `"barton_bandis"`: rock joints, whose friction angle phi_r + JRC log10(JCS/sigma) falls with the '
@@ -21,15 +21,15 @@ LawName = Annotated[
 ]
 FractureEnergy = Annotated[
     Positive | None,
-    Field(description="of `cohesive`: energy per area that parting in tension takes, stress times length"),
+    Field(description="of `cohesive`: energy per area of separation in tension, stress times length"),
 ]
 ShearFractureEnergy = Annotated[
     Positive | None,
-    Field(description="the same in shear; that in tension if not given (and the shear strength the tensile one)"),
+    Field(description="the same in shear; by default that in tension (as the shear strength is that in tension)"),
 ]
 Softening = Annotated[
     Literal["linear", "exponential", "constant"] | None,
-    Field(description='how tractions fall; `"linear"` if not given; `"constant"`: not at all until the bond is lost'),
+    Field(description='decrease of the tractions; by default `"linear"`; `"constant"`: none until the bond is lost'),
 ]
 ResidualFrictionAngle = Annotated[
     ResidualAngle | None,
@@ -45,7 +45,7 @@ WallStrength = Annotated[
 Closure = Annotated[
     Positive | None,
     Field(
-        description="of `barton_bandis`: largest closure V, length; `normal_stiffness` is then that at the beginning, "
+        description="of `barton_bandis`: largest closure V, length; `normal_stiffness` is then the initial stiffness "
         "K in sigma = K v/(1 - v/V)"
     ),
 ]
@@ -57,27 +57,27 @@ DilationAngle = Annotated[
     ),
 ]
 DilationSlip = Annotated[
-    Positive | None, Field(description="... over this length of slip, in either direction; without end if not given")
+    Positive | None, Field(description="... over this length of slip, in either direction; by default unlimited")
 ]
 DilationPart = Annotated[
     PartOrWhole | None,
     Field(
-        description="of `barton_bandis`: the dilation angle is this part of JRC log10(JCS/sigma), 0.5 under high and 1 "
-        "under low stress; needs `peak_slip`"
+        description="of `barton_bandis`: the dilation angle is this fraction of JRC log10(JCS/sigma), 0.5 under high "
+        "and 1 under low stress; requires `peak_slip`"
     ),
 ]
 PeakSlip = Annotated[
     Positive | None,
     Field(
-        description="of `barton_bandis`: slip at which dilation is steepest, length; about a hundredth of the joint's"
+        description="of `barton_bandis`: slip at which dilation is steepest; about a hundredth of the joint length"
     ),
 ]
-RateEffect = Annotated[Positive | None, Field(description="a of `rate_and_state`: how friction rises with ln V")]
+RateEffect = Annotated[Positive | None, Field(description="a of `rate_and_state`: increase of friction with ln V")]
 StateEffect = Annotated[
-    NotNegative | None, Field(description="b of `rate_and_state`: how friction rises with ln theta")
+    NotNegative | None, Field(description="b of `rate_and_state`: increase of friction with ln theta")
 ]
 ReferenceRate = Annotated[Positive | None, Field(description="V0 of `rate_and_state`, length/time")]
 InitialState = Annotated[
     Positive | None,
-    Field(description="theta of `rate_and_state` at the start, time; `slip_distance/reference_rate` if not given"),
+    Field(description="theta of `rate_and_state` at the start, time; by default `slip_distance/reference_rate`"),
 ]

@@ -1,4 +1,4 @@
-"""The tables of a case file about what stays rigid, and about tractions with a given resultant."""
+"""The tables of a case file for rigid curves and tools, and for tractions with a given resultant."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from pbem.description.varying import Value
 
 
 class StageRigidTable(Table):
-    """Force and moment on what stays rigid, or how it moves, at the end of the stage. May depend on the time `t`."""
+    """Force and moment on a rigid curve or tool, or its motion, at the end of the stage. May depend on the time `t`."""
 
-    fx: Value | None = Field(None, description="force along x on it, stress times length, as per unit thickness")
+    fx: Value | None = Field(None, description="force along x, per unit thickness (stress times length)")
     fy: Value | None = Field(None, description="force along y")
     moment: Value | None = Field(None, description="moment about `about`, counter-clockwise, stress times length^2")
     ux: Value | None = Field(None, description="or displacement of the point `about` along x")
     uy: Value | None = Field(None, description="or along y")
-    rotation: Value | None = Field(None, description="or rotation, degrees, counter-clockwise; it is taken as small")
+    rotation: Value | None = Field(None, description="or rotation, degrees, counter-clockwise; it must be small")
 
 
 class RigidTable(StageRigidTable):
-    """What stays rigid: per direction a force or a motion is given; where neither is, the force is zero."""
+    """A rigid curve: in each direction a force or a motion is given; if neither is, the force is zero."""
 
     about: Point | None = Field(
-        None, description="point of the moment and of the displacements; by default the centroid of its curves"
+        None, description="reference point of the moment and the displacements; by default the centroid of its curves"
     )
     curves: tuple[Text, ...] = Field((), description="further curves that move with it as one rigid body")
 
@@ -34,7 +34,7 @@ class RigidTable(StageRigidTable):
 class StageForceTable(Table):
     """Resultant of a traction at the end of the stage. May depend on the time `t`."""
 
-    fx: Value | None = Field(None, description="force along x, stress times length, as per unit thickness")
+    fx: Value | None = Field(None, description="force along x, per unit thickness (stress times length)")
     fy: Value | None = Field(None, description="force along y")
     moment: Value | None = Field(
         None, description='moment about `about`, counter-clockwise; with `how = "linear"` only'
@@ -42,15 +42,14 @@ class StageForceTable(Table):
 
 
 class ForceTable(StageForceTable):
-    """A force and a moment that are spread over a curve as a traction."""
+    """A force and a moment distributed over a curve as a traction."""
 
-    about: Point | None = Field(None, description="point of the moment; by default the curve's centroid")
+    about: Point | None = Field(None, description="reference point of the moment; by default the centroid of the curve")
     how: Literal["uniform", "linear"] = Field(
-        "uniform", description="the traction is the same everywhere, or linear in x and y, with that moment"
+        "uniform", description="the traction is uniform, or linear in x and y with the given moment"
     )
 
 
 class ToolTable(RigidTable):
-    """A rigid tool: a curve that bounds no region, with a shape that never changes. It acts on bodies by `[contacts]`
-    in which it is one of the two curves. Per direction a force or a motion is given; where neither is, the force is
-    zero."""
+    """A rigid tool: a curve of fixed shape that bounds no region. It acts on bodies through `[contacts]` in which it is
+    one of the two curves. In each direction a force or a motion is given; if neither is, the force is zero."""

@@ -14,7 +14,7 @@ class Table(BaseModel):
 
 
 class UnitsTable(Table):
-    """Labels for pictures and results. Nothing is converted: any consistent units will do."""
+    """Labels for pictures and results. No values are converted; use any consistent units."""
 
     length: Text = Field("", description="label of the unit of length")
     stress: Text = Field("", description="label of the unit of stress")

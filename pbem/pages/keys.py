@@ -20,14 +20,14 @@ INTRODUCTION = """\
 # Keys of the case file
 
 Lengths and stresses are in any consistent units; angles are in degrees. The plane is x (right), y (up). Stress is
-positive in tension. Capitals stand for names of your choice, or for those of the curves and materials of the file. What
-the tables mean together: `pbem help cases`.
+positive in tension. Names in capitals stand for names that you choose, or for the curves and materials of the file.
+`pbem help cases` explains how the tables work together.
 
-A varying value is `{ expression = "..." }`, a function of `x`, `y` and of the length `s` from the curve's first point,
-in conditions and pressures also of the time `t`; or `{ table = [[s, value], ...] }` with rising `s`, linear in between
-and constant beyond its ends.
+A varying value is `{ expression = "..." }`, a function of `x`, `y` and the arc length `s` from the first point of the
+curve, in conditions and pressures also of the time `t`; or `{ table = [[s, value], ...] }` with increasing `s`, linear
+in between and constant beyond its ends.
 
-This page is made from the program's own schema. An optional key without a default is absent unless it is given."""
+This page is generated from the schema of the program. An optional key without a default is unset unless it is given."""
 
 # What stands in the place of a name of the user's.
 NAMES = {

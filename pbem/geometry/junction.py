@@ -38,8 +38,13 @@ def _pair(found: tuple[Integer, Integer]) -> Iterator[tuple[int, int]]:
     return zip(found[0].tolist(), found[1].tolist(), strict=True)
 
 
-def split_at_junctions(curves: Mapping[str, Curve], tolerance: Tolerance) -> SplitCurves:
-    """Split every leg in whose interior an end of another curve lies; the break is exactly that end."""
+def split_at_junctions(
+    curves: Mapping[str, Curve], tolerance: Tolerance, apart: Set[frozenset[str]] = frozenset()
+) -> SplitCurves:
+    """Split every leg in whose interior an end of another curve lies; the break is exactly that end.
+
+    apart: pairs of curves of bodies that are drawn into each other, which do not meet in the end.
+    """
     legs = [(name, index, leg) for name, curve in curves.items() for index, leg in enumerate(curve.legs)]
     boxes = Boxes.around_legs([leg for _, _, leg in legs], tolerance.largest)
     breaks: dict[tuple[str, int], dict[complex, float]] = defaultdict(dict)
@@ -47,7 +52,7 @@ def split_at_junctions(curves: Mapping[str, Curve], tolerance: Tolerance) -> Spl
     ends = [(name, end) for name, curve in curves.items() if not curve.closed for end in (curve.start, curve.end)]
     for at, number in _pair(boxes.find_around(np.array([end for _, end in ends], dtype=complex))):
         (name, end), (other, index, leg) = ends[at], legs[number]
-        if other == name or end in (leg.start, leg.end):
+        if other == name or end in (leg.start, leg.end) or {other, name} in apart:
             continue
         t, distance = project(leg, end)
         if distance > tolerance.between(name, other) or not 0 < t < 1:

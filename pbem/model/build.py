@@ -37,7 +37,7 @@ from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.origin import move_to_own_origin
-from pbem.model.overlap import check_contacts, find_overlaps
+from pbem.model.overlap import check_contacts, find_overlaps, list_apart
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
 from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.pulled import check_pulled
@@ -156,14 +156,15 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
 
 def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     case, roles, shapes = cut.case, cut.roles, cut.shapes
-    split = split_at_junctions(shapes.curves, shapes.tolerance)
+    apart = list_apart(case, roles)
+    split = split_at_junctions(shapes.curves, shapes.tolerance, apart)
     curves: Mapping[str, Curve]
     loaded = [complex(*table.at) for table in case.point_loads.values()]
     curves, places = split_at_points(split.curves, shapes.tolerance, loaded)
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
     # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.
-    touching = {
+    touching = apart | {
         frozenset(pair) for pair in roles.contacts.values() if roles.outer[pair[0]] != roles.outer[pair[1]]
     }
     crossings = [*cut.faults] or find_crossings(curves, cracks, shapes.tolerance, touching)

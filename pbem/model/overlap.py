@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -54,19 +54,40 @@ def _make_body(case: Case, curves: Mapping[str, Curve], name: str, loops: tuple[
     return _Body(name, {side.curve: side.forward for loop in loops for side in loop.sides}, legs, infinite, low, high)
 
 
+def _list_pressed(case: Case, roles: Roles) -> dict[frozenset[str], float]:
+    """Pairs of regions that may be drawn into each other, with the depth that their contacts allow."""
+    pressed: dict[frozenset[str], float] = {}
+    for name, curves in roles.contacts.items():
+        regions, depth = frozenset(roles.outer[curve] for curve in curves), case.contacts[name].overlap
+        if depth > 0 and len(regions) == 2:
+            pressed[regions] = max(depth, pressed.get(regions, 0.0))
+    return pressed
+
+
+def list_apart(case: Case, roles: Roles) -> set[frozenset[str]]:
+    """Pairs of outer curves of bodies that are drawn into each other: they may cross, and do not meet where they do."""
+    pairs: set[frozenset[str]] = set()
+    for regions in _list_pressed(case, roles):
+        first, second = ([curve for curve, region in roles.outer.items() if region == name] for name in regions)
+        pairs |= {frozenset(pair) for pair in product(first, second)}
+    return pairs
+
+
 def find_overlaps(
     case: Case, curves: Mapping[str, Curve], loops: Loops, roles: Roles, tolerance: Tolerance
 ) -> list[Fault]:
     """Regions that lie on the same side of a shared curve, or one inside another that does not have it as a hole.
 
-    Curves that are in contact with one of the other region are left to `check_contacts`.
+    Curves that are in contact with one of the other region are left to `check_contacts`; others of the two bodies may
+    lie in each other by as much as their contact allows.
     """
-    faults = []
+    faults, pressed = [], _list_pressed(case, roles)
     bodies = [_make_body(case, curves, name, own) for name, own in loops.items()]
     touching = {curve: other for pair in roles.contacts.values() for curve, other in (pair, pair[::-1])}
     for (i, j), near in _pair_near(bodies, curves, touching).items():
         first, second = bodies[i], bodies[j]
-        found = _overlap(curves, first, second, near, tolerance)
+        allowed = pressed.get(frozenset((first.name, second.name)), 0.0)
+        found = _overlap(curves, first, second, near, tolerance, allowed)
         if found:
             expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
             text = f"region '{second.name}' overlapping region '{first.name}' ({found})"
@@ -111,14 +132,20 @@ def _meet(bodies: list[_Body], curves: list[Curve]) -> Iterator[tuple[int, int]]
 
 
 def _overlap(
-    curves: Mapping[str, Curve], first: _Body, second: _Body, near: list[tuple[_Body, str]], tolerance: Tolerance
+    curves: Mapping[str, Curve], first: _Body, second: _Body, near: list[tuple[_Body, str]], tolerance: Tolerance,
+    allowed: float,
 ) -> str:
-    """near: curves of one of them that may lie in the other, and that other."""
+    """near: curves of one of them that may lie in the other, and that other; allowed: by how much at most."""
     fewer, more = sorted((first.sides, second.sides), key=len)
     for curve, forward in fewer.items():
         if more.get(curve) == forward:
             return f"both lie on the same side of '{curve}'"
     for body, curve in near:
+        if allowed:
+            depth = _find_deepest(curves[curve], body)[0]
+            if depth > max(tolerance.of(curve), allowed * (1 + ROUNDED)):
+                return f"'{curve}' lies inside, {depth:.3g} deep, by more than the overlap of their contact"
+            continue
         points = np.concatenate([inner_points(leg, 1) for leg in curves[curve].legs])
         if (body.find_depth(points) > tolerance.of(curve)).any():
             return f"'{curve}' lies inside"
@@ -131,13 +158,14 @@ def check_contacts(
     """By name the overlap that is allowed of contacts whose bodies lie in each other as they are drawn, with a sentence
     for each; a fault for every one in which they do by more, with the deepest place found."""
     faults, overlaps, notes = [], {}, {}
+    pressed = _list_pressed(case, roles)
     for name, (first, second) in roles.contacts.items():
         for curve, other in ((first, second), (second, first)):
             region = roles.outer[other]
             if region not in loops or region == roles.outer[curve] or curve not in curves:
                 continue
             depth, point = _find_deepest(curves[curve], _make_body(case, curves, region, loops[region]))
-            allowed = case.contacts[name].overlap
+            allowed = pressed.get(frozenset((region, roles.outer[curve])), 0.0)
             if depth > max(tolerance.of(curve), allowed * (1 + ROUNDED)):
                 found = f"curve '{curve}' inside region '{region}', {depth:.3g} deep at {format_point(point)}"
                 expected = ("bodies that at most touch before they are loaded; or, for a press fit, "

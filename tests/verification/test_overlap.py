@@ -101,3 +101,62 @@ def test_a_disc_drawn_into_a_block(tmp_path: Path) -> None:
     moved, drawn = press(0.0, 0.01), press(-0.01, 0.0, overlap=0.011)
     assert drawn.reactions["top"][-1, 1] == pytest.approx(moved.reactions["top"][-1, 1], rel=1e-2)
     assert moved.reactions["top"][-1, 1] < -1.0
+
+
+def lay_blocks(width: float, depth: float, at: complex, turn: complex, drawn: bool, swap: bool = False) -> dict[str, Any]:
+    """A block 2 x 1 and one of a width and the height 1 on it, drawn into it by a depth, or moved there."""
+    lift = 1 - depth * drawn
+
+    def line(*points: complex) -> dict[str, Any]:
+        placed = [at + turn * point for point in points]
+        return {"points": [[z.real, z.imag] for z in placed], "elements": 8}
+
+    low, high = 1 - width / 2 + 1j * lift, 1 + width / 2 + 1j * lift
+    move = turn * -1j * depth * (not drawn)
+    return {
+        "materials": {"m": {"young": 1000.0, "poisson": 0.0}},
+        "curves": {"foot": line(0, 2), "right": line(2, 2 + 1j), "seat": line(2 + 1j, 1j), "left": line(1j, 0),
+                   "sole": line(low, high), "side": line(high, high + 1j), "head": line(high + 1j, low + 1j),
+                   "back": line(low + 1j, low)},
+        "regions": {"lower": {"material": "m", "boundary": ["foot", "right", "seat", "left"]},
+                    "upper": {"material": "m", "boundary": ["sole", "side", "head", "back"]}},
+        "boundary": {"foot": {"ux": 0.0, "uy": 0.0}, "head": {"ux": move.real, "uy": move.imag}},
+        "contacts": {"fit": {"between": ["sole", "seat"] if swap else ["seat", "sole"], "friction": 0.3,
+                             "overlap": 1.5 * depth * abs(turn) * drawn}},
+        "analysis": {"steps": 1},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("at", "turn"), [(0j, 1 + 0j), (4e3 - 700j, 25 * np.exp(0.7j))])
+def test_straight_faces_drawn_into_each_other(at: complex, turn: complex, tmp_path: Path) -> None:
+    """Blocks of one width, whose sides run over each other, share the depth evenly."""
+    results = pbem.run(lay_blocks(2.0, 1e-3, at, turn, drawn=True), tmp_path / "blocks.h5")
+    contact = results.contact["fit"]
+    np.testing.assert_allclose(contact.traction_n[-1], -1000.0 * 1e-3 / 2, rtol=1e-9)
+    np.testing.assert_allclose(contact.traction_s[-1], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("width", "swap"), [(1.0, False), (1.0, True), (3.0, False)])
+def test_corners_drawn_into_a_face_press_as_if_moved_there(width: float, swap: bool, tmp_path: Path) -> None:
+    """Sides of the one cross the face of the other; the outlines differ by the depth over the size."""
+    forces = []
+    for drawn in (True, False):
+        case = lay_blocks(width, 1e-3, 3 - 2j, 1 + 0j, drawn, swap)
+        results = pbem.run(case, tmp_path / f"{drawn}.h5")
+        forces.append(results.reactions["head"][-1])
+        assert (results.contact["fit"].traction_n[-1] <= 1e-9).all()
+    assert forces[0][1] < -0.5
+    np.testing.assert_allclose(forces[0], forces[1], atol=2e-3 * abs(forces[1][1]))
+
+
+def test_other_sides_lie_no_deeper_than_the_contact_allows(tmp_path: Path) -> None:
+    case = lay_blocks(1.0, 1e-3, 0j, 1 + 0j, drawn=True)
+    case["contacts"]["fit"]["overlap"] = 5e-4
+    with pytest.raises(pbem.CaseError, match=r"0\.001 deep .* at most overlap = 0\.0005 deep"):
+        pbem.run(case, tmp_path / "deep.h5")
+    # A lip of the upper block that reaches far into the lower one, beside the contact.
+    case["contacts"]["fit"]["overlap"] = 2e-3
+    case["curves"]["side"]["points"] = [[1.5, 0.999], [1.8, 0.5], [1.8, 1.999]]
+    case["curves"]["head"]["points"][0] = [1.8, 1.999]
+    with pytest.raises(pbem.CaseError, match=r"'side' lies inside, 0\.29 deep"):
+        pbem.run(case, tmp_path / "lip.h5")

@@ -103,7 +103,9 @@ def test_a_disc_drawn_into_a_block(tmp_path: Path) -> None:
     assert moved.reactions["top"][-1, 1] < -1.0
 
 
-def lay_blocks(width: float, depth: float, at: complex, turn: complex, drawn: bool, swap: bool = False) -> dict[str, Any]:
+def lay_blocks(
+    width: float, depth: float, at: complex, turn: complex, drawn: bool, swap: bool = False
+) -> dict[str, Any]:
     """A block 2 x 1 and one of a width and the height 1 on it, drawn into it by a depth, or moved there."""
     lift = 1 - depth * drawn
 

@@ -141,6 +141,27 @@ def solve_needle(angle: float, halves: int, **analysis: Any) -> float:
     return float(solved.last.contact.opening[0])
 
 
-@pytest.mark.parametrize("angle", [15.0, 25.0, 40.0])
+@pytest.mark.parametrize("angle", [6.0, 8.0, 15.0, 25.0, 40.0])
 def test_the_needle_at_the_mouth_of_a_shallow_crack(angle: float) -> None:
-    assert solve_needle(angle, 0) == pytest.approx(solve_needle(angle, 1, order=3), rel=0.01)
+    assert solve_needle(angle, 0) == pytest.approx(solve_needle(angle, 1, order=3), rel=0.005)
+
+
+@pytest.mark.parametrize(("angle", "turn"), [(3.0, 0.0), (5.0, 40.0)])
+def test_a_sharp_wedge_bends_as_a_beam_that_tapers(angle: float, turn: float) -> None:
+    # M = p x^2/2 and I = (a x)^3/12 at the distance x from the edge: the edge moves by 6 p/(E' a^3), and by 1.2 p/(G a)
+    # of shear, for a length of 1; the square of the angle is left out.
+    slope, pressure, along = np.tan(np.radians(angle)), 1e-6, np.exp(1j * np.radians(turn))
+    corners = [0j, along, along * (1 + 1j * slope)]
+    curves = {name: line(complex(corners[k]), complex(corners[(k + 1) % 3]), count)
+              for k, (name, count) in enumerate({"low": 8, "wall": 4, "high": 8}.items())}
+    solved = solve_case(
+        materials={"rock": ROCK},
+        curves=curves,
+        regions={"wedge": {"material": "rock", "boundary": list(curves)}},
+        boundary={"wall": {"ux": 0.0, "uy": 0.0}, "high": {"pressure": pressure}},
+        analysis={"steps": 1},
+    )
+    edge = np.argmin(np.abs(solved.mesh.position))
+    moved = -(solved.last.displacement[edge] / along).imag
+    beam = pressure * (6 / (MODULUS * slope**3) + 1.2 / (1000.0 / 2.4 * slope))
+    assert moved == pytest.approx(beam, rel=0.01)

@@ -276,15 +276,15 @@ def write_topic(cases: list[GalleryCase]) -> str:
             parts.append(f"## {subject.capitalize()}\n\n" + "\n".join(own))
     return f"""# Gallery
 
-{len(cases)} cases to start from, each with an answer that is known from elsewhere, and a few seconds or less to
-run. They come with the program and run by name, in any folder:
+{len(cases)} cases to start from, each with a known answer and a run time of a few seconds at most. They
+come with the program and can be run by name in any folder:
 
-    pbem check {cases[0].name}             # the model, and what is chosen
+    pbem check {cases[0].name}             # the model, and the automatic choices
     pbem run {cases[0].name}               # also: pbem run gallery/{cases[0].name}
     pbem plot {cases[0].name}.h5
 
 The folder `cases/gallery` of the sources has a page for each, NAME.md: problem, source, case, the same in
-Python, pictures, and the numbers to expect. To begin a case of your own, copy NAME.toml.
+Python, pictures, and the numbers to expect. To start your own case, copy NAME.toml.
 
 """ + "\n\n".join(parts) + "\n"
 

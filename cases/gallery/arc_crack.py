@@ -7,9 +7,9 @@ from pbem.results.reader import Results
 
 TITLE = "A crack along an arc of a circle: mixed mode"
 SUBJECT = "fracture"
-PROBLEM = """A crack along an arc of the radius R = 2 m and the half-angle b = 60 degrees in an infinite plane under
-the tension s = 1 MPa from all sides. KI = s sqrt(pi R sin b) cos(b/2)/(1 + sin(b/2)^2), and KII has sin(b/2) in place
-of cos(b/2). By Irwin's relation the J-integral is (KI^2 + KII^2)/E'."""
+PROBLEM = """A crack along an arc of radius R = 2 m and half-angle b = 60 degrees in an infinite plane under
+equibiaxial tension s = 1 MPa. KI = s sqrt(pi R sin b) cos(b/2)/(1 + sin(b/2)^2), and KII has sin(b/2) instead of
+cos(b/2). By Irwin's relation the J-integral is (KI^2 + KII^2)/E'."""
 SOURCE = """N. I. Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity, section 124
 (Noordhoff, 1953); Tada, Paris, Irwin, The Stress Analysis of Cracks Handbook (ASME, 2000)."""
 KI, KII = arc_crack_intensity(2.0, math.radians(60), 1.0)

@@ -7,11 +7,11 @@ from pbem.results.reader import Results
 TITLE = "A rough joint at three confining pressures: Barton's strength"
 SUBJECT = "rock joints"
 PROBLEM = """A specimen of granite is cut by a rough joint, JRC = 9, JCS = 120 MPa, residual friction angle 28 degrees,
-at an angle of q = 54.5 degrees to the direction across it. It is compressed under the confining pressures p = 1, 3 and
-10 MPa, each time until the joint slides. The stress is uniform in both parts: with the difference D = s1 - p the joint
-carries the normal stress s = p + D cos(q)^2 and the shear t = D sin(q) cos(q), and D follows from
-t = s tan(28 + 9 log10(120/s)) degrees. The friction angle falls from 42.5 degrees to 35.0. The joint closes by
-v = s/(K + s/V), with the stiffness K = 20 MPa/mm at the beginning and the largest closure V = 0.2 mm."""
+at an angle of q = 54.5 degrees to the horizontal. It is compressed under the confining pressures p = 1, 3 and 10 MPa,
+each time until the joint slides. The stress is uniform in both parts: with the difference D = s1 - p the joint carries
+the normal stress s = p + D cos(q)^2 and the shear t = D sin(q) cos(q), and D follows from t = s tan(28 + 9
+log10(120/s)) degrees. The friction angle falls from 42.5 degrees to 35.0. The joint closes by v = s/(K + s/V), with
+the initial stiffness K = 20 MPa/mm and the largest closure V = 0.2 mm."""
 SOURCE = """N. Barton, V. Choubey, The shear strength of rock joints in theory and practice, Rock Mechanics 10 (1977)
 1-54; S. C. Bandis, A. C. Lumsden, N. R. Barton, Fundamentals of rock joint deformation, Int. J. Rock Mech. Min. Sci. 20
 (1983) 249-268; for the stress on an inclined joint J. C. Jaeger, N. G. W. Cook, R. W. Zimmerman, Fundamentals of Rock

@@ -6,10 +6,10 @@ from pbem.results.reader import Results
 
 TITLE = "A strap bolted to a bar under load"
 SUBJECT = "contact"
-PROBLEM = """A bar is stretched by 100 MPa. A strap beside it, still without stress, is bolted to it as it lies: from
-then on the seam keeps the slip of 0.05 mm at its end. Another 50 MPa on both stretch both by 0.025 mm more, and the
-seam carries nothing. When 100 MPa are taken off the ends of both, they shorten by 0.05 mm: the bar is left with
-50 MPa, the strap with -50 MPa, and the seam with its slip (Poisson's ratio is 0)."""
+PROBLEM = """A bar is stretched by 100 MPa. An unstressed strap beside it is then bolted to it: from then on the seam
+keeps the slip of 0.05 mm at its end. Another 50 MPa on both stretch both by a further 0.025 mm, and the seam carries
+no traction. When 100 MPa are removed from the ends of both, they shorten by 0.05 mm: a stress of 50 MPa remains in the
+bar and of -50 MPa in the strap, and the seam keeps its slip (Poisson's ratio is 0)."""
 SOURCE = """Superposition: what comes after the bolting is a uniform stress of both bars, u = s x/E."""
 EXPECTED = {
     "slip at the end of the seam when bolted, mm": (0.05, 1e-6),

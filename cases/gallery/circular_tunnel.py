@@ -4,9 +4,9 @@ from pbem.results.reader import Results
 
 TITLE = "A deep circular tunnel (Kirsch)"
 SUBJECT = "tunnels and ground"
-PROBLEM = """A circular tunnel of the radius a = 3 m in rock under the stress at rest sxx = -5 and syy = -10 MPa
-(plane strain). Along its wall the stress is 3 sxx - syy at the crown and 3 syy - sxx at the sides. By the excavation
-the crown moves by a ((sxx + syy) - (sxx - syy)(3 - 4 nu))/(4 G), downwards."""
+PROBLEM = """A circular tunnel of radius a = 3 m in rock under the in-situ stress sxx = -5 and syy = -10 MPa (plane
+strain). Along its wall the stress is 3 sxx - syy at the crown and 3 syy - sxx at the sides. Due to the excavation the
+crown moves by a ((sxx + syy) - (sxx - syy)(3 - 4 nu))/(4 G), downwards."""
 SOURCE = """G. Kirsch, Die Theorie der Elasticitaet und die Beduerfnisse der Festigkeitslehre, Zeitschrift des
 Vereines deutscher Ingenieure 42 (1898) 797-807; Jaeger, Cook, Zimmerman, Fundamentals of Rock Mechanics, section
 8.5."""

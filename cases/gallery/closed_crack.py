@@ -11,7 +11,7 @@ SUBJECT = "fracture"
 PROBLEM = """A crack of half-length a = sqrt(2) m at 45 degrees in an infinite plane (plane strain) under the
 compression s = 10 MPa along y. Its faces carry s/2 of normal pressure and, by friction f = 0.4, f s/2 of shear. The
 rest, (1 - f) s/2, is released: the slip is an ellipse of the height 4 (1 - f) (s/2) a/E', and KII = (1 - f) (s/2)
-sqrt(pi a). Nothing opens, and the pressure is that without the crack."""
+sqrt(pi a). The crack does not open, and the pressure on it is that without the crack."""
 SOURCE = """F. A. McClintock, J. B. Walsh, Friction on Griffith cracks in rocks under pressure, Proceedings of the
 Fourth US National Congress of Applied Mechanics (1962) 1015-1021."""
 HALF_LENGTH, DRIVING = math.sqrt(2), (1 - 0.4) * 5.0

@@ -6,11 +6,11 @@ from pbem.results.reader import Results
 
 TITLE = "Shear strength of a notched joint whose bond softens"
 SUBJECT = "rock joints"
-PROBLEM = """A glued joint in rock, E' = 10 GPa, with a notch of the half-length a = 0.5 m without a bond, under
-shear. The bond has the shear strength c = 2 MPa, which falls linearly with slip until the fracture energy G = 0.2 kJ/m2
-is spent: E' G/c^2 = a, so that neither strength of materials (2 MPa) nor fracture mechanics (1.13 MPa) holds. The
-strength is the largest shear for which the slip of the softening zone has a solution; beyond it the faces run away.
-What they dissipate is G times the part of it that is spent, along the bond."""
+PROBLEM = """A glued joint in rock, E' = 10 GPa, with an unbonded notch of half-length a = 0.5 m, under shear. The bond
+has the shear strength c = 2 MPa, which falls linearly with slip until the fracture energy G = 0.2 kJ/m2 is spent: E'
+G/c^2 = a, so that neither strength of materials (2 MPa) nor fracture mechanics (1.13 MPa) applies. The strength is the
+largest shear for which the slip of the softening zone has a solution; beyond it the faces slip unstably. The
+dissipation is G times the spent fraction, integrated along the bond."""
 SOURCE = """The integral equation of a crack with cohesive zones at its ends (Dugdale, 1960; Barenblatt, 1962), solved
 at Gauss points for linear softening: find_strength in tests/verification/test_cohesive.py."""
 EXPECTED = {

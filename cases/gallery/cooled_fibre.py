@@ -2,13 +2,13 @@
 
 from pbem.results.reader import Results
 
-TITLE = "Stresses of cooling around a fibre"
+TITLE = "Cooling stresses around a fibre"
 SUBJECT = "composites"
 PROBLEM = """A glass fibre (expansion 4.6e-6 per degree) in a polymer (60e-6) cools by 120 degrees, in plane strain.
-Free of each other their radii would shrink by (1 + nu) alpha T; the difference e is the misfit of the fibre. It is
-under the pressure p = e/(1/(2 G) + (1 - 2 nu)/(2 g)), G of the matrix, g and nu of the fibre; in the matrix the
-stresses -p (r/R)^2 across and p (r/R)^2 along the circles fall with the square of the distance R. An infinite region
-has no temperature of its own, so the misfit is given as an eigenstrain of the fibre."""
+Without the bond their radii would shrink by (1 + nu) alpha T; the difference e is the misfit of the fibre. It is under
+the pressure p = e/(1/(2 G) + (1 - 2 nu)/(2 g)), G of the matrix, g and nu of the fibre; in the matrix the stresses -p
+(r/R)^2 across and p (r/R)^2 along the circles fall with the square of the distance R. An infinite region cannot have a
+temperature, so the misfit is given as an eigenstrain of the fibre."""
 SOURCE = """J. D. Eshelby, The determination of the elastic field of an ellipsoidal inclusion, Proceedings of the
 Royal Society A 241 (1957) 376-396; Timoshenko, Goodier, Theory of Elasticity, section 151 (McGraw-Hill, 1970)."""
 G, g = 3.5e3 / (2 * 1.35), 72e3 / (2 * 1.22)

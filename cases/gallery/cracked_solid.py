@@ -4,13 +4,13 @@ import math
 
 from pbem.results.reader import Results
 
-TITLE = "Modulus of a solid with cracks of all directions"
+TITLE = "Modulus of a solid with cracks in all directions"
 SUBJECT = "composites"
-PROBLEM = """Cracks of half-length a and number n per area, d = n a^2 their density, lower the modulus of a solid.
-While they are far from each other, E'/E'' = 1 + pi d if the cracks are open and equally many have each direction, as
-every crack moves by 2 pi a^2/E' times the traction that it lacks, whatever its direction. Under compression they
-close: without friction they slide only, and E'/E'' = 1 + pi d/4. Twelve cracks around a circle of twelve half-lengths
-have both, to 3e-4."""
+PROBLEM = """Cracks of half-length a and density d = n a^2 (n per unit area) reduce the modulus of a solid. If they are
+far from each other and open, and all directions are equally frequent, E'/E'' = 1 + pi d, as the integrated opening of
+each crack is 2 pi a^2/E' times the traction it relieves, whatever its direction. Under compression they close: without
+friction they only slide, and E'/E'' = 1 + pi d/4. Twelve cracks around a circle of twelve half-lengths reproduce both
+to 3e-4."""
 SOURCE = """J. R. Bristow, British Journal of Applied Physics 11 (1960) 81-85; J. B. Walsh, Journal of Geophysical
 Research 70 (1965) 381-389; M. Kachanov, Effective elastic properties of cracked solids, Applied Mechanics Reviews 45
 (1992) 304-335."""

@@ -6,9 +6,9 @@ from pbem.results.reader import Results
 
 TITLE = "Crossing cracks: a cross under fluid pressure"
 SUBJECT = "fracture"
-PROBLEM = """Two cracks of half-length a = 1 m cross at right angles in an infinite plane and are opened by a fluid of
+PROBLEM = """Two cracks of half-length a = 1 m cross at right angles in an infinite plane and are opened by fluid at
 the pressure p = 1 MPa. In the case file they are two curves; they are cut where they cross, into flat.1, flat.2,
-steep.1 and steep.2. At all four tips KI = 0.8636 p sqrt(pi a), less than that of one of them alone, and KII = 0."""
+steep.1 and steep.2. At all four tips KI = 0.8636 p sqrt(pi a), less than that of a single crack, and KII = 0."""
 SOURCE = """D. P. Rooke, I. N. Sneddon, The crack energy and the stress intensity factor for a cruciform crack
 deformed by internal pressure, International Journal of Engineering Science 7 (1969) 1079-1089."""
 EXPECTED = {

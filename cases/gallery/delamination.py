@@ -5,10 +5,10 @@ from pbem.results.reader import Results
 TITLE = "Delamination of two layers by moments"
 SUBJECT = "composites"
 PROBLEM = """A layer of carbon composite (h = 2 mm) on one of glass composite (3 mm), both taken as isotropic, with a
-crack between them that is long against both. Opposite moments M = 60 N mm per mm of width open it (plane strain). The
-bonded part carries nothing in the end, so each arm releases its energy of bending: J = 6 M^2/(E' h^3), summed over
-both arms, with E' = E/(1 - nu^2). It does not depend on the length of the crack, and is exact to terms that fall
-exponentially with it. Between two materials there is a J-integral, but no KI and KII in the usual sense."""
+long crack between them. Opposite moments M = 60 N mm per mm of width open it (plane strain). The bonded part is free
+of stress far from the tip, so each arm releases its bending energy: J = 6 M^2/(E' h^3), summed over both arms, with E'
+= E/(1 - nu^2). It does not depend on the length of the crack, and is exact up to terms that decrease exponentially
+with it. Between two materials there is a J-integral, but no KI and KII in the usual sense."""
 SOURCE = """J. R. Rice, A path independent integral and the approximate analysis of strain concentration by notches
 and cracks, Journal of Applied Mechanics 35 (1968) 379-386; Z. Suo, J. W. Hutchinson, Interface crack between two
 elastic layers, International Journal of Fracture 43 (1990) 1-18."""

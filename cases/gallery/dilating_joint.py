@@ -4,15 +4,15 @@ import math
 
 from pbem.results.reader import Results
 
-TITLE = "A shaft that is turned in rock: a joint that dilates and locks"
+TITLE = "A shaft rotated in rock: a joint that dilates and locks"
 SUBJECT = "rock joints"
-PROBLEM = """A shaft of the radius a = 500 mm in an infinite rock under the pressure p0 = 5 MPa has a core of the radius
-b = 250 mm, which does not give way and is turned by the angle w. The joint around the shaft slides by s, with the
-friction coefficient f = 0.7. It is rough: over the first 4 mm of slip it opens by D = s tan(8 degrees). As shaft and
-rock do not give way the pressure on the joint rises to p = p0 + D/c, by the softness of both, c = a/(2 G) + a (1 -
-q)/(2 (l + G) + 2 G q) with q = b^2/a^2 and Lame's moduli l and G; and the shear on it, f p, takes s = a w - f p a^3/(2
-G b^2) from the turn. Without dilation the pressure would stay 5 MPa. With it the shaft bears almost four times the
-torque, which no longer rises when the asperities have been overridden."""
+PROBLEM = """A shaft of radius a = 500 mm in infinite rock under the pressure p0 = 5 MPa has a rigid core of radius b =
+250 mm, which is rotated by the angle w. The joint around the shaft slides by s, with the friction coefficient f = 0.7.
+It is rough: over the first 4 mm of slip it opens by D = s tan(8 degrees). As shaft and rock resist this opening, the
+pressure on the joint rises to p = p0 + D/c, with the compliance of both, c = a/(2 G) + a (1 - q)/(2 (l + G) + 2 G q)
+with q = b^2/a^2 and Lame's moduli l and G; and the shear on it, f p, leaves the slip s = a w - f p a^3/(2 G b^2).
+Without dilation the pressure would remain 5 MPa. With it the shaft carries almost four times the torque, which no
+longer rises once the asperities have been overridden."""
 SOURCE = """Plane solutions for rings and holes: S. P. Timoshenko, J. N. Goodier, Theory of Elasticity (McGraw-Hill,
 third edition, 1970), article 28; for joints that dilate M. E. Plesha, Constitutive models for rock discontinuities with
 dilatancy and surface degradation, Int. J. Numer. Anal. Methods Geomech. 11 (1987) 345-362."""

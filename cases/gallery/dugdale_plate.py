@@ -6,11 +6,11 @@ from pbem.results.reader import Results
 
 TITLE = "Strength of a cracked sheet by its size: Dugdale's strips"
 SUBJECT = "fracture"
-PROBLEM = """A slit of the half-length a = 50 mm in a large steel sheet under tension, E = 200 GPa, plane stress. Ahead
-of it strips carry the yield stress s = 300 MPa until they are torn by d = 0.1 mm: bonds of constant traction with the
-fracture energy s d. Strips of the length a (1/cos(pi p/2 s) - 1) open at a tension p by
-8 s a/(pi E) ln(1/cos(pi p/2 s)) at the end of the slit. Where this is d, at p = (2 s/pi) acos exp(-pi E d/(8 s a)), the
-slit runs: the next step is no equilibrium, and energy is released."""
+PROBLEM = """A slit of half-length a = 50 mm in a large steel sheet under tension, E = 200 GPa, plane stress. Strips
+ahead of it carry the yield stress s = 300 MPa until they tear at the opening d = 0.1 mm: bonds of constant traction
+with the fracture energy s d. Strips of length a (1/cos(pi p/2 s) - 1) open at a tension p by 8 s a/(pi E) ln(1/cos(pi
+p/2 s)) at the end of the slit. When this reaches d, at p = (2 s/pi) acos exp(-pi E d/(8 s a)), the slit propagates:
+the next step is not an equilibrium, and energy is released."""
 SOURCE = """D. S. Dugdale, Yielding of steel sheets containing slits, J. Mech. Phys. Solids 8 (1960);
 B. A. Bilby, A. H. Cottrell, K. H. Swinden, Proc. R. Soc. A 272 (1963), for the opening."""
 HALF, YIELD, YOUNG = 0.05, 300.0, 200e3

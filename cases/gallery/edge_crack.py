@@ -6,9 +6,9 @@ from pbem.results.reader import Results
 
 TITLE = "An edge crack half-way through a strip"
 SUBJECT = "fracture"
-PROBLEM = """A strip of the width b = 20 mm and the length 4 b is cracked from its left edge to the depth a = b/2, and
-pulled by s = 100 MPa at its ends, which are free to turn. KI = 2.8246 s sqrt(pi a): far more than the 1.1215 of a
-shallow crack, as the strip bends. Its loads balance, so nothing has to hold it."""
+PROBLEM = """A strip of width b = 20 mm and length 4 b is cracked from its left edge to the depth a = b/2 and loaded by
+the tension s = 100 MPa at its ends, which are free to rotate. KI = 2.8246 s sqrt(pi a): far more than the 1.1215 of a
+shallow crack, as the strip bends. Its loads balance, so no supports are needed."""
 SOURCE = """A. C. Kaya, F. Erdogan, On the solution of integral equations with strongly singular kernels, Quarterly of
 Applied Mathematics 45 (1987) 105-122 (infinite strip)."""
 EXPECTED = {"KI/(s sqrt(pi a))": (2.8246, 1e-3)}

@@ -4,12 +4,13 @@ import numpy as np
 
 from pbem.results.reader import Results
 
-TITLE = "Slip on a fault by injection of fluid"
+TITLE = "Slip on a fault due to fluid injection"
 SUBJECT = "injection"
-PROBLEM = """A fault under the normal stress s = 50 MPa and the shear t = 27 MPa, with friction f = 0.6, holds. Fluid
-of the pressure p = 10 MPa is injected in its middle and diffuses along it: p erfc(|x|/sqrt(4 D time)). The fault
-slips over the half-length a that grows with the root of time. All depends on T = (f s - t)/(f p), here 0.5: a/sqrt(4
-D time) = 0.791607, and the slip in the middle is 0.934648 f p a/E'. D is chosen such that a = 100 m at the end."""
+PROBLEM = """A fault under the normal stress s = 50 MPa and the shear t = 27 MPa, with friction f = 0.6, is locked.
+Fluid at the pressure p = 10 MPa is injected in its middle and diffuses along it: p erfc(|x|/sqrt(4 D time)). The
+slipping half-length a grows with the square root of time. The solution depends only on T = (f s - t)/(f p), here 0.5:
+a/sqrt(4 D time) = 0.791607, and the slip in the middle is 0.934648 f p a/E'. D is chosen such that a = 100 m at the
+end."""
 SOURCE = """R. C. Viesca, Self-similar fault slip in response to fluid injection, Journal of Fluid Mechanics 928
 (2021) A29."""
 SPREAD, PLANE_MODULUS = 126.3253, 30e3 / (1 - 0.25**2)

@@ -4,13 +4,13 @@ import math
 
 from pbem.results.reader import Results
 
-TITLE = "A disc pressed by two forces (Brazilian test)"
+TITLE = "A disc compressed by two forces (Brazilian test)"
 SUBJECT = "rock joints"
-PROBLEM = """A disc of the radius R = 25 mm is pressed by two opposite forces P = 0.1 MN/m at points of its rim. The
-stress is that of two Flamant fields and a uniform tension P/(pi R): in the middle P/(pi R) across and -3 P/(pi R) along
-the forces, and at the distance r below a force -2 P/(pi r) - 2 P/(pi (2 R - r)) + P/(pi R) along it. The diameter
-across the forces grows by 2 P/(pi E) (2 - (pi/2) (1 - nu)) in plane stress. Point supports hold the disc at the ends of
-that diameter, and carry nothing."""
+PROBLEM = """A disc of radius R = 25 mm is pressed by two opposite forces P = 0.1 MN/m at points of its rim. The stress
+is that of two Flamant fields and a uniform tension P/(pi R): in the middle P/(pi R) across and -3 P/(pi R) along the
+forces, and at the distance r below a force -2 P/(pi r) - 2 P/(pi (2 R - r)) + P/(pi R) along it. The diameter across
+the forces grows by 2 P/(pi E) (2 - (pi/2) (1 - nu)) in plane stress. Point supports hold the disc at the ends of that
+diameter and carry no load."""
 SOURCE = """H. Hertz, 1883; A. Flamant, 1892; S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, article 41
 (McGraw-Hill, 1970)."""
 P, R, E, NU = 0.1, 0.025, 20e3, 0.25

@@ -4,10 +4,10 @@ from pbem.results.reader import Results
 
 TITLE = "A gravity dam under weight and water"
 SUBJECT = "tunnels and ground"
-PROBLEM = """A concrete dam of 40 m on stiff rock carries its own weight and then 38 m of water, whose pressure is
+PROBLEM = """A concrete dam, 40 m high, on stiff rock carries its own weight and then 38 m of water, whose pressure is
 9.81 kPa times the depth. The resultants are known: the thrust of the water w h^2/2, which the foot carries in shear,
-the weight of the dam by its area, and the moment of both about the upstream edge of the foot. Where the resultant
-meets the foot says whether the dam stands safely, within the middle third."""
+the weight of the dam by its area, and the moment of both about the upstream edge of the foot. The dam is safe if the
+resultant meets the foot within its middle third."""
 SOURCE = """Hydrostatics; statics of gravity dams, e.g. Design of Gravity Dams (US Bureau of Reclamation, 1976)."""
 AREA = 5 * 40 + 0.5 * 27 * 36
 EXPECTED = {

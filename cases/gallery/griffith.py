@@ -9,8 +9,8 @@ from pbem.results.reader import Results
 TITLE = "Griffith's crack: stress-intensity factor, opening and T-stress"
 SUBJECT = "fracture"
 PROBLEM = """A crack of half-length a = 1 m in an infinite plane (plane strain) under the tension s = 2 MPa across it.
-The stress-intensity factor is s sqrt(pi a), the opening an ellipse of the height 4 s a/E' in its middle, with E' =
-E/(1 - nu^2), and the T-stress -s. Eight elements are enough: those at the tips have the square-root shape."""
+The stress-intensity factor is s sqrt(pi a), the opening an ellipse of height 4 s a/E' in its middle, with E' = E/(1 -
+nu^2), and the T-stress -s. Eight elements are enough: those at the tips have the square-root shape."""
 SOURCE = """A. A. Griffith, The phenomena of rupture and flow in solids, Philosophical Transactions of the Royal
 Society A 221 (1921) 163-198; H. Tada, P. C. Paris, G. R. Irwin, The Stress Analysis of Cracks Handbook (ASME,
 2000)."""

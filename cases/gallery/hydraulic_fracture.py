@@ -6,10 +6,9 @@ from pbem.results.reader import Results
 
 TITLE = "A hydraulic fracture whose fluid lags behind its tips"
 SUBJECT = "injection"
-PROBLEM = """A fracture of the half-length a = 10 m is held open by fluid of p = 8 MPa that fills it up to c = 9 m,
-against the stress s = 5 MPa in the rock. KI = sqrt(pi a) ((2/pi) p asin(c/a) - s). Filled to its tips it would have
-(p - s) sqrt(pi a), four times as much: the dry ends hold it back. With KI = 0 this is the fracture of rock without
-toughness."""
+PROBLEM = """A fracture of half-length a = 10 m is held open by fluid at p = 8 MPa that fills it up to c = 9 m, against
+the stress s = 5 MPa in the rock. KI = sqrt(pi a) ((2/pi) p asin(c/a) - s). Filled to its tips it would have (p - s)
+sqrt(pi a), four times as much: the dry ends reduce it. KI = 0 would be the case of rock without toughness."""
 SOURCE = """S. A. Khristianovic, Y. P. Zheltov, Formation of vertical fractures by means of highly viscous fluid,
 Proceedings of the Fourth World Petroleum Congress 2 (1955) 579-586; Tada, Paris, Irwin, The Stress Analysis of Cracks
 Handbook (ASME, 2000)."""

@@ -6,13 +6,13 @@ import numpy as np
 
 from pbem.results.reader import Results
 
-TITLE = "Stress at rest (K0) on a joint in the ground"
+TITLE = "In-situ stress (K0) on a joint in the ground"
 SUBJECT = "rock joints"
-PROBLEM = """Ground of 100 m is at rest: the vertical stress is the weight above, the horizontal one K0 = 0.5 times
+PROBLEM = """In 100 m of ground at rest, the vertical stress is the weight above and the horizontal one K0 = 0.5 times
 that. A joint that dips by q = 36.87 degrees carries normal stress and shear in the ratio (1 - K0) sin q cos
 q/(cos(q)^2 + K0 sin(q)^2) at any depth. As this is less than its friction the state is in equilibrium, and the
-displacement is zero: the ground does not settle under its own weight once more. With the friction below that ratio
-(pbem run joint_at_rest --set interfaces.joint.friction=0.2) the joint slips."""
+displacement is zero: the ground does not settle again under its own weight. With the friction below that ratio (pbem
+run joint_at_rest --set interfaces.joint.friction=0.2) the joint slips."""
 SOURCE = """Jaeger, Cook, Zimmerman, Fundamentals of Rock Mechanics, sections 2.3 and 13.4 (Blackwell, 2007): stress
 on an inclined plane."""
 DIP, K0, WEIGHT = math.atan2(60, 80), 0.5, 2.5e-3 * 9.81

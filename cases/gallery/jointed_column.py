@@ -8,10 +8,10 @@ from pbem.results.reader import Results
 
 TITLE = "Deformability of a column with an elastic joint"
 SUBJECT = "rock joints"
-PROBLEM = """A column of h = 2 m (plane strain) is crossed by a joint that dips by q = 21.8 degrees and has the
+PROBLEM = """A column of height h = 2 m (plane strain) is crossed by a joint that dips at q = 21.8 degrees and has the
 stiffness kn = 20 and ks = 5 GPa/m. Under the axial stress s = 10 MPa the joint carries s cos(q)^2 across and s sin(q)
 cos(q) along it, below its friction of 35 degrees, and the stress is uniform. The head moves down by s h/E', and
-further by s cos(q) (cos(q)^2/kn + sin(q)^2/ks), the share of the joint."""
+additionally by s cos(q) (cos(q)^2/kn + sin(q)^2/ks), the contribution of the joint."""
 SOURCE = """R. E. Goodman, R. L. Taylor, T. L. Brekke, A model for the mechanics of jointed rock, Journal of the Soil
 Mechanics and Foundations Division ASCE 94 (1968) 637-659; R. E. Goodman, Introduction to Rock Mechanics, chapter 6
 (Wiley, 1989)."""

@@ -2,14 +2,14 @@
 
 from pbem.results.reader import Results
 
-TITLE = "A tunnel in ground at rest: stress that grows with depth"
+TITLE = "A tunnel in ground at rest: stress that increases with depth"
 SUBJECT = "tunnels and ground"
-PROBLEM = """A tunnel of the radius a = 3 m, 20 m deep, in ground of the weight g = 0.02 MN/m^3 with the horizontal
-stress K = 0.5 times the vertical one; the surface is taken as far away. With p = -20 g at the middle the stress along
-the wall is (3 K - 1) p at crown and invert and (3 - K) p at the sides by Kirsch, and by the growth with depth
-g a [(K + 1 - 1/(2 (1 - nu))) sin t - (K - 1) sin 3 t] more at the angle t. The weight of what was dug out is a net
-force upward, which the notes tell: displacements are known against each other only. Crown and invert come nearer to
-each other by a ((K + 1) p - (K - 1) p (3 - 4 nu))/(2 G), to which the growth adds nothing."""
+PROBLEM = """A tunnel of radius a = 3 m, 20 m deep, in ground of unit weight g = 0.02 MN/m^3 with the horizontal stress
+K = 0.5 times the vertical one; the surface is assumed to be far away. With p = -20 g at the middle the stress along
+the wall is (3 K - 1) p at crown and invert and (3 - K) p at the sides by Kirsch's solution; the increase with depth
+adds g a [(K + 1 - 1/(2 (1 - nu))) sin t - (K - 1)  sin 3 t] at the angle t. The weight of the excavated ground is a
+net force upward, which a note reports: only relative displacements are known. Crown and invert approach each other by
+a ((K + 1) p - (K - 1) p (3 - 4 nu))/(2 G), to which the increase with depth does not contribute."""
 SOURCE = """N. I. Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity, chapter 10 (Noordhoff,
 1953), with phi = A ln z + c z^-2; G. Kirsch, 1898."""
 WEIGHT, K, NU, A = 0.02, 0.5, 0.3, 3.0

@@ -6,11 +6,11 @@ from pbem.results.reader import Results
 
 TITLE = "A force and a moment at a point (Kelvin)"
 SUBJECT = "tunnels and ground"
-PROBLEM = """A force F = 10 MN/m along x and a moment M = 2 MN at a point of an infinite plane (E = 20 GPa,
-nu = 0.25, plane strain), such as a bolt leaves in rock. Ahead of the force at the distance r the stress along it is
--(3 + k) F/(2 pi (1 + k) r) with k = 3 - 4 nu, beside it the shear stress is (k - 1) F/(2 pi (1 + k) r) from the force
-and -M/(2 pi r^2) from the moment. Displacements are known against each other only: ahead of the force, between
-r and 2 r, 2 k F ln 2/(4 pi G (1 + k)). The point is 1e-3 m from the load and 3.5 m from it, across the bond."""
+PROBLEM = """A force F = 10 MN/m along x and a moment M = 2 MN at a point of an infinite plane (E = 20 GPa, nu = 0.25,
+plane strain), as exerted by a bolt in rock. Ahead of the force at the distance r the stress along it is -(3 + k) F/(2
+pi (1 + k) r) with k = 3 - 4 nu, beside it the shear stress is (k - 1) F/(2 pi (1 + k) r) from the force and -M/(2 pi
+r^2) from the moment. Only relative displacements are known: ahead of the force, between r and 2 r, 2 k F ln 2/(4 pi G
+(1 + k)). The point is 1e-3 m from the load and 3.5 m from it, across the bond."""
 SOURCE = """W. Thomson (Lord Kelvin), 1848; S. P. Timoshenko, J. N. Goodier, Theory of Elasticity, articles 42 and
 45 (McGraw-Hill, 1970)."""
 K, F, M, G = 2.0, 10.0, 2.0, 20e3 / 2.5

@@ -4,10 +4,10 @@ from pbem.results.reader import Results
 
 TITLE = "A lined tunnel under stress from all sides"
 SUBJECT = "tunnels and ground"
-PROBLEM = """The rock around a lined tunnel (a = 3 m, lining down to b = 2.6 m) comes under p = 8 MPa from all sides
-(plane strain). Its wall moves inwards by (2 (1 - nu) p - q) a/(2 G) where the lining presses back with q; the lining
-gives way by q a ((1 - 2 nu) a^2 + b^2)/(2 G (a^2 - b^2)) with its own constants. From both follow q and, in the
-lining, the hoop stress -2 q a^2/(a^2 - b^2) inside."""
+PROBLEM = """The rock around a lined tunnel (a = 3 m, lining down to b = 2.6 m) is loaded by p = 8 MPa from all sides
+(plane strain). Its wall moves inwards by (2 (1 - nu) p - q) a/(2 G) if the lining presses back with q; the lining is
+displaced by q a ((1 - 2 nu) a^2 + b^2)/(2 G (a^2 - b^2)) with its own constants. Both together give q and the hoop
+stress -2 q a^2/(a^2 - b^2) at the inside of the lining."""
 SOURCE = """Lame's solutions for ring and plane; e.g. H. H. Einstein, C. W. Schwartz, Simplified analysis for tunnel
 supports, Journal of the Geotechnical Engineering Division ASCE 105 (1979) 499-518 (thin linings)."""
 G, g = 10e3 / 2.5, 30e3 / 2.4

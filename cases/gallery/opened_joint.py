@@ -6,11 +6,11 @@ from pbem.results.reader import Results
 
 TITLE = "A dry joint in a pier opens under an eccentric load"
 SUBJECT = "masonry"
-PROBLEM = """A pier of the width b = 1 m is jointed at mid-height, without mortar, and carries a force e = 0.31443 b
-out of its middle. The opened part of the joint is an edge crack of the depth a that closes smoothly: its KI is zero.
-With KI = s sqrt(pi a) F of a strip under tension (F = 2.8246 at a = b/2) and bending (1.4972), the compression s and
-the bending stress 6 e/b s cancel at 6 e/b = 2.8246/1.4972: the joint is open over half of its width. Navier's rule
-for materials without tension, 3 (b/2 - e) for what is closed, would say 0.44 b."""
+PROBLEM = """A pier of width b = 1 m has a joint without mortar at mid-height and carries a force with an eccentricity
+of e = 0.31443 b. The opened part of the joint is an edge crack of depth a that closes smoothly: its KI is zero. With
+KI = s sqrt(pi a) F of a strip under tension (F = 2.8246 at a = b/2) and bending (1.4972), the compression s and the
+bending stress 6 e/b s cancel at 6 e/b = 2.8246/1.4972: the joint is open over half of its width. Navier's rule for
+materials without tension, 3 (b/2 - e) for the closed part, would give an open part of 0.44 b."""
 SOURCE = """A. C. Kaya, F. Erdogan, On the solution of integral equations with strongly singular kernels, Quarterly of
 Applied Mathematics 45 (1987) 105-122 (factors of strips), superposed."""
 EXPECTED = {

@@ -4,11 +4,12 @@ from pbem.results.reader import Results
 
 TITLE = "A stone pushed over: rocking on its edge"
 SUBJECT = "masonry"
-PROBLEM = """A block of b = 1 m and h = 2.5 m stands dry on a footing, with friction of 0.6, under its weight W. Its
-head is pushed to the right by 10 mm. While it rocks, the weight and the push H balance about its right edge: H/W =
-b/(2 h) = 0.2, less than the friction, so that it turns over before it slides. The bed stays closed over a small part
-at the edge only, and its pressure there makes H a little less than that of a rigid block. A body force acts at half
-the height: the block falls at the slope, or the horizontal acceleration over gravity, of b/h = 0.4."""
+PROBLEM = """A block of b = 1 m and h = 2.5 m stands on a footing without mortar, with friction 0.6, under its weight
+W. Its head is pushed to the right by 10 mm. While it rocks, the moments of the weight and the push H about its right
+edge balance: H/W = b/(2 h) = 0.2, less than the friction, so that it overturns before it slides. The bed remains
+closed only over a small part at the edge, and the pressure there makes H slightly smaller than for a rigid block. A
+body force acts at half the height: the block falls at a slope, or a ratio of horizontal acceleration to gravity, of
+b/h = 0.4."""
 SOURCE = """Statics of a rigid block; G. W. Housner, The behavior of inverted pendulum structures during earthquakes,
 Bulletin of the Seismological Society of America 53 (1963) 403-417."""
 WEIGHT = 2.6 * 9.81 * 2.5

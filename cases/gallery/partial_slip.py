@@ -10,8 +10,8 @@ TITLE = "Partial slip of pressed cylinders (Cattaneo, Mindlin)"
 SUBJECT = "contact"
 PROBLEM = """Two equal cylinders are pressed by P and then pushed by Q, less than f P. The contact of half-width a
 slips at its edges, and sticks where |x| < c = a sqrt(1 - Q/(f P)). The shear traction is that of full slip, f p0
-sqrt(1 - x^2/a^2), less the same of the width c times c/a: in the middle it is f p0 (1 - c/a). P and Q are the forces
-at the top; a and p0 follow from P by Hertz's formulas."""
+sqrt(1 - x^2/a^2), less c/a times the same distribution of width c: in the middle it is f p0 (1 - c/a). P and Q are the
+forces at the top; a and p0 follow from P by Hertz's formulas."""
 SOURCE = """C. Cattaneo, Rendiconti dell'Accademia nazionale dei Lincei 27 (1938) 342-348, 434-436, 474-478; R. D.
 Mindlin, Compliance of elastic bodies in contact, Journal of Applied Mechanics 16 (1949) 259-268."""
 SOFTNESS, CURVATURE = 2 * (1 - 0.3**2) / 210e3, 2 / 100

@@ -5,9 +5,9 @@ import numpy as np
 
 SUBJECT = "contact"
 TITLE = "Pin pressed by a force into its clearance"
-PROBLEM = """A pin of radius R = 10 lies in the middle of a hole of radius 10.01 in a large plate of the same steel, and
-is pressed without friction by a force Q = 4000 per unit thickness. Nothing holds it before it touches: the program
-moves it there. The contact is on an arc whose half-angle e follows from E' c/Q alone, c the clearance."""
+PROBLEM = """A pin of radius R = 10 lies in the middle of a hole of radius 10.01 in a large plate of the same steel,
+and is pressed without friction by a force Q = 4000 per unit thickness. Nothing holds it before it touches; the program
+moves it into contact. The contact is an arc whose half-angle e depends only on E' c/Q, with the clearance c."""
 SOURCE = "A. Persson, 1964; closed form of M. Ciavarella, P. Decuzzi, Int. J. Solids Structures 38, 2001, b = tan(e/2)"
 RADIUS, CLEARANCE, FORCE, MODULUS = 10.0, 0.01, 4000.0, 210000.0 / (1 - 0.3**2)
 

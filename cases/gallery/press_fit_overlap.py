@@ -4,10 +4,10 @@ from pbem.results.reader import Results
 
 TITLE = "A press fit by geometry (Lame)"
 SUBJECT = "contact"
-PROBLEM = """A brass ring (radii 25 and 40 mm) sits on a hollow steel shaft (10 and 25.0005 mm): the shaft is drawn
-too large, and the contact allows that. The pressure of the fit follows from Lame's solution for both, and the energy
-that is stored is half of its work on the interference. Then the ring is turned by a shear traction on its outside,
-whose moment the friction of the fit has to carry."""
+PROBLEM = """A brass ring (radii 25 and 40 mm) sits on a hollow steel shaft (10 and 25.0005 mm): the shaft is drawn too
+large, and the contact allows the overlap. The pressure of the fit follows from Lame's solution for both, and the
+stored energy is half of its work on the interference. Then a shear traction on the outside of the ring applies a
+torque, which the friction of the fit has to carry."""
 SOURCE = """G. Lame, Lecons sur la theorie mathematique de l'elasticite des corps solides (1852); Timoshenko, Goodier,
 Theory of Elasticity, section 28 (McGraw-Hill, 1970)."""
 BORE, FIT, OUT, DEPTH = 10.0, 25.0, 40.0, 5e-4

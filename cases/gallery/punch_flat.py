@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 SUBJECT = "contact"
-TITLE = "Flat punch under a force beside its middle"
-PROBLEM = """A rigid punch with a flat face of width 2 a = 2 is pressed without friction on a large block by a force
-P = 1 that acts 0.2 to the right of its middle: the tool has a force, a moment, and no displacement along the face. The
-pressure grows without bound towards both edges, and the punch tilts."""
+TITLE = "Flat punch under an eccentric force"
+PROBLEM = """A rigid punch with a flat face of width 2 a = 2 is pressed without friction on a large block by a force P
+= 1 that acts 0.2 to the right of its middle: force and moment of the tool are given, and its displacement along the
+face is zero. The pressure grows without bound towards both edges, and the punch tilts."""
 SOURCE = "K. L. Johnson, Contact Mechanics, 1985, section 2.8: p = (P + 2 M x/a^2)/(pi sqrt(a^2 - x^2)), half-plane"
 FORCE, MOMENT, HALF, MODULUS = 1.0, 0.2, 1.0, 1000.0 / (1 - 0.3**2)
 EXPECTED = {

@@ -8,10 +8,10 @@ from pbem.results.reader import Results
 
 TITLE = "A joint with teeth rides up: shear strength and dilation"
 SUBJECT = "rock joints"
-PROBLEM = """Two blocks of rock meet in four teeth of the angle i = 20 degrees; the friction angle of the faces is b =
-30 degrees. Under a constant normal force the upper block is moved to the right: the faces that look to the left slide
-and carry everything, and the block is lifted. The shear force is tan(b + i) times the normal force: exactly, by the
-equilibrium of the upper block, whatever the stresses. The block rises by tan i of its way."""
+PROBLEM = """Two blocks of rock meet along four teeth with the angle i = 20 degrees; the friction angle of the faces is
+b = 30 degrees. Under a constant normal force the upper block is moved to the right: the faces that face left slide and
+carry the whole load, and the block is lifted. The shear force is tan(b + i) times the normal force: exactly, by the
+equilibrium of the upper block, whatever the stresses. The block rises by tan i times its displacement."""
 SOURCE = """F. D. Patton, Multiple modes of shear failure in rock, Proceedings of the First Congress of the
 International Society for Rock Mechanics 1 (1966) 509-513."""
 EXPECTED = {

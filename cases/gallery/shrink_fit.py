@@ -6,10 +6,10 @@ from pbem.results.reader import Results
 
 TITLE = "A shrink fit (Lame), then a torque"
 SUBJECT = "contact"
-PROBLEM = """A ring of iron (25 to 40 mm) sits on a hollow shaft of steel (10 to 25 mm) that is too large for it by d
-= 0.02 mm in radius (plane stress). The pressure between them is d over the sum of their radial compliances, R ((R^2 +
-r^2)/(R^2 - r^2) - nu)/E of the shaft and R ((r^2 + R^2)/(r^2 - R^2) + nu)/E of the ring. Then the ring is turned by
-shear tractions on its outside: the fit carries ts (40/25)^2, just less than friction times pressure."""
+PROBLEM = """A ring of iron (25 to 40 mm) sits on a hollow shaft of steel (10 to 25 mm) that is too large for it by d =
+0.02 mm in radius (plane stress). The pressure between them is d over the sum of their radial compliances, R ((R^2 +
+r^2)/(R^2 - r^2) - nu)/E of the shaft and R ((r^2 + R^2)/(r^2 - R^2) + nu)/E of the ring. Then shear tractions ts on
+the outside of the ring apply a torque: the fit carries ts (40/25)^2, slightly less than friction times pressure."""
 SOURCE = """G. Lame, Lecons sur la theorie mathematique de l'elasticite des corps solides (1852); S. P. Timoshenko, J.
 N. Goodier, Theory of Elasticity, section 28 (McGraw-Hill, 1970)."""
 SHAFT = 25 * ((25**2 + 10**2) / (25**2 - 10**2) - 0.3) / 210e3

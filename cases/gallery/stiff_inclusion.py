@@ -4,9 +4,9 @@ from pbem.results.reader import Results
 
 TITLE = "A stiff fibre in a matrix under tension"
 SUBJECT = "composites"
-PROBLEM = """A glass fibre of the shear modulus g in a polymer of the shear modulus G, both bonded, under the tension
-s across it (plane strain). With k = 3 - 4 nu of the fibre and K of the matrix, the stress in the fibre is uniform:
-its sum sxx + syy is s (K + 1) g/(2 g + (k - 1) G), and its difference sxx - syy is s (K + 1) g/(G + K g)."""
+PROBLEM = """A glass fibre of shear modulus g is bonded to a polymer of shear modulus G, under the tension s across the
+fibre (plane strain). With k = 3 - 4 nu of the fibre and K of the matrix, the stress in the fibre is uniform: its sum
+sxx + syy is s (K + 1) g/(2 g + (k - 1) G), and its difference sxx - syy is s (K + 1) g/(G + K g)."""
 SOURCE = """J. N. Goodier, Concentration of stress around spherical and cylindrical inclusions and flaws, Journal of
 Applied Mechanics 1 (1933) 39-44; J. D. Eshelby, Proceedings of the Royal Society A 241 (1957) 376-396."""
 G, K = 3.5e3 / (2 * 1.35), 3 - 4 * 0.35

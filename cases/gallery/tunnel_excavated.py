@@ -6,9 +6,9 @@ from pbem.results.reader import Results
 
 TITLE = "A tunnel excavated beside a joint, and supported afterwards"
 SUBJECT = "tunnels and ground"
-PROBLEM = """A tunnel of the radius 3 m is excavated in rock under the stress at rest sxx = -5 and syy = -10 MPa (plane
-strain), 1.1 m below a joint of friction 0.3. The rock in it is removed by a stage, its tractions being released in two
-steps. A support of 7.5 MPa comes after that: the joint that has slipped stays as it is."""
+PROBLEM = """A tunnel of radius 3 m is excavated in rock under the in-situ stress sxx = -5 and syy = -10 MPa (plane
+strain), 1.1 m below a joint with friction 0.3. A stage removes the rock in it and releases its tractions in two steps.
+A support of 7.5 MPa follows; it does not reverse the slip of the joint."""
 SOURCE = """G. Kirsch, Die Theorie der Elasticitaet und die Beduerfnisse der Festigkeitslehre, Zeitschrift des Vereines
 deutscher Ingenieure 42 (1898) 797-807, for the floor, which is far from the joint; Coulomb's law for the rest."""
 EXPECTED = {

@@ -4,12 +4,12 @@ import math
 
 from pbem.results.reader import Results
 
-TITLE = "A wedge that is driven in and locks itself"
+TITLE = "A self-locking wedge"
 SUBJECT = "contact"
-PROBLEM = """A steel wedge of the half-angle a = 10 degrees is driven into a notch by a force P, and then let go. As
-it is driven, its faces slide, and it pushes each side outwards with P/(2 tan(a + b)), where tan b = 0.3 is the
-friction. When the force is gone the wedge is held by friction alone: shear and normal force of a face balance, at the
-ratio tan a. As this is less than 0.3, the faces stick and the notch remains under stress."""
+PROBLEM = """A steel wedge of half-angle a = 10 degrees is driven into a notch by a force P and then released. While it
+is driven, its faces slide, and it pushes each side outwards with P/(2 tan(a + b)), where tan b = 0.3 is the friction.
+After release the wedge is held by friction alone: the ratio of shear to normal force on a face is tan a. As this is
+less than 0.3, the faces stick and the notch remains under stress."""
 SOURCE = """Statics of the wedge: equilibrium of the three forces on it; e.g. J. L. Meriam, L. G. Kraige, Engineering
 Mechanics: Statics, section 6/4 (Wiley, 2002)."""
 ANGLE, FRICTION = math.atan(3.526539614 / 20), 0.3

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -34,8 +34,16 @@ def interpolate_shapes(local: Real, exponent: float = 0.0) -> Real:
     local (p + 1,): the nodes' coordinates on the axis that the powers refer to; positive if exponent is not whole.
     (theory, 18)
     """
-    powers = local[:, None] ** (np.arange(len(local)) + exponent)
-    return np.ascontiguousarray(np.linalg.inv(powers))
+    return _invert_powers(tuple(local.tolist()), exponent)
+
+
+@lru_cache(maxsize=256)
+def _invert_powers(local: tuple[float, ...], exponent: float) -> Real:
+    """Models have few sets of nodes, and results ask for them thousands of times; read-only."""
+    powers = np.array(local)[:, None] ** (np.arange(len(local)) + exponent)
+    inverse = np.ascontiguousarray(np.linalg.inv(powers))
+    inverse.flags.writeable = False
+    return inverse
 
 
 def integrate_shapes(local: Real) -> Real:

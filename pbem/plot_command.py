@@ -81,8 +81,9 @@ def add_plot_arguments(plot: argparse.ArgumentParser) -> None:
     how.add_argument("--magnify", type=read_finite, metavar="X", help="scale of the displacements")
     how.add_argument("--displaced", action="store_true", help="with --field: on the displaced bodies")
     how.add_argument("--shape", type=int, nargs=2, metavar=("NX", "NY"),
-                     help="with --field: points across and up (default: 64 along the longer side)")
-    how.add_argument("--contours", type=int, metavar="N", help="with --field: about so many lines, 0 for none")
+                     help="with --field: points across and up (default: 96 along the longer side)")
+    how.add_argument("--contours", type=int, metavar="N", help="with --field: about so many lines, 0 for none "
+                     "(default: 10, none among 60 cracks and more)")
     how.add_argument("--limits", type=read_finite, nargs=2, metavar=("LOW", "HIGH"), help="ends of the colours")
     how.add_argument("--label", nargs="+", action="extend", metavar="NAME",
                      help="names to be written: interfaces, cracks, traces")
@@ -154,11 +155,10 @@ def _make_picture(
     if kind == "field":
         from pbem.results.field_plot import FieldOptions, FieldPicture
 
-        contours = 10 if options.contours is None else options.contours
         shape = tuple(options.shape) if options.shape else None
         return FieldPicture(results, options.field, FieldOptions(
             box=box, shape=shape, displaced=options.displaced, magnify=options.magnify, limits=limits,
-            contours=contours, page=page), steps)  # fmt: skip
+            contours=options.contours, page=page), steps)  # fmt: skip
     if kind in ("traces", "rose"):
         from pbem.results.trace_plot import RosePicture, TraceOptions, TracePicture
 

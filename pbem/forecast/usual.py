@@ -56,7 +56,7 @@ PLACED, CRACK_WRITTEN, CRACK_JUDGED, CRACK_JUDGED_STEP = 20e-6, 6.5e-3, 2.6e-3, 
 ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 1.0, 110.0, 0.5, 1.0, 0.5
 SPARSE, SPARSE_SHARED, GROUPED = 1.4, 2.8, 0.65
 # How the rate of shared dense factors, on more ranks than two, grows with their number.
-FACTOR_RANKS = 0.7
+FACTOR_RANKS = 1.5
 
 
 @dataclass(frozen=True)

@@ -39,27 +39,30 @@ from pbem.results.singular_points import name_singular_place
 from pbem.wording import suggest
 
 # Points across the picture, and by how much closer they may lie where the boundary asks for it.
-ACROSS, CLOSER = 64, 6.0
+ACROSS, CLOSER = 96, 8.0
 # Colours diverge from zero if the field reaches beyond it on both sides by this part of the larger one.
 BOTH_SIDES = 0.1
 # What is smaller than this part of the largest displacement, or component of stress, is shown as the 0 that it is.
 ROUNDING = 1e-9
 # What is smaller than this part of the colours' range is no more than what is left of an area without stress.
 NOTHING = 5e-3
+# About so many lines; and none from so many cracks in the picture on.
+CONTOURS, MANY_CRACKS = 10, 60
 HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
 @dataclass(frozen=True)
 class FieldOptions:
     """box: x0, y0, x1, y1, None: the model. shape: points across and up. displaced: on the displaced bodies, magnify
-    times, None: a visible displacement. limits: of the colours, None: chosen. contours: about so many, 0: none."""
+    times, None: a visible displacement. limits: of the colours, None: chosen. contours: about so many, 0: none; None:
+    10, and none where so many cracks are shown that lines around each of them would hide the colours."""
 
     box: tuple[float, float, float, float] | None = None
     shape: tuple[int, int] | None = None
     displaced: bool = False
     magnify: float | None = None
     limits: tuple[float, float] | None = None
-    contours: int = 10
+    contours: int | None = None
     page: Page = field(default_factory=Page)
 
 
@@ -202,13 +205,23 @@ class FieldPicture:
             "cut off", "colours end before the values"
         )
 
+    def _count_contours(self) -> int:
+        """About how many lines are drawn."""
+        if self._options.contours is not None:
+            return self._options.contours
+        elements = self._results.elements
+        low, high = elements.geometry.bounds()
+        seen = elements.crack & (low <= self._box.high).all(axis=1) & (high >= self._box.low).all(axis=1)
+        return CONTOURS if len(np.unique(elements.curve[seen])) < MANY_CRACKS else 0
+
     def _draw_contours(
         self, axes: Axes, triangulation: Triangulation, values: Real, low: float, high: float, bar: object
     ) -> None:
         """Lines of equal values, the negative ones dashed, and the same lines in the bar of colours."""
-        if not self._options.contours or not values.max() - values.min() > 1e-9 * np.abs(values).max():
+        contours = self._count_contours()
+        if not contours or not values.max() - values.min() > 1e-9 * np.abs(values).max():
             return
-        levels = MaxNLocator(self._options.contours + 1).tick_values(low, high)
+        levels = MaxNLocator(contours + 1).tick_values(low, high)
         levels = levels[(levels > max(low, float(values.min()))) & (levels < min(high, float(values.max())))]
         # Where next to nothing acts the line of zero would wander about.
         idle = (np.abs(values) <= NOTHING * max(abs(low), abs(high)))[triangulation.triangles].all(axis=1)

@@ -26,8 +26,8 @@ INCH, NUDGE = 2.54, 1e-9
 # Widths by name, in cm: of one column, and of the type area, as most journals have them.
 WIDTHS = {"column": 8.6, "page": 17.8}
 MOST_HEIGHT = 28.0
-# An infinite region is shown around all that is in it by this part of its size.
-AROUND = 0.4
+# An infinite region is shown around all that is in it by this part of its size: of less where many curves are.
+AROUND, AROUND_MANY, MANY = 0.4, 0.1, 20
 EMPTY = 1e-3
 # What is lower than this part of its width has no room for a bar of colours at its side.
 FLAT = 0.45
@@ -136,7 +136,8 @@ def choose_box(results: Results, box: tuple[float, float, float, float] | None =
     endless = bool(read_infinite(results).any())
     if box is None:
         # A single crack has no height.
-        room = (AROUND if endless else EMPTY) * size
+        around = AROUND if len(np.unique(results.elements.curve)) < MANY else AROUND_MANY
+        room = (around if endless else EMPTY) * size
         lacking = np.maximum(0.0, 0.35 * size - (high - low)) * 0.5 * endless
         return Box(low - room - lacking, high + room + lacking, False)
     corners = np.array(box).reshape(2, 2)

@@ -21,7 +21,7 @@ from pbem.results.region_points import View, fill_points
 # The pieces of a curved element turn by no more than this (radians); of one too small to be seen, by more.
 TURN, COARSE_TURN = 0.07, 0.5
 # An element is divided into so many pieces if there is room for them in the picture.
-PIECES = 2
+PIECES = 3
 # Points that differ by less than this part of a region's size are one.
 SAME = 1e-10
 MOST_ROUNDS = 14

@@ -12,10 +12,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import pbem.plot_command
+import pbem.results.field_plot
+import pbem.results.page
 from pbem.bem.location import locate_points
 from pbem.errors import ResultFileError
 from pbem.results.field_formulas import FIELDS
-from pbem.results.field_plot import FieldOptions, FieldPicture, draw_field, plot_field
+from pbem.results.field_plot import CONTOURS, FieldOptions, FieldPicture, draw_field, plot_field
 from pbem.results.outline import to_columns
 from pbem.results.page import choose_box
 from pbem.results.picture_limits import CUT, limit_field, print_number
@@ -197,7 +199,7 @@ def test_displaced_pictures_and_parts(griffith: Results) -> None:
     assert "part from (0.5, \N{MINUS SIGN}0.25) to (1.5, 0.25)" in list_notes(figure)
     places = to_columns(picture.triangles.position[picture.triangles.corners])
     assert (places.max(axis=1)[:, 0] >= 0.5).all() and (places.min(axis=1)[:, 0] <= 1.5).all()
-    fine = FieldPicture(griffith, "uy", FieldOptions(box=(0.5, -0.25, 1.5, 0.25), shape=(100, 50)), [0])
+    fine = FieldPicture(griffith, "uy", FieldOptions(box=(0.5, -0.25, 1.5, 0.25), shape=(150, 75)), [0])
     assert len(fine.triangles.corners) > 1.5 * len(picture.triangles.corners)
 
 
@@ -272,3 +274,32 @@ def test_lines_of_zero_are_left_out_where_nothing_acts(griffith: Results, monkey
     chance = np.random.default_rng(3)
     once = measure_zero_lines(x)
     assert once > 1 and 0 < measure_zero_lines(np.where(x > 0, x, 0.0) + 1e-4 * chance.normal(size=len(x))) < 2 * once
+
+
+def test_triangles_are_fine_enough_for_the_lines_of_a_map(griffith: Results) -> None:
+    """Between the vertices, where the field is interpolated, it is off by less than a quarter of what lines are apart.
+    """
+    picture = FieldPicture(griffith, "syy", FieldOptions(), [0])
+    triangles, values = picture.triangles, picture.values(0)
+    middle = triangles.position[triangles.corners].mean(axis=1)
+    far = np.minimum(np.abs(middle - 1), np.abs(middle + 1)) > 0.1
+    exact = griffith.evaluate(to_columns(middle[far]), steps=[0]).stress[0, :, 1]
+    off = np.abs(values[triangles.corners[far]].mean(axis=1) - exact)
+    low, high, _ = picture._choose_colours()
+    assert off.max() < 0.25 * (high - low) / CONTOURS
+
+
+def test_lines_are_left_out_where_many_cracks_are_shown(
+    griffith: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def count_lines(options: FieldOptions) -> int:
+        return FieldPicture(griffith, "syy", options, [0])._count_contours()
+
+    assert count_lines(FieldOptions()) == CONTOURS
+    monkeypatch.setattr(pbem.results.field_plot, "MANY_CRACKS", 1)
+    assert count_lines(FieldOptions()) == 0 and count_lines(FieldOptions(contours=5)) == 5
+    # Nor is there a crack in this part.
+    assert count_lines(FieldOptions(box=(1.5, 0.5, 2.0, 1.0))) == CONTOURS
+    room = choose_box(griffith).size
+    monkeypatch.setattr(pbem.results.page, "MANY", 1)
+    assert (choose_box(griffith).size < room).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 import subprocess
@@ -30,9 +31,21 @@ class Picture(Protocol):
 
 def check_movie(path: str | os.PathLike[str]) -> None:
     """Raises ResultFileError where a format cannot be written here."""
-    if Path(path).suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+    if Path(path).suffix.lower() == ".mp4" and find_ffmpeg() is None:
         raise ResultFileError(str(path), "needs the program ffmpeg, which is not installed (on Debian and Ubuntu: "
-                                         "apt-get install ffmpeg); an animation that ends with .gif needs nothing else")
+                                         "apt-get install ffmpeg; or pip install imageio-ffmpeg); an animation that "
+                                         "ends with .gif needs nothing else")
+
+
+def find_ffmpeg() -> str | None:
+    """The program ffmpeg, or the one that the package imageio-ffmpeg brings along; None where neither is installed."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        try:
+            found = str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())
+        except (ImportError, RuntimeError, OSError):  # RuntimeError: it has none for this machine
+            return None
+    return found
 
 
 def animate(
@@ -75,8 +88,10 @@ def _write_gif(frames: Sequence[NDArray[np.uint8]], path: str | os.PathLike[str]
 
 def _write_mp4(frames: Sequence[NDArray[np.uint8]], path: str | os.PathLike[str], rate: float) -> None:
     height, width = frames[0].shape[:2]
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-               "-r", f"{rate:g}", "-i", "-", "-pix_fmt", "yuv420p", "-r", "25", os.fspath(path)]  # fmt: skip
+    command = [
+        find_ffmpeg() or "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
+        f"{width}x{height}", "-r", f"{rate:g}", "-i", "-", "-pix_fmt", "yuv420p", "-r", "25", os.fspath(path),
+    ]  # fmt: skip
     done = subprocess.run(command, input=b"".join(frame.tobytes() for frame in frames), capture_output=True)
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip()

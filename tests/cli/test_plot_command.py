@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from matplotlib import image
@@ -14,6 +15,7 @@ import pbem.results.curve_profile
 import pbem.results.page
 import pbem.results.trace_plot
 from pbem.cli import main, make_parser
+from pbem.results.reader import open_results
 from tests.verification.planes import make_plane, make_straight, solve
 
 Capture = pytest.CaptureFixture[str]
@@ -94,8 +96,29 @@ def test_wrong_options_are_refused(folder: Path, capsys: Capture, options: str, 
     assert [path.name for path in folder.iterdir()] == ["run.h5"]
 
 
+@pytest.mark.parametrize("found", ["on the path", "in a package"])
+def test_a_film_is_given_all_frames(folder: Path, monkeypatch: pytest.MonkeyPatch, found: str) -> None:
+    """Of one size, both numbers even, one after the other; the program stores what it gets."""
+    program = folder / "ffmpeg"
+    program.write_text('#!/bin/sh\necho "$@" > arguments\nfor last; do :; done\n/bin/cat > "$last"\n')
+    program.chmod(0o755)
+    if found == "on the path":
+        monkeypatch.setenv("PATH", str(folder))
+    else:
+        monkeypatch.setenv("PATH", "/nowhere")
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", SimpleNamespace(get_ffmpeg_exe=lambda: str(program)))
+    monkeypatch.chdir(folder)
+    assert main(["plot", "run.h5", "-o", "run.mp4", "--dpi", "40", "--fps", "3"]) == 0
+    arguments = (folder / "arguments").read_text().split()
+    width, height = map(int, arguments[arguments.index("-s") + 1].split("x"))
+    assert width % 2 == height % 2 == 0 and arguments[arguments.index("-r") + 1] == "3"
+    frames = len(open_results(folder / "run.h5").steps)
+    assert (folder / "run.mp4").stat().st_size == 3 * width * height * frames
+
+
 def test_a_film_without_its_program_says_so(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     assert main(["plot", "run.h5", "-o", "run.mp4"]) == 2
     assert "needs the program ffmpeg" in capsys.readouterr().err
     assert not (folder / "run.mp4").exists()

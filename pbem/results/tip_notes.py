@@ -28,9 +28,9 @@ def compare_release(results: Results) -> list[str]:
     largest = max((float(np.nanmax(tips.J[-1], initial=0.0)) for tips in results.tips.values()), default=0.0)
     found = []
     stress = float(np.nanmax(np.abs(results.traction[-1]), initial=0.0))
+    lengths = _measure_contacts(results)
     for name, tips in results.tips.items():
-        length = float(np.ptp(results.contact[name].arc_length)) if name in results.contact else 0.0
-        least = (ROUNDING * stress) ** 2 * length / tips.plane_modulus
+        least = (ROUNDING * stress) ** 2 * lengths.get(name, 0.0) / tips.plane_modulus
         from_intensity = (tips.KI[-1] ** 2 + tips.KII[-1] ** 2) / tips.plane_modulus
         for end, (J, other) in enumerate(zip(tips.J[-1], from_intensity, strict=True)):
             scale = max(J, other)
@@ -63,6 +63,16 @@ def explain_missing_factors(results: Results) -> list[str]:
         elif (reason := _find_reason(results, name, meeting[ends[name][end]])):
             reasons[reason].append(f"'{name}' ({ENDS[end]})")
     return [f"No K at {list_names(names, MOST_NAMES)}: {reason}." for reason, names in reasons.items()]
+
+
+def _measure_contacts(results: Results) -> dict[str, float]:
+    """Lengths of interfaces and cracks, of arcs nearly. Contacts themselves are read one by one, which takes long of
+    thousands; both of their sides are among the elements."""
+    elements = results.elements
+    chords = np.hypot(*(elements.vertices[:, 1] - elements.vertices[:, 0]).T)
+    lengths = 0.5 * np.bincount(elements.curve, chords, minlength=len(results.nodes.curve_names))
+    names = zip(results.nodes.curve_names, lengths.tolist(), strict=True)
+    return {name: length for name, length in names if name in results.contact}
 
 
 def _collect_vertices(results: Results) -> dict[tuple[float, ...], list[int]]:

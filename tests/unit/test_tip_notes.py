@@ -9,6 +9,7 @@ import pytest
 
 import pbem
 from pbem.results.describe import describe_results
+from pbem.results.lazy import Contact
 from pbem.results.tip_notes import compare_release
 from pbem.solve.problem.step import SilentReporter
 
@@ -60,3 +61,13 @@ def test_closed_cracks_that_release_nothing_are_not_compared(tmp_path: Path) -> 
     results, notes = run(tmp_path, elements=3, order=0, stress=-1.0)
     assert notes == []
     assert results.tips["crack"].KI[-1].tolist() == [0.0, 0.0]
+
+
+def test_contacts_of_large_networks_are_not_read_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, notes = run(tmp_path, elements=3, order=0)
+
+    def refuse(self: Contact) -> None:
+        raise AssertionError(self.name)
+
+    monkeypatch.setattr(Contact, "_arrays", property(refuse))
+    assert compare_release(pbem.open_results(tmp_path / "case.h5")) == notes

@@ -85,10 +85,12 @@ class Measured:
 
 @dataclass(frozen=True)
 class _Tips:
-    """Crack tips (k,): points, lengths of their elements, and number of the connected set of cracks of each."""
+    """Crack tips and sharp corners of cracks (k,): points, lengths of their elements, growth of lengths per distance
+    from there, and number of the connected set of cracks of each."""
 
     point: Complex
     length: Real
+    slope: Real
     component: Integer
 
 
@@ -177,7 +179,8 @@ class LengthField:
 
     def _find_near(self, cells: Cells, points: Complex, sight: Real, length: Real, before: Near | None) -> Near:
         """Faces within sight of cells, and the tips of the same set of connected cracks that bound their lengths."""
-        around, wider = Boxes.around_points(points, sight), Boxes.around_points(points, cells.wanted / SLOPE + length)
+        wide = cells.wanted / self._tips.slope.min(initial=SLOPE) + length
+        around, wider = Boxes.around_points(points, sight), Boxes.around_points(points, wide)
         if before is not None:
             return Near(before.faces.narrow(around, before.within), before.tips.narrow(wider, before.within),
                         np.arange(len(points)))
@@ -190,11 +193,13 @@ class LengthField:
         """What the tips of the same set of connected cracks allow."""
         allowed = np.full(len(points), np.inf)
         which, tip = near.other, near.box
-        np.minimum.at(allowed, which, self._tips.length[tip] + SLOPE * np.abs(points[which] - self._tips.point[tip]))
+        far = np.abs(points[which] - self._tips.point[tip])
+        np.minimum.at(allowed, which, self._tips.length[tip] + self._tips.slope[tip] * far)
         return allowed
 
     def _collect_tips(self, tips: Mapping[str, tuple[bool, bool]]) -> tuple[_Tips, Real]:
-        """All tips, and per end of a leg (legs, 2) the least length of its elements, if it is a tip (else 0)."""
+        """All tips and sharp corners, and per end of a leg (legs, 2) the least length of its elements, if it is a tip
+        (else 0)."""
         names, legs = self.surroundings.curve, self.surroundings.legs
         last = {name: number for number, name in enumerate(names)}
         first = {name: number for number, name in reversed(list(enumerate(names)))}
@@ -210,7 +215,15 @@ class LengthField:
                     point.append(legs[number].end if k else legs[number].start)
                     length.append(own)
                     component.append(self._component[number])
-        return _Tips(np.array(point, dtype=complex), np.array(length), np.array(component, dtype=np.int64)), at_tip
+        slope = [SLOPE] * len(point)
+        for number, at_end in sorted(self.wedges.list_turning()):
+            point.append(legs[number].end if at_end else legs[number].start)
+            length.append(float(self._floor[number, int(at_end)]))
+            slope.append(float(self._growth[number, int(at_end)]))
+            component.append(self._component[number])
+        return _Tips(
+            np.array(point, dtype=complex), np.array(length), np.array(slope), np.array(component, dtype=np.int64)
+        ), at_tip
 
 
 def _connect(surroundings: Surroundings, tips: Mapping[str, tuple[bool, bool]]) -> Integer:

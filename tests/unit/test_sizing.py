@@ -187,5 +187,12 @@ def test_lengths_fall_geometrically_where_a_crack_turns_sharply(scale: float) ->
         assert wing[0] == pytest.approx(6e-5 * math.hypot(0.3, 0.3) * scale, rel=1e-9)
         assert (wing[1:] <= np.cumsum(wing)[:-1] * (1 + 1e-9)).all()
     assert len(measure(turn("0.3,0.03", 'elements = [8, 8], grading = "none"'))[1]) == 8
+    # Lengths go on to grow beyond the curve that ends in the corner.
+    pieces = build(scale, main="-1,0 0,0; elements = 8", short="0,0 0.001,0.003; elements = 8",
+                   long='0.001,0.003 0.1,0.3; elements = 8, grading = "none"')  # fmt: skip
+    long = lengths(pieces, "long")
+    from_corner = math.hypot(0.001, 0.003) * scale + np.cumsum(long)[:-1]
+    assert long[0] <= 2 * math.hypot(0.001, 0.003) * scale
+    assert (long[1:] <= 2 * from_corner).all() and len(long) > 8
     # Three elements a leg are too coarse for that to matter.
     assert len(measure(turn("0.1,0.3", "elements = [3, 3]"))[1]) == 3

@@ -120,8 +120,9 @@ def test_kinked_crack_cut_and_graded_anyhow(seed: int) -> None:
     assert found.J < 1e-2, way.text
 
 
-# Sharp corners (136 and 106 degrees), short wings, and one at each order that turns by less than the program's rule.
-@pytest.mark.parametrize("seed", [31, 27, 17, 16, 23, 36])
+# Sharp corners (136 and 106 degrees), short wings, one that turns by less than the program's rule; short curves at the
+# corner, whose neighbours are longer than the distance from it (97, 82).
+@pytest.mark.parametrize("seed", [31, 27, 17, 16, 36, 97, 82])
 def test_kinked_crack_of_a_file_cut_and_graded_anyhow(seed: int) -> None:
     kink = draw_kink(seed)
     found = measure_kink(kink)

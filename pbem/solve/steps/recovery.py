@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbem.arrays import Complex, Real
 from pbem.contact.laws import Memory
+from pbem.contact.loads import Load
 from pbem.contact.separating import stick_bonded
 from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.newton import Solution
@@ -29,7 +31,7 @@ def describe_step(
     cracks = problem.all_crack_nodes
     jump = displacement[cracks]
     load = problem.evaluate_load(stage, factor)
-    mean = problem.recover_crack_displacement(solution.v, load) if recover else np.zeros(len(jump), dtype=complex)
+    mean = _recover_means(problem, solution.v, load) if recover else np.zeros(len(jump), dtype=complex)
     displacement[cracks] = mean + jump / 2
     opposite = np.zeros(mesh.nodes, dtype=complex)
     opposite[cracks] = mean - jump / 2
@@ -62,3 +64,29 @@ def describe_step(
         duration=solution.memory.duration,
         support_reactions=reactions,
     )
+
+
+def _recover_means(problem: Problem, v: Real, load: Load) -> Complex:
+    """Mean displacement of the two faces at all crack nodes, without errors of motions that strain nothing.
+
+    Bodies that nothing holds have any rotation yet. On arcs it is no polynomial, so that equation (13) has it but for
+    an error of the mesh; the mean motion of each finite region is therefore left out of it.
+    """
+    mesh, rest = problem.mesh, v.copy()
+    cracks = problem.all_crack_nodes
+    moved = np.zeros(len(cracks), dtype=complex)
+    for region in problem.model.regions:
+        inside = mesh.node_region == mesh.region_names.index(region.name)
+        of_cracks = inside[cracks]
+        if region.infinite or not of_cracks.any():
+            continue
+        own = np.flatnonzero(inside & ~mesh.node_crack)
+        z, u, weight = mesh.position[own], v[2 * own] + 1j * v[2 * own + 1], mesh.weight[own] / mesh.weight[own].sum()
+        middle, shift = complex(weight @ z), complex(weight @ u)
+        lever = z - middle
+        spin = float(weight @ (np.conj(1j * lever) * u).real) / float(weight @ np.abs(lever) ** 2)
+        motion = shift + 1j * spin * lever
+        rest[2 * own] -= motion.real
+        rest[2 * own + 1] -= motion.imag
+        moved[of_cracks] = shift + 1j * spin * (mesh.position[cracks[of_cracks]] - middle)
+    return problem.recover_crack_displacement(rest, load) + moved

@@ -141,7 +141,8 @@ class EnergyBalance:
     ) -> Runaway | None:
         """What was set free in the step, if growing loads do not explain it; at_hand: energy stored and supplied."""
         released = float(pairs.surplus.sum())
-        if not released > max(LEAST_RELEASED * at_hand, self._measure_increments(old, new, moved)):
+        # Where nothing is stored and nothing is supplied, as in a stage without loads, it is rounding.
+        if not at_hand or not released > max(LEAST_RELEASED * at_hand, self._measure_increments(old, new, moved)):
             return None
         names = self._mesh.interface_names
         by_name = np.bincount(self._mesh.pairs.interface, pairs.surplus, minlength=len(names))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -488,3 +489,10 @@ def test_energies_in_the_file_count_all_steps_and_go_on_after_a_stop(tmp_path: P
         for kind, values in vars(results.energy).items():
             wanted = [getattr(expected[number - 1], kind) for number in results.steps.number]
             np.testing.assert_allclose(values, wanted, rtol=1e-12, atol=1e-18)
+
+
+def test_where_nothing_is_stored_and_supplied_nothing_is_set_free() -> None:
+    """Stages without loads have rounding in their pairs: a part of no energy at all is not a number."""
+    rounding = PairWork(0.0, 0.0, 0.0, 0.0, 0.0, np.array([1e-40, 3e-39]), 0.0)
+    balance = SimpleNamespace(_measure_increments=lambda *_: 0.0)
+    assert EnergyBalance._find_runaway(balance, None, None, None, rounding, 0.0) is None  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.arrays import Complex, Real
+from pbem.bem.rigid_motions import interpolates_rotation
 from pbem.contact.laws import Memory
 from pbem.contact.loads import Load
 from pbem.contact.separating import stick_bonded
@@ -67,26 +68,24 @@ def describe_step(
 
 
 def _recover_means(problem: Problem, v: Real, load: Load) -> Complex:
-    """Mean displacement of the two faces at all crack nodes, without errors of motions that strain nothing.
+    """Mean displacement of the two faces at all crack nodes, without what the mesh adds to rotations.
 
-    Bodies that nothing holds have any rotation yet. On arcs it is no polynomial, so that equation (13) has it but for
-    an error of the mesh; the mean motion of each finite region is therefore left out of it.
+    Bodies that nothing holds have any rotation yet. Where elements only interpolate it, equation (13) has it but for an
+    error of the mesh; it is left out there, as in the other equations.
     """
     mesh, rest = problem.mesh, v.copy()
     cracks = problem.all_crack_nodes
     moved = np.zeros(len(cracks), dtype=complex)
-    for region in problem.model.regions:
-        inside = mesh.node_region == mesh.region_names.index(region.name)
+    for region in problem.model.finite_regions:
+        inside = mesh.node_region == region
         of_cracks = inside[cracks]
-        if region.infinite or not of_cracks.any():
+        if not of_cracks.any() or not interpolates_rotation(mesh, region):
             continue
         own = np.flatnonzero(inside & ~mesh.node_crack)
-        z, u, weight = mesh.position[own], v[2 * own] + 1j * v[2 * own + 1], mesh.weight[own] / mesh.weight[own].sum()
-        middle, shift = complex(weight @ z), complex(weight @ u)
-        lever = z - middle
-        spin = float(weight @ (np.conj(1j * lever) * u).real) / float(weight @ np.abs(lever) ** 2)
-        motion = shift + 1j * spin * lever
-        rest[2 * own] -= motion.real
-        rest[2 * own + 1] -= motion.imag
-        moved[of_cracks] = shift + 1j * spin * (mesh.position[cracks[of_cracks]] - middle)
+        lever = mesh.position[own] - mesh.position[own].mean()
+        u = v[2 * own] + 1j * v[2 * own + 1]
+        spin = float((np.conj(1j * lever) * u).real.sum() / (np.abs(lever) ** 2).sum())
+        rest[2 * own] -= (1j * spin * lever).real
+        rest[2 * own + 1] -= (1j * spin * lever).imag
+        moved[of_cracks] = 1j * spin * (mesh.position[cracks[of_cracks]] - mesh.position[own].mean())
     return problem.recover_crack_displacement(rest, load) + moved

@@ -24,6 +24,9 @@ FEWEST = 5
 MOST_CARRIED = 0.9
 # Meshes whose lengths agree to this part are equally fine.
 EQUAL = 1e-6
+# Around a pin and its hole with as many elements lengths differ by the clearance: up to this part the shorter curve is
+# the slave, that of the pin, whose tractions are what is meant by the pressure between both.
+ALIKE = 0.03
 
 
 def place_pairs(chain: Chain) -> Columns:
@@ -49,8 +52,8 @@ def pair_contact(
 
     Each pair belongs to a node of the slave, whose displacement follows the master; the master carries the slave's
     tractions. Nodes of the slave that face nothing are no pairs and free of traction. Whichever curve is the slave, the
-    pairs lie on the contact's first curve and have its normal. order: names of the curves; of equally fine ones the
-    first in it is the slave, so that the results do not depend on which curve the contact names first.
+    pairs lie on the contact's first curve and have its normal. order: names of the curves; of equally fine ones of one
+    length the first in it is the slave, so that the results do not depend on which curve the contact names first.
     """
     both = sorted((chains[joint.first], chains[joint.second]), key=lambda chain: order.index(chain.curve))
     others = Elements.join([chain.elements for chain in chains.values()])
@@ -118,6 +121,11 @@ def _choose_slave(one: Chain, other: Chain, others: Elements, behind: float) -> 
         return slave, master, couple_curves(slave.elements, master.elements, slave.local, others, behind)
     seen = couple_curves(one.elements, other.elements, one.local, others, behind)
     worse, better = measure_contrast(seen, one.elements, other.elements)
+    longer = one.elements.lengths.sum() > (1 + EQUAL) * other.elements.lengths.sum()
+    if longer and 0 < max(worse, better) <= 1 + ALIKE:
+        one, other = other, one
+        seen = couple_curves(one.elements, other.elements, one.local, others, behind)
+        worse, better = 1.0, 1.0
     chosen = (one, other, seen)
     if worse <= better * (1 + EQUAL) and 0 < seen.shared.sum() <= _carried(chosen) / MOST_CARRIED:
         return chosen

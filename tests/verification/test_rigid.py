@@ -156,7 +156,7 @@ def test_pin_pressed_into_its_clearance(clearance: float, operator: str) -> None
     np.testing.assert_allclose(opening, clearance * (1 - np.cos(angle)), atol=0.1 * clearance)
     pressure, exact = -solved.last.contact.traction_n[at], force * evaluate_persson(angle, width)
     inner = np.abs(angle) < 0.9 * width
-    assert np.abs(pressure - exact)[inner].max() < 1e-2 * exact.max()
+    assert np.abs(pressure - exact)[inner].max() < 4e-3 * exact.max()
     given, motion = measure(solved, "hub")
     np.testing.assert_allclose(np.hypot(*given[:2]), force, rtol=1e-10)
     assert np.hypot(*motion[:2]) > clearance

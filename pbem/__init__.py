@@ -1,7 +1,7 @@
 """pbem: boundary elements for frictional contact in two-dimensional elasticity.
 
-Signs, once for the whole program. The plane is x (right), y (up). Stress and traction are positive in tension; a
-region's normal points out of it, and its boundary is travelled with the region on the left. A contact pair has a
+Sign conventions. The plane is x (right), y (up). Stress and traction are positive in tension; the normal of a region
+points outwards, and its boundary is traversed with the region on the left. A contact pair has a
 first side r and a second side l; n is the outward normal of the first side and s is n turned by +90 degrees:
 
     opening  g_n = (u_l - u_r) . n + gap  >= 0
@@ -9,10 +9,10 @@ first side r and a second side l; n is the outward normal of the first side and 
     traction p   = traction on the first side; p_n <= 0 in compression; the second side carries -p
 
 Inside the program a point or a vector of the plane is one complex number x + iy. Docstrings and comments cite formulas
-as (theory, 12): that is formula 12 of the page that `pbem help theory` prints.
+as (theory, 12): formula 12 of `pbem help theory`.
 
-    results = pbem.run("case.toml")              # solve a case; see pbem.driver.run
-    case = pbem.Case(materials={...}, ...)       # or a case made by calls, to be solved; see pbem.case.case.Case
+    results = pbem.run("case.toml")              # run a case; see pbem.driver.run
+    case = pbem.Case(materials={...}, ...)       # a case made in Python; see pbem.case.case.Case
     table = pbem.sweep(case, {"interfaces.seat.friction": [0.1, 0.2]})    # many cases; see pbem.sweeps.sweep.sweep
     results = pbem.open_results("case.h5")       # read a result file; see pbem.results.reader.open_results
 """

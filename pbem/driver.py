@@ -70,25 +70,25 @@ def run(
     label: Label = label_key,
     kept: KeptProblems | None = None,
 ) -> Results:
-    """Solve a case, and return its results.
+    """Run a case and return its results.
 
-    case: path of the TOML file, a pbem.Case, or its tables as a dictionary. output: path of the result file; by default
-    the name of the case's file with .h5 (case.h5 if it has none), in the working directory. resume: go on after the
-    last step that the file holds. force: replace results that are there; without either, they are left alone. petsc:
-    PETSc options without prefix, which win over the case's [petsc] table. operator: "auto", "dense" or "hierarchical",
-    in place of the case's solver.operator; the configuration in the result file tells it. reporter: told of the
-    progress, on the first rank only. set: values by keys, as of `Case.replace`, that the result file keeps beside the
-    case; those of a file that is gone on with hold unless others are given, which is refused. comm: the MPI
-    communicator whose ranks compute it together, by default all: each of them calls this and gets the results. With
-    MPI.COMM_SELF each rank computes a case of its own, to a file of its own. label: how messages name what was set.
-    kept: operators and factors of earlier runs, for a case with the same.
+    case: path of a TOML file, a pbem.Case, or its tables as a dictionary. output: path of the result file; by default
+    the name of the case file with .h5 (case.h5 if there is none), in the working directory. resume: continue after the
+    last step in the file. force: replace existing results; without either, an existing file is refused. petsc: PETSc
+    options without prefix, which override the [petsc] table of the case. operator: "auto", "dense" or "hierarchical",
+    overrides solver.operator of the case; it is stored in the configuration in the result file. reporter: receives the
+    progress, on the first rank only. set: values to override, as in `Case.replace`; the result file stores them
+    separately from the case, a resumed run uses the stored values, and other values are refused. comm: the MPI
+    communicator whose ranks compute the case together, by default all ranks; each of them has to call this and receives
+    the results. With MPI.COMM_SELF each rank computes a separate case and writes a separate file. label: function that
+    names set values in messages. kept: operators and factors of earlier runs, for cases that share them.
 
-    Raises LaunchError (ranks, libraries or threads that do not fit together), CaseError (all faults of the case),
-    ResultFileError (the output cannot be written, is there already, or is another case's), ConvergenceError (the file
-    then holds every step reached), StorageError (the disk has no room for a step; the file holds those before it),
-    LawError (a custom law failed), StopError (told to stop by a signal; KeyboardInterrupt by SIGINT). Any other
-    exception on one rank ends all ranks, but for one that computes alone. ValueError: there is no such operator.
-    TypeError: comm is no communicator, petsc no dictionary.
+    Raises LaunchError (incompatible ranks, libraries or threads), CaseError (all faults of the case), ResultFileError
+    (the output cannot be written, exists already, or belongs to another case), ConvergenceError (the file then holds
+    every step reached), StorageError (the disk has no room for a step; the file holds the steps before it), LawError (a
+    custom law failed), StopError (stopped by a signal; KeyboardInterrupt for SIGINT). Any other exception on one rank
+    ends all ranks, unless the rank computes alone. ValueError: unknown operator. TypeError: comm is not a communicator,
+    or petsc is not a dictionary.
     """
     comm = check_communicator(comm)
     if operator is not None and operator not in get_args(Operator):

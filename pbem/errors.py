@@ -1,4 +1,4 @@
-"""The ways in which a run can end other than well."""
+"""The errors that the program raises."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _quote(part: str) -> str:
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that is wrong with a case.
+    """One fault of a case.
 
     place: where, as the user wrote it, e.g. ``materials.soft.young``, in a file with its line, or ``line 3, column 7``
     found: what stands there; expected: what should stand there; path: of the object and its field, if there is one.
@@ -73,7 +73,7 @@ class Fault:
 
 
 class PbemError(Exception):
-    """What the user can do something about; raised by all ranks alike."""
+    """Base class of the errors a user can correct; raised on all ranks alike."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Errors travel between the ranks: they are made again from their own attributes.
@@ -81,7 +81,7 @@ class PbemError(Exception):
 
 
 class CaseError(PbemError):
-    """The case file is wrong; nothing was computed or written. Carries every fault at once."""
+    """The case is invalid; nothing was computed or written. Carries all faults at once."""
 
     def __init__(self, source: str, faults: tuple[Fault, ...]) -> None:
         self.source = source
@@ -94,7 +94,7 @@ class ConvergenceError(PbemError):
     """A load step did not converge at the smallest step.
 
     reason: a short name, e.g. "mode cycle", "singular tangent", "iteration limit", "linear solver"
-    detail: where and what to try, in sentences. places: points (in the coordinates of the model) of the pairs whose
+    detail: where, and what to try, in sentences. places: points (in the coordinates of the model) of the pairs whose
     contact did not settle, where shorter elements may help; none if they would not, or if there are too many.
     unless: of "free motion" in the last statuses of a search that did not settle, what else may be the reason
     (`pbem.solve.nonlinear.unsettled.Unsettled`).
@@ -109,7 +109,7 @@ class ConvergenceError(PbemError):
 
 
 class StopError(PbemError):
-    """A run was told to stop, or cannot go on here; a later one can go on from its file.
+    """A run was stopped, or cannot continue here; a later run can resume from its file.
 
     reason: a short name, e.g. "SIGTERM"; detail: a sentence; code: the exit code of the program. unfinished: where the
     search for the contact statuses was (`pbem.solve.problem.step.Unfinished`), once those who know have said it.
@@ -124,7 +124,7 @@ class StopError(PbemError):
 
 
 class LawError(PbemError):
-    """A custom law failed, or gave something else than a strength, while it was computed with.
+    """A custom law failed, or returned something other than a Strength, during a run.
 
     reason: a sentence that names the law's file.
     """
@@ -135,7 +135,7 @@ class LawError(PbemError):
 
 
 class ResultFileError(PbemError):
-    """A result file cannot be written, is not one of pbem's, or does not belong to the case.
+    """A result file cannot be written, is not a result file of pbem, or does not belong to the case.
 
     path: the file as the user named it; reason: what is wrong and what to do, one sentence.
     """

@@ -1,4 +1,4 @@
-"""Reads a result file into frozen objects whose large arrays are loaded when they are first asked for."""
+"""Reads a result file into frozen objects whose large arrays are loaded on first access."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ ATTEMPTS = 5
 
 @dataclass(frozen=True, repr=False)
 class Results:
-    """What a result file holds. k stored steps, n nodes.
+    """The contents of a result file, with k stored steps and n nodes.
 
-    reactions: per outer curve (k, 2), integral of the traction; contact: per interface and crack; pairs: all of them at
-    once; groups: interfaces that a table [[generate]] made; tips: per crack what its tips carry; energy: the
-    energies; balance: of the forces on every region, and linearity: how large strains and slips are, None in files of
-    earlier versions; interior: points inside, None if the case has none; convergence: one row per Newton iteration with
-    the fields step, iteration, residual, changed, stick, slip, open, seconds.
-    rigid: forces on rigid curves and tools, and how they move.
-    overrides: values that were set beside the case, a line KEY = VALUE each. failure: why the run ended early (status
-    "failed" or "stopped"), empty if it did not, or was killed.
+    reactions: for each outer curve (k, 2), integral of the traction; contact: for each interface, crack and contact;
+    pairs: the pairs of all of them together; groups: interfaces made by tables [[generate]]; tips: for each crack its
+    stress-intensity factors; energy: the energies; balance: of the forces on every region, and linearity: size of
+    strains and slips, both None in files of earlier versions; interior: interior points, None if the case has none;
+    convergence: one row per Newton iteration with the fields step, iteration, residual, changed, stick, slip, open,
+    seconds; rigid: forces on rigid curves and tools, and their motions; overrides: values that were set in addition to
+    the case, one line KEY = VALUE each; failure: why the run ended early (status "failed" or "stopped"), empty if it
+    did not, or if it was killed.
     """
 
     path: Path
@@ -87,12 +87,12 @@ class Results:
 
     @cached_property
     def displacement(self) -> Real:
-        """(k, n, 2) at the nodes, in units of length; NaN where a stage has taken the region away."""
+        """(k, n, 2) at the nodes, in units of length; NaN where a stage has removed the region."""
         return self._blank(self._load("fields/displacement"))
 
     @cached_property
     def traction(self) -> Real:
-        """(k, n, 2) at the nodes, in units of stress, global axes; NaN where a stage has taken the region away."""
+        """(k, n, 2) at the nodes, in units of stress, global axes; NaN where a stage has removed the region."""
         return self._blank(self._load("fields/traction"))
 
     @cached_property
@@ -102,7 +102,7 @@ class Results:
 
     @cached_property
     def fractions(self) -> Fractions | None:
-        """Where the elements of each curve's legs end, if the mesh may have been refined."""
+        """Ends of the elements on the legs of each curve, if the mesh may have been refined; else None."""
         with open_quietly(self.path) as file:
             return read_fractions(file)
 
@@ -113,14 +113,14 @@ class Results:
             return read_errors(file, len(self.steps))
 
     def displacement_at(self, step: int) -> Real:
-        """(n, 2) of one stored step (its place in the file, negative from the end) without loading the others."""
+        """(n, 2) of one stored step (its index in the file, negative from the end) without loading the others."""
         with open_quietly(self.path) as file:
             moved: Real = file["fields/displacement"][range(len(self.steps))[step]]
         gone = self.find_gone(step)
         return np.where(gone[self.nodes.region, None], np.nan, moved) if gone.any() else moved
 
     def find_gone(self, step: int) -> Bool:
-        """Which regions (r,) a stage has taken away by a stored step."""
+        """Which regions (r,) have been removed by a stored step."""
         steps = self.steps
         names = steps.removed[int(steps.stage[step])] if steps.removed else ()
         return np.isin(self.nodes.region_names, names)
@@ -130,13 +130,13 @@ class Results:
     ) -> Evaluation:
         """Displacement, stress and region at any points (q, 2): `.displacement` (k, q, 2), `.stress` (k, q, 3).
 
-        steps: places of k stored steps, negative from the end; all by default. Stress is sxx, syy, sxy. Outside of all
+        steps: indices of k stored steps, negative from the end; all by default. Stress is sxx, syy, sxy. Outside all
         regions the values are NaN and `.region` is "". On an outer boundary they are the limits from inside; on a crack
-        or interface those of its first side, or of its second with side="second". At a crack's tip stress is NaN: it is
-        infinite there. Needs the result file alone.
+        or interface those of the first side, or of the second with side="second". At crack tips, where the stress is
+        infinite, it is NaN. Only the result file is needed.
 
-        Raises ValueError for points of another shape or another side, IndexError for no such step, ResultFileError for
-        files that hold no step yet and those of earlier versions.
+        Raises ValueError for points of another shape or an unknown side, IndexError for a step that is not stored,
+        ResultFileError for files without stored steps and those of earlier versions.
         """
         if side not in get_args(Side):
             raise ValueError(f"side: found {side!r}; expected one of {', '.join(get_args(Side))}")
@@ -151,9 +151,9 @@ class Results:
         return Evaluator(self.path, self.nodes, self.elements, self.steps, self.configuration)
 
     def choose_steps(self, steps: int | Sequence[int] | None = None) -> list[int]:
-        """Places, counted from 0, of stored steps that are given by places, negative from the end; None: all.
+        """Indices from 0 of stored steps; given ones may be negative, from the end. None selects all.
 
-        Raises IndexError for one that is not stored.
+        Raises IndexError for a step that is not stored.
         """
         count = len(self.steps)
         if steps is None:
@@ -167,20 +167,20 @@ class Results:
         return [int(each) % count for each in chosen]
 
     def to_dataframe(self, what: str) -> Any:
-        """A pandas.DataFrame: of an interface, crack or contact by its name, a row for each stored step and pair.
+        """A pandas.DataFrame of an interface, crack or contact, with one row per stored step and pair.
 
-        Also "steps", "reactions", "tips", "interior", and "contact" for all interfaces together; an interface with one
-        of these names is "contact.NAME". Columns are called as in the file.
+        what: its name, or "steps", "reactions", "tips", "interior", or "contact" for all interfaces together; use
+        "contact.NAME" for an interface with one of these names. Columns are named as in the file.
 
-        Raises ImportError if pandas is not installed, ResultFileError if the file has nothing of this name.
+        Raises ImportError if pandas is not installed, ResultFileError if nothing in the file has this name.
         """
         return _load_module("tables").make_dataframe(self, what)
 
     def plot(self, **options: Any) -> Any:
         """A matplotlib Figure: the displaced bodies; with curve= quantities along curves; with field= alone a map.
 
-        curve: a name, or several. field: what is drawn, or a list of it along curves. step: place of a stored step,
-        by default the last. x: "arc_length", "angle", "x" or "y". xlim, ylim: of the axes. ax: axes to draw into.
+        curve: one or several names. field: the quantity, or a list of quantities along curves. step: index of a stored
+        step, by default the last. x: "arc_length", "angle", "x" or "y". xlim, ylim: limits. ax: axes to draw into.
         All options and errors: `pbem.results.drawing.plot`.
         """
         return _load_module("drawing").plot(self, **options)
@@ -192,7 +192,7 @@ class Results:
         return _load_module("summary").summarise_html(self)
 
     def find_curve_ends(self, name: str) -> Real:
-        """(2, 2): where a curve starts and ends; NaN in files of earlier versions."""
+        """(2, 2): start and end of a curve; NaN in files of earlier versions."""
         stored = self._configured
         if name not in stored.get("curves", {}):
             return np.full((2, 2), np.nan)
@@ -205,7 +205,7 @@ class Results:
         return json.loads(self.configuration) if self.configuration else {}
 
     def find_step(self, number: int) -> int:
-        """Where the load step of this number is stored. Raises ResultFileError if it is not."""
+        """Index of the load step with this number. Raises ResultFileError if it is not stored."""
         found = np.flatnonzero(self.steps.number == number)
         if not len(found):
             stored = ", ".join(map(str, self.steps.number[:20])) + (", ..." if len(self.steps) > 20 else "")
@@ -229,9 +229,9 @@ def _load_module(name: str) -> Any:
 
 
 def open_results(path: str | os.PathLike[str]) -> Results:
-    """Open a result file, also of a run that is still going on or was cut off: up to its last complete step.
+    """Open a result file, up to its last complete step if the run is in progress or was killed.
 
-    Raises ResultFileError if there is no such file, it is not a result file of pbem, or it is damaged.
+    Raises ResultFileError if the file does not exist, is not a result file of pbem, or is damaged.
     """
     source = Path(path)
     if not os.path.isfile(source):  # also of names that no file can have

@@ -1,4 +1,4 @@
-"""A case computed with all combinations of some values: what is common to them is computed once."""
+"""Parameter sweeps: a case run with all combinations of some values; common parts are computed once."""
 
 from __future__ import annotations
 
@@ -98,26 +98,27 @@ def sweep(
     label: Label = label_key,
     option: str = "",
 ) -> SweepTable:
-    """Compute a case with all combinations of values, and return a table with one row each.
+    """Run a case with all combinations of values, and return a table with one row for each.
 
-    case: as of `pbem.run`. values: by keys, as of `Case.replace`, those that each key takes; the last key changes
-    fastest. quantities: what is taken from the last step of each, see `pbem help sweeps`; without: reactions, the
-    largest slips and openings, stress-intensity factors. out: a file for the table (CSV); one that is there is gone on
-    with: its rows are not computed again. keep: a folder for the result files of the cases, where a row whose file is
-    not there is computed again; without, none are written, and errors are not estimated. set: values that are the same
-    in all. petsc, operator: as of `pbem.run`. force: begin a table that is there anew. neighbours: begin the search for
-    the statuses of a case with those of the one before it, where laws do not remember; a case with more than one
-    equilibrium, which high friction can have, may so end in another one than alone. comm: ranks that share the cases,
-    or each case, as is faster; all of them call this and get the table. listener: told of each case, on the first rank.
-    label, option: how messages name values, quantities.
+    case: as in `pbem.run`. values: for each key, as in `Case.replace`, the values it takes; the last key varies
+    fastest. quantities: taken from the last step of each case, see `pbem help sweeps`; by default reactions, the
+    largest slips and openings, and stress-intensity factors. out: a file for the table (CSV); an existing table is
+    continued, and its rows are not computed again. keep: a folder for the result files of the cases; rows whose file is
+    missing are computed again. Without keep no result files are written, and errors are not estimated. set: values that
+    are the same in all cases. petsc, operator: as in `pbem.run`. force: replace an existing table. neighbours: start
+    the search for the statuses of a case from those of its neighbours, if the laws have no memory; a case with more
+    than one equilibrium, which is possible with high friction, may then reach another one than in a single run. comm:
+    the ranks that share the cases, or compute each case together, whichever is faster; all of them have to call this
+    and receive the table. listener: called with each case, on the first rank. label, option: names of values and
+    quantities in messages.
 
-    A case that does not converge is a row with the status "failed" and the reason, a combination of values that makes
-    no case one with the status "refused"; neither has quantities, but for those of steps. The reason of a row that is
-    finished tells what was noted of its steps.
+    A case that does not converge gives a row with the status "failed" and the reason, an invalid combination of values
+    a row with the status "refused"; neither has quantities except those of steps. The reason of a finished row has the
+    notes on its steps.
 
-    Raises CaseError with all that is wrong with the case, with any value by itself, and with the quantities;
-    ResultFileError (a table that is another one's, a folder that cannot be written); LaunchError; StorageError;
-    StopError or KeyboardInterrupt, after which the table can be gone on with.
+    Raises CaseError with all faults of the case, of single values and of the quantities; ResultFileError (the table
+    belongs to another sweep, or a folder cannot be written); LaunchError; StorageError; StopError or KeyboardInterrupt,
+    after which the sweep can be continued.
     """
     comm = check_communicator(comm)
     if operator is not None and operator not in get_args(Operator):

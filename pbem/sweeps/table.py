@@ -1,4 +1,4 @@
-"""The table of a sweep, one row a case: in memory, and as a file that grows row by row and can be gone on with."""
+"""The table of a sweep, one row per case: in memory, and as a file that grows row by row and can be continued."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Row:
 
 
 class SweepTable:
-    """One row a case: the values that were set, the quantities, status, iterations, seconds, reason.
+    """One row per case: the values that were set, the quantities, status, iterations, seconds, reason.
 
         table["reactions.top.x"]     # a column: an array, NaN where a case did not converge
         for row in table: ...        # rows as dictionaries
@@ -66,7 +66,7 @@ class SweepTable:
         return (dict(row) for row in self._rows)
 
     def __getitem__(self, column: str) -> NDArray[Any]:
-        """A column (rows,); numbers where it has nothing else. Raises KeyError with the columns there are."""
+        """A column (rows,), numeric if all entries are numbers. Raises KeyError with the names of all columns."""
         if column not in self.columns:
             raise KeyError(f"no column {column!r}; there are {', '.join(self.columns)}")
         values = [row[column] for row in self._rows]
@@ -77,7 +77,7 @@ class SweepTable:
         return array
 
     def to_dataframe(self) -> Any:
-        """The table as pandas has it. Raises ImportError where pandas is not installed."""
+        """The table as a pandas.DataFrame. Raises ImportError if pandas is not installed."""
         return frame_columns(lambda: {column: list(self[column]) for column in self.columns})
 
     def __repr__(self) -> str:

@@ -46,7 +46,7 @@ Boundary elements for frictional contact in two-dimensional elasticity.
   pbem make cracks           write a case of random cracks; also inclusions
   pbem import FILE -o CASE   a map of traces, or a mesh, as a case
   pbem check CASE            is the case right, and what will be computed?
-  pbem run CASE              compute; `pbem CASE` does the same
+  pbem run CASE              run a case; `pbem CASE` does the same
   pbem sweep CASE            compute it with several values of some keys: a table
   pbem info FILE.h5          what a result file holds
   pbem plot FILE.h5          draw a result file
@@ -173,11 +173,11 @@ def make_parser() -> argparse.ArgumentParser:
 
     add_make_commands(add("make", _make, "write a case file of random cracks or inclusions"))
     add_import_options(add("import", _import, "write a case file of a map of traces or of a mesh", IMPORT_NOTES))
-    check = add("check", _check, "validate a case, show what would be computed, and what that would take")
+    check = add("check", _check, "validate a case, and show the model and a forecast of its cost")
     add_check_options(check)
     add_set_option(check)
     add_run_options(add("run", None, "compute a case and write its results", RUN_NOTES))
-    add_sweep_options(add("sweep", None, "compute a case with all combinations of some values", SWEEP_NOTES))
+    add_sweep_options(add("sweep", None, "run a case with all combinations of some values", SWEEP_NOTES))
     add_info_arguments(add("info", _info, "show what a result file holds"))
     add_export_arguments(add("export", _export, "write results for ParaView and PyVista, or as a table", EXPORT_NOTES))
     about = "draw bodies, fields, curves, networks or animations of a result file"

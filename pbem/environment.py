@@ -188,7 +188,7 @@ def refuse_threads(sites: Sequence[Site]) -> str | None:
     return (
         f"{ranks} on node {sites[0].host} with up to {most} threads each ({name} = {most}) are {sum(threads)} threads, "
         f"but the ranks may use {cores:g} of its {count(sites[0].online, 'core')}.\n  Set {name}=1{binding}; "
-        f"{OVERRIDE}=1 runs it all the same"
+        f"{OVERRIDE}=1 overrides this"
     )
 
 

@@ -10,7 +10,7 @@ from pbem.errors import ExportError
 VTK, TABLE = (".vtkhdf", ".hdf"), (".csv",)
 NOTES = """\
   pbem export run.h5                      run.vtkhdf: all stored steps for ParaView and PyVista (`pbem help paraview`)
-  pbem export run.h5 --copy               the same without need of run.h5
+  pbem export run.h5 --copy               the same without references to run.h5
   pbem export run.h5 -o run.csv           the contact of all interfaces
   pbem export run.h5 -o seat.csv --what contact.seat
 

@@ -16,7 +16,7 @@ from pbem.make_command import read_finite
 NOTES = """\
 FILE: .geojson, .csv (rows x1,y1,x2,y2 or id,x,y), .dxf: traces, which become cracks of the whole plane, cut where they
 cross or meet; .msh of gmsh (2.2 or 4.1): physical surfaces become regions, physical lines curves.
-All that is joined, cut, dropped or moved is listed, and kept in the first comment of the case: `pbem help import`"""
+All changes (joined, cut, dropped, moved) are listed, also in the first comment of the case: `pbem help import`"""
 
 
 def add_import_options(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +25,12 @@ def add_import_options(parser: argparse.ArgumentParser) -> None:
     add("file", metavar="FILE")
     add("-o", "--output", required=True, metavar="CASE.toml", help="case file to be written")
     add("--force", action="store_true", help="write over a file that is there")
-    add("--size", type=_read_positive, metavar="H", help="largest length of an element (default: a sixth of the "
-        "traces' median length; of a mesh its own)")
+    add("--size", type=_read_positive, metavar="H", help="largest element length (default: a sixth of the median "
+        "length of the traces; for a mesh its own)")
     add("--snap", type=_read_distance, metavar="D",
-        help="points no further apart are one (default: a thousandth of the median length)")
+        help="points within this distance coincide (default: a thousandth of the median length)")
     add("--simplify", type=_read_distance, metavar="D",
-        help="leave out vertices as long as no trace is moved by more (default: 0)")
+        help="remove vertices as long as no trace moves by more than this (default: 0)")
     add("--keep-junctions", action="store_true",
         help="cut the traces before they are simplified, and simplify what lies between their junctions")
     add("--friction", type=read_finite, metavar="F", help="friction coefficient of all traces (default: 0.6)")

@@ -9,8 +9,8 @@ def add_info_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `pbem info`."""
     parser.add_argument("file", metavar="FILE.h5")
     parser.add_argument("--traces", type=read_count, metavar="N",
-                        help="list so many traces, those of the largest moments (default: 10; with --json all)")
-    parser.add_argument("--json", action="store_true", help="everything for programs; null where a number is unknown")
+                        help="number of traces to list, by decreasing moment (default: 10; with --json all)")
+    parser.add_argument("--json", action="store_true", help="machine-readable output; null where a number is unknown")
 
 
 def read_count(text: str) -> int:

@@ -41,7 +41,7 @@ def add_make_commands(parser: argparse.ArgumentParser) -> None:
     inclusions.add_argument("--law", choices=("bonded", "coulomb"), default=None,
                             help="of the interfaces (default: coulomb if a friction coefficient is given, else bonded)")
     _add_area(inclusions).add_argument("--fraction", type=float, metavar="F",
-                                       help="or part of the area that they take (default: 0.2)")
+                                       help="or the fraction of the area that they cover (default: 0.2)")
 
 
 def _add_common(parser: argparse.ArgumentParser, elements: int) -> None:
@@ -50,7 +50,7 @@ def _add_common(parser: argparse.ArgumentParser, elements: int) -> None:
     add("--force", action="store_true", help="write over a file that is there")
     add("--count", type=int, required=True, metavar="N")
     add("--name", metavar="NAME", help="of the curves: NAME_1, NAME_2, ... (default: crack, inclusion)")
-    add("--distance", type=float, metavar="D", help="least distance of any two (default: a tenth of the size)")
+    add("--distance", type=float, metavar="D", help="smallest distance between any two (default: a tenth of the size)")
     add("--elements", type=int, default=elements, metavar="N", help=f"on each (default: {elements})")
     add("--order", type=int, default=2, help="of the polynomials on an element (default: 2)")
     add("--friction", type=float, metavar="F", help="friction coefficient")
@@ -63,7 +63,7 @@ def _add_common(parser: argparse.ArgumentParser, elements: int) -> None:
     add("--young", type=float, default=1000.0, metavar="E", help="Young's modulus (default: 1000)")
     add("--poisson", type=float, default=0.2, metavar="NU", help="Poisson's ratio (default: 0.2)")
     add("--plane", choices=("strain", "stress"), default="strain")
-    add("--plate", type=float, metavar="SIDE", help="in a square plate on walls, in place of an infinite plane")
+    add("--plate", type=float, metavar="SIDE", help="in a square plate on walls instead of an infinite plane")
     add("--plate-elements", type=int, default=20, metavar="N", help="on each side of the plate (default: 20)")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--compact", dest="explicit", action="store_false", default=None)

@@ -79,7 +79,7 @@ def lacks_memory(error: BaseException) -> bool:
 def describe_lack(error: BaseException) -> str:
     """That there is not enough memory, in one line."""
     text = " ".join(str(error).split())
-    return f"out of memory{f' ({text})' if text else ''}; more nodes, or fewer ranks on each, give a rank more of it"
+    return f"out of memory{f' ({text})' if text else ''}; use more nodes, or fewer ranks per node"
 
 
 class StopSignals:

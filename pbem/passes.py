@@ -58,7 +58,7 @@ def plan_finer(first: Model, model: Model, unknowns: int, tries: int, error: Con
         return None
     note = (
         f"Contacts did not settle ({error.reason}) near {_list_places(model, error.places)}. Elements there are "
-        f"halved, {count(after, 'element')} in place of {before}, and the run begins again from rest."
+        f"halved, {count(after, 'element')} in place of {before}, and the run starts again from rest."
     )
     return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
 
@@ -88,7 +88,7 @@ def blame_tries(error: ConvergenceError, tries: int, unknowns: int) -> Convergen
         return error
     return ConvergenceError(
         error.reason,
-        f"{error.detail}; elements beside pairs that did not settle were halved {count(tries, 'time')} already, up to "
+        f"{error.detail}; elements near pairs that did not settle were halved {count(tries, 'time')} already, up to "
         f"{unknowns} unknowns",
     )
 
@@ -100,5 +100,5 @@ def blame_pass(error: BaseException, one: Pass, unknowns: int) -> BaseException:
     return ConvergenceError(
         error.reason,
         f"with the mesh refined for analysis.accuracy, pass {one.number} of {unknowns} unknowns, {error.detail}; the "
-        f"file holds pass {one.number - 1}, which was solved, but is not as accurate as was asked for",
+        f"file holds pass {one.number - 1}, which was solved, but is not as accurate as requested",
     )

@@ -40,7 +40,7 @@ APPLIES = {
 
 NOTES = """\
 examples:
-  pbem plot run.h5                                         displaced bodies, and the interfaces where most happens
+  pbem plot run.h5                                         displaced bodies, and the interfaces that slip most
   pbem plot run.h5 --field mises -o mises.pdf              stress on triangles that follow the outlines
   pbem plot run.h5 --field syy --box -1 0 1 2 --displaced  a part, on the displaced bodies
   pbem plot run.h5 --curve seat --field traction_n --x angle
@@ -62,11 +62,11 @@ def add_plot_arguments(plot: argparse.ArgumentParser) -> None:
     plot.add_argument("-o", "--output", metavar="FILE", help="picture: .png, .pdf, .svg; animation of the stored "
                       "steps: .gif, .mp4 (default: a .png beside the result file)")
     plot.add_argument("--step", type=int, metavar="N", help="number of the load step (default: last)")
-    what = plot.add_argument_group("what is drawn (default: the displaced bodies and their interfaces)")
+    what = plot.add_argument_group("kind of picture (default: the displaced bodies and their interfaces)")
     what.add_argument("--field", metavar="FIELD", help=f"a field in the regions: {', '.join(FIELDS)}; with --curve, "
                       "quantities along the curve, with commas between several")
     what.add_argument("--curve", nargs="+", action="extend", metavar="NAME",
-                      help="only what is along these interfaces, cracks or curves; a trace t12 is all its pieces "
+                      help="only what is along these interfaces, cracks or curves; a trace t12 includes its pieces "
                       "t12.1, t12.2; * as in the shell")
     what.add_argument("--traces", metavar="BY", help=f"all cracks and interfaces, coloured by: {', '.join(TRACES)}")
     what.add_argument("--rose", action="store_true", help="slip and length of cracks and interfaces by orientation")
@@ -86,12 +86,12 @@ def add_plot_arguments(plot: argparse.ArgumentParser) -> None:
                      "(default: 10, none among 60 cracks and more)")
     how.add_argument("--limits", type=read_finite, nargs=2, metavar=("LOW", "HIGH"), help="ends of the colours")
     how.add_argument("--label", nargs="+", action="extend", metavar="NAME",
-                     help="names to be written: interfaces, cracks, traces")
+                     help="names to write: interfaces, cracks, traces")
     page = plot.add_argument_group("size")
     page.add_argument("--width", metavar="CM", help="width in cm, or: column (8.6), page (17.8)")
     page.add_argument("--size", type=read_finite, nargs=2, metavar=("CM", "CM"), help="width and height in cm")
-    page.add_argument("--dpi", type=read_finite, metavar="N", help="dots per inch (default: 200, of animations 110)")
-    page.add_argument("--fps", type=read_finite, metavar="N", help="steps of an animation in a second (default: 2)")
+    page.add_argument("--dpi", type=read_finite, metavar="N", help="dots per inch (default: 200, for animations 110)")
+    page.add_argument("--fps", type=read_finite, metavar="N", help="steps of an animation per second (default: 2)")
 
 
 def plot(options: argparse.Namespace) -> Path:
@@ -135,7 +135,7 @@ def _write(
     if moving:
         check_movie(target)
         if not steps:
-            raise PlotError((f"{options.file}: holds no load step yet, of which an animation could be made",))
+            raise PlotError((f"{options.file}: holds no load step yet, so there is nothing to animate",))
     try:
         with style():
             picture = _make_picture(options, kind, results, steps, page)
@@ -240,7 +240,7 @@ def _check_values(options: argparse.Namespace, kind: str) -> list[str]:
     if options.dpi is not None and 0 < options.dpi < 30:
         faults.append(f"argument --dpi: found {options.dpi:g}; expected at least 30")
     if options.width is not None and options.size is not None:
-        faults.append("--width and --size are both given; --size has the width already")
+        faults.append("--width and --size are both given; --size includes the width")
     if options.size is not None and not all(3 <= each <= 100 for each in options.size):
         faults.append(f"argument --size: found {options.size[0]:g} {options.size[1]:g}; expected width and height from "
                       "3 to 100 cm")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 OPERATORS = ("auto", "dense", "hierarchical")
 
 RUN_NOTES = """\
-PETSc: any option of PETSc's is taken with the prefix pbem_ and wins over the case's [petsc] table, e.g.
+PETSc: any PETSc option is accepted with the prefix pbem_ and overrides the [petsc] table of the case, e.g.
   pbem run CASE -pbem_ksp_rtol 1e-10 -pbem_ksp_monitor
 
 Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores
@@ -41,19 +41,20 @@ def add_run_options(run: argparse.ArgumentParser) -> None:
     """Add the options of `pbem run`."""
     run.add_argument("case", metavar="CASE")
     run.add_argument("-o", "--output", metavar="FILE.h5", help="result file (default: name of the case, here)")
-    run.add_argument("--resume", action="store_true", help="go on after the last step that the result file holds")
+    run.add_argument("--resume", action="store_true", help="continue after the last step in the result file")
     run.add_argument("--force", action="store_true", help="replace the results that the file holds")
     run.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     add_set_option(run)
     run.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    run.add_argument("--profile", metavar="FILE", help="write time, calls and bytes by piece (FILE.json: as JSON)")
+    run.add_argument("--profile", metavar="FILE",
+                     help="write time, calls and bytes of each part of the run (FILE.json: as JSON)")
 
 
 def add_set_option(command: argparse.ArgumentParser) -> None:
     """Add `--set`, which any command that reads a case can have."""
     command.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE",
-        help="in place of what the case says, e.g. interfaces.seat.friction=0.3; may be given several times "
+        help="override a value of the case, e.g. interfaces.seat.friction=0.3; may be given several times "
         "(see `pbem help commands`)",
     )
 

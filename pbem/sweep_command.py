@@ -35,15 +35,16 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
                          help="a,b,c or from:to:count; may be given several times")
     command.add_argument("-o", "--output", metavar="TABLE.csv", help="the table (default: name of the case, here)")
     command.add_argument("--quantity", action="append", metavar="Q",
-                         help="what is taken from each case, e.g. reactions.top.x; may be given several times "
+                         help="a quantity computed from each case, e.g. reactions.top.x; may be given several times "
                          "(default: reactions, largest slips and openings, stress-intensity factors)")
     command.add_argument("--keep", metavar="DIR", help="keep the result files of all cases in this folder")
     command.add_argument("--force", action="store_true", help="begin a table that is there anew")
     command.add_argument("--no-neighbours", action="store_true",
-                         help="begin the search for the statuses of each case anew, not with those of another case")
+                         help="start the search for the statuses of each case from scratch, not from other cases")
     command.add_argument("--operator", choices=OPERATORS, help="in place of the case's solver.operator")
     command.add_argument("--quiet", action="store_true", help="no progress, no summary")
-    command.add_argument("--profile", metavar="FILE", help="write time, calls and bytes by piece (FILE.json: as JSON)")
+    command.add_argument("--profile", metavar="FILE",
+                         help="write time, calls and bytes of each part of the run (FILE.json: as JSON)")
 
 
 def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
@@ -77,7 +78,7 @@ def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
         return say_wrong_launch(error, world.rank, world.size)
     except (StopError, KeyboardInterrupt, StorageError) as error:
         said = "interrupted" if isinstance(error, KeyboardInterrupt) else getattr(error, "detail", str(error))
-        done = "" if sum(counts.values()) == 0 else f"; {target} holds the cases before, the same command goes on"
+        done = "" if sum(counts.values()) == 0 else f"; {target} holds the finished cases; the same command continues"
         say(f"pbem: {said}{done}", world.rank)
         world.Barrier()
         if isinstance(error, KeyboardInterrupt):

@@ -19,7 +19,7 @@ from pbem.contact.declaration import FrictionLaw, Slide
 from pbem.contact.friction_bound import Strength
 
 PARTS = ("bound", "by_traction", "by_slip")
-EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays of the shape of p_n"
+EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays with the shape of p_n"
 
 
 class CustomLaw(FrictionLaw):

@@ -156,7 +156,7 @@ def check_custom_laws(model: Model) -> tuple[Fault, ...]:
         tried.add(id(law))
         found = _try(law)
         if found:
-            expected = "a Python file with a function strength(p_n, slip, **parameters) that gives a Strength of arrays"
+            expected = "a Python file with a function strength(p_n, slip, **parameters) returning a Strength of arrays"
             faults.append(Fault(f"{place}.file", found, expected))
     return tuple(faults)
 

@@ -64,7 +64,7 @@ def _check_distribution(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]
     spread, power = table.get("spread"), distribution == "power"
     for key in ("exponent", "largest"):
         if power and key not in table:
-            expected = "exponent and largest: numbers fall like size^-exponent up to the largest size"
+            expected = "exponent and largest: the number decreases as size^-exponent up to the largest size"
             findings.append(Finding(loc, f'distribution = "power" without {key}', expected))
         elif not power and key in table and distribution in ("uniform", "lognormal"):
             expected = 'distribution = "power" with it, or no such key'

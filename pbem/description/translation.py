@@ -62,10 +62,10 @@ def _translate(details: ErrorDetails) -> Finding:
         found = f"unknown key '{loc[-1]}'{suggest(str(loc[-1]), known)}"
         expected = f"one of: {list_names(sorted(known), 40)}"
         if loc[0] == "stages" and str(loc[-1]) in known_keys(loc[2:-1]):
-            expected += f" ({loc[-1]} cannot change: it is told in [{format_path(loc[2:-1])}])"
+            expected += f" ({loc[-1]} cannot change: it belongs in [{format_path(loc[2:-1])}])"
         elif "tools" in (loc[0], *loc[2:3]) and loc[-1] in known_keys(("contacts", "")):
             found = f"unknown key '{loc[-1]}'"
-            expected += f" ({loc[-1]} is told in the table [contacts.NAME] of a contact of the tool)"
+            expected += f" ({loc[-1]} belongs in the table [contacts.NAME] of a contact of the tool)"
         return Finding(loc, found, expected)
     if kind == "missing":
         if isinstance(loc[-1], int):

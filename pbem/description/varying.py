@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from pbem.description.table import Table
 from pbem.description.values import LARGEST, NotNegative, Number, Point, Text, is_number
 
-EXAMPLES = '{ expression = "..." } or { table = [[s, value], ...] } with rising s'
+EXAMPLES = '{ expression = "..." } or { table = [[s, value], ...] } with increasing s'
 
 
 def _check_varying(value: object) -> object:
@@ -29,7 +29,7 @@ def _check_varying(value: object) -> object:
             expected = "a table of at least two [s, value], finite numbers each"
             raise PydanticCustomError("expected", "{expected}", {"expected": expected})
     if any(after[0] <= before[0] for before, after in itertools.pairwise(rows)):
-        expected = "a table in which s rises from each row to the next"
+        expected = "a table in which s increases from row to row"
         raise PydanticCustomError("expected", "{expected}", {"expected": expected})
     return value
 

@@ -178,7 +178,7 @@ def _overlap(name: str, other: str, leg: Leg) -> Fault:
     found = f"curve '{other}' running over curve '{name}' from {format_point(leg.start)} to {format_point(leg.end)}"
     if name == other:
         found = f"a curve that runs over itself from {format_point(leg.start)} to {format_point(leg.end)}"
-    expected = "each piece once: a piece that two regions share is one curve, named in the boundary of both"
+    expected = "each piece once: a piece shared by two regions is one curve, named in the boundary of both"
     return Fault.at(("curves", other), found, expected)
 
 

@@ -119,7 +119,7 @@ def draw_circle(
     start = _point_on_circle(center, radius, first)
     if abs(abs(start - center) - radius) > 1e-3 * radius:
         found = f"radius = {radius:g}, lost in the rounding of the center"
-        return Fault.at(path, found, "a circle that is not so small against its distance from the origin")
+        return Fault.at(path, found, "a circle that is larger relative to its distance from the origin")
     turn = abs(last - first)
     needed = math.ceil(turn / WIDEST_ARC - 1e-9)
     if division.size is not None:

@@ -56,7 +56,7 @@ def read_dxf(path: Path) -> Reading:
         elif not wrong:
             reading.traces.append(Trace(f"t{len(reading.traces) + 1}", place, (tuple(legs),)))
     if heights:
-        reading.notes.append("Heights of points are left out: the model is plane.")
+        reading.notes.append("Heights of points are ignored: the model is plane.")
     for kind, count in sorted(others.items()):
         reading.left_out.append(f"{count} {kind}: only {', '.join(KINDS)} are read")
     if reading.faults:

@@ -112,7 +112,7 @@ def _read_points(row: Any, place: str, reading: Reading) -> list[complex] | None
         heights |= len(point) > 2
         if x is not None and y is not None:
             points.append(complex(x, y))
-    note = "Heights and further numbers of points are left out: the model is plane."
+    note = "Heights and further numbers of points are ignored: the model is plane."
     if heights and note not in reading.notes:
         reading.notes.append(note)
     return points if len(reading.faults) == before else None

@@ -296,7 +296,7 @@ def _tell_defaults(options: Options, scale: _Scale) -> list[str]:
     ]
     if options.sxx is options.syy is options.sxy is None:
         told.append("--syy -1")
-    notes = ["Taken as nothing else was asked for: " + ", ".join(told) + "."] if told else []
+    notes = ["Default values used: " + ", ".join(told) + "."] if told else []
     if scale.snap > (SNAP * scale.median if options.snap is None else options.snap):
         notes.append(f"--snap {scale.snap:.4g} is the least for these lengths and coordinates.")
     return notes

@@ -19,11 +19,11 @@ from pbem.importing.options import FRICTION, POISSON, YOUNG, Imported, Options
 from pbem.importing.reading import Reading, Trace, fail
 
 CONDITIONS = """
-# Conditions: outer curves are free of traction until they are told otherwise, for example
+# Conditions: outer curves are free of traction unless conditions are given, for example
 # [boundary]
 # {name} = {{ ux = 0.0, uy = 0.0 }}"""
 LAWS = """
-# Interfaces: shared curves are bonded until they are told otherwise, for example
+# Interfaces: shared curves are bonded unless a law is given, for example
 # [interfaces]
 # {name} = {{ law = "coulomb", friction = 0.6 }}"""
 
@@ -82,7 +82,7 @@ def _refuse(path: Path, options: Options) -> None:
 
 def _read_traces(grid: Grid) -> Reading:
     """The lines of a mesh without surfaces, as traces."""
-    reading = Reading(notes=[*grid.notes, "The mesh has no surfaces: its lines are taken as traces."])
+    reading = Reading(notes=[*grid.notes, "The mesh has no surfaces: its lines are treated as traces."])
     groups: dict[int, dict[Edge, int]] = defaultdict(dict)
     for cell in grid.lines:
         groups[cell.group].setdefault(_key(*cell.corners), cell.entity)
@@ -265,4 +265,4 @@ def _tell_defaults(options: Options, uses: Mapping[str, int]) -> list[str]:
         notes.append("--friction has no effect: no physical line lies inside of a region, and interfaces are bonded.")
     if options.size is None:
         told.append("an element for each edge of the mesh")
-    return [*notes, "Taken as nothing else was asked for: " + ", ".join(told) + "."] if told else notes
+    return [*notes, "Default values used: " + ", ".join(told) + "."] if told else notes

@@ -216,7 +216,7 @@ def _read_elements_4(lines: _Lines, grid: Grid, physical: dict[tuple[int, int], 
         for _ in range(count):
             _add(grid, kind, tuple(lines.integers()[1:]), groups[0] if groups else 0, entity)
     if several:
-        grid.notes.append("Of entities with several physical groups the first is taken.")
+        grid.notes.append("For entities with several physical groups the first one is used.")
 
 
 def _add(grid: Grid, kind: int, nodes: tuple[int, ...], group: int, entity: int) -> None:
@@ -265,7 +265,7 @@ def _read_by_meshio(path: Path) -> Grid:
         raise
     except (Exception, SystemExit) as error:  # whatever a library says of a file that is none of its own
         found = f"what meshio cannot read ({type(error).__name__}: {error})"
-        expected = f"{EXPECTED}; of a text (gmsh -bin 0) the line would be told"
+        expected = f"{EXPECTED}; a text file (gmsh -bin 0) would allow the line to be reported"
         raise fail(path, [Fault("the file", found[:200], expected)]) from None
 
 

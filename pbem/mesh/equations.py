@@ -57,7 +57,7 @@ def choose_equations(model: Model) -> Equations:
     if len(notes) > MOST_NOTES:
         scheme = model.analysis.scheme
         notes = [f"{len(notes)} curves keep the displacement equation as one face of a slot or thin part: "
-                 f"{scheme} has traction equations on both faces, which do not tell them apart"]  # fmt: skip
+                 f"{scheme} has traction equations on both faces, which do not distinguish them"]  # fmt: skip
     if lost:
         names = list_names([f"'{curve}'" for curve in lost], MOST_NOTES)
         notes.append(f"too few elements for {model.analysis.scheme}: all of those of {names} are at corners or ends of "
@@ -102,7 +102,7 @@ def _explain_strips(
     return [
         f"region {region.name} keeps the displacement equation on {curve}, one face of a "
         f"{f'part {strip.width:.3g} thick' if strip.inside else f'slot {strip.width:.3g} wide'}: "
-        f"{model.analysis.scheme} has traction equations on both faces, which do not tell them apart"
+        f"{model.analysis.scheme} has traction equations on both faces, which do not distinguish them"
         for curve, strip in narrowest.items()
     ]
 
@@ -119,7 +119,7 @@ def _explain_inner_loops(model: Model, inner: Mapping[str, frozenset[str]]) -> t
         shown = loops if len(loops) <= MOST_NOTES else [f"{len(loops)} inner loops"]
         notes += [
             f"region {region.name} keeps the displacement equation on its {loop}: "
-            f"{model.analysis.scheme} has a traction equation there, which does not see its rigid motion"
+            f"{model.analysis.scheme} has a traction equation there, which does not determine its rigid motion"
             for loop in shown
         ]
     return tuple(notes)

@@ -366,7 +366,7 @@ def _check_support(model: Model, recall: Recall) -> tuple[list[Fault], list[str]
     if model.closing:
         names = list_names([f"'{name}'" for name in sorted(model.closing)])
         notes.append(f"Nothing but {names} holds what the loads move, which does not touch yet: the search for its "
-                     "contact begins where it comes to touch.")
+                     "contact begins where it first touches.")
     for motion in find_plane_translations(model):
         moving = [regions[name] for name in motion.regions]
         name = next(each.name for each in moving if each.infinite)
@@ -376,9 +376,9 @@ def _check_support(model: Model, recall: Recall) -> tuple[list[Fault], list[str]
         if describe_unbalance(_leave_out_point_loads(model), motion, moving) is None:
             force = find_unbalanced_force(model, motion, moving)
             notes.append(f"Weight and point loads have a net force of {format_point(force)} on the infinite region "
-                         f"'{name}', with what lies in it and without what is dug out of it: its "
-                         "displacement grows with the logarithm of the distance, so that only stresses, and "
-                         "displacements of one point against another, mean anything.")
+                         f"'{name}', with the bodies in it and without excavated regions: its "
+                         "displacement grows with the logarithm of the distance, so that only stresses "
+                         "and relative displacements are meaningful.")
         else:
             found = f"a net force on the infinite region '{name}': {unbalance}"
             expected = ("loads that balance, apart from moments: the displacement of a net force grows with the "

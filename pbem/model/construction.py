@@ -59,10 +59,10 @@ def list_removed(case: Case, stage: int) -> set[str]:
 
 # How to take away what is no region, by what it is.
 INSTEAD: Mapping[str, str] = {
-    "a rigid tool": "a region; a tool that is to bear nothing has its contact in 'open'",
-    "an interface": "a region; faces that are to bear nothing are named in 'open'",
-    "a crack": "a region; faces that are to bear nothing are named in 'open'",
-    "a contact": "a region; faces that are to bear nothing are named in 'open'",
+    "a rigid tool": "a region; for a tool without load, name its contact in 'open'",
+    "an interface": "a region; faces without traction are named in 'open'",
+    "a crack": "a region; faces without traction are named in 'open'",
+    "a contact": "a region; faces without traction are named in 'open'",
     "a point load": "a region; a load ends with fx = 0 and fy = 0 in a stage",
 }  # fmt: skip
 
@@ -96,12 +96,12 @@ def _check_gone(roles: Roles, number: int, table: StageTable, removed: Collectio
     gone |= {("eigenstrain", name): ("an eigenstrain", name) for name in table.eigenstrain if name in removed}
     for loc, (found, region) in gone.items():
         yield Fault.at(("stages", number, *loc), f"{found} of region '{region}', which is gone",
-                       "no values for what is gone, in the stage that removes it and in those after it")
+                       "no values for a removed object, in the stage that removes it and in later ones")
     for name in table.interfaces:
         sides = roles.shared[name] if name in roles.shared else [roles.cracks.get(name)]
         if not set(removed).isdisjoint(sides):
             expected = (f"its pressure in [stages.boundary.{name}]" if name in list_bared(roles, removed) else
-                        "no values for what is gone, in the stage that removes it and in those after it")
+                        "no values for a removed object, in the stage that removes it and in later ones")
             yield Fault.at(("stages", number, "interfaces", name), f"a pressure of '{name}', where a region is gone",
                            expected)
 

@@ -134,7 +134,7 @@ def describe_near_misses(case: Case, curves: Mapping[str, Curve], tips: Mapping[
     asked = {name: _measure_element(case, curves[name]) for name in tips}
     notes = [
         f"Crack '{miss.crack}' ends at {format_point(miss.point)}, {miss.distance:.3g} short of curve '{miss.other}', "
-        f"less than its elements are long ({asked[miss.crack]:.3g}): it has a tip there, and what is left in between "
+        f"less than the length of its elements ({asked[miss.crack]:.3g}): it has a tip there, and the ligament "
         "carries load. An end on the curve would join them."
         for miss in _find_misses(curves, tips, asked)
     ]

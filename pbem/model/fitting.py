@@ -57,7 +57,7 @@ def fit_curves(
 def _refuse(excess: Excess) -> Fault:
     found = (
         f"curves '{excess.curve}' and '{excess.other}' at a distance of {excess.distance:.3g}, which would need "
-        f"elements of {excess.length:.3g} and far more of them than were asked for"
+        f"elements of {excess.length:.3g} and far more of them than requested"
     )
     return Fault.at(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
 

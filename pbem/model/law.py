@@ -189,7 +189,7 @@ def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fau
     least, place = find_least(curve, falls)
     if law.friction_dynamic is not None and least < 0:
         found = f"friction_dynamic above the static friction at {format_point(place)}"
-        yield Fault.at((*loc, "friction_dynamic"), found, "friction that falls with slip everywhere on the curve")
+        yield Fault.at((*loc, "friction_dynamic"), found, "friction that decreases with slip everywhere on the curve")
     for friction in (law.friction, law.friction_dynamic):
         if climb and isinstance(friction, Varying):
             least, place = find_least(curve, functools.partial(evaluate, friction))
@@ -238,7 +238,7 @@ def _check_strengths(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Faul
     plain = not isinstance(table.friction, VaryingTable)
     if kind == "coulomb" and isinstance(dynamic, float) and plain and dynamic > friction * (1 + 1e-12):
         found = f"friction_dynamic = {dynamic:g} above the static friction of {friction:g}"
-        expected = "friction that falls with slip: friction_dynamic <= friction"
+        expected = "friction that decreases with slip: friction_dynamic <= friction"
         yield Fault.at((*loc, "friction_dynamic"), found, expected)
     if friction > 0 and isinstance(tension, float) and isinstance(cohesion, float) and (
         tension * friction > cohesion * (1 + APEX)
@@ -268,7 +268,7 @@ def _check_dilation(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Fault
     if climb > least * (1 + APEX):
         angle = math.degrees(math.atan(least))
         found = f"dilation_angle = {table.dilation_angle:g} on '{loc[-1]}', beyond the angle of friction, {angle:.6g}"
-        yield Fault.at((*loc, "dilation_angle"), found, "at most the angle of friction: dilation cannot give work")
+        yield Fault.at((*loc, "dilation_angle"), found, "at most the angle of friction: dilation cannot produce energy")
 
 
 def _find_file(case: Case, loc: KeyPath, table: LawTable) -> tuple[str | None, list[Fault]]:

@@ -53,7 +53,7 @@ def note_jumps(model: Model) -> list[str]:
         if names:
             notes.append(
                 f"What is prescribed on {list_names(list(names))} jumps when stage '{stage.name}' begins: the time t "
-                f"goes on from stage to stage, and is {model.find_time(number, 0.0):.6g} there."
+                f"continues from stage to stage, and is {model.find_time(number, 0.0):.6g} there."
             )
     return notes
 

@@ -160,7 +160,7 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
                 faults += check_wall(case, int(prefix[1]), name)
             elif name in two_sided:
                 kind = "an interface" if name in roles.shared else "a crack"
-                expected = f"conditions on outer curves only; what {kind} does is told in [interfaces.{name}]"
+                expected = f"conditions on outer curves only; what {kind} does belongs in [interfaces.{name}]"
                 faults.append(Fault.at(loc, f"conditions on '{name}', {kind}", expected))
             elif roles.outer.get(name) in case.tools:
                 tool = roles.outer[name]
@@ -168,7 +168,7 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
                 place = f"[stages.tools.{tool}]" if prefix else f"[tools.{tool}]"
                 faults.append(Fault.at(loc, f"conditions on '{name}', a rigid tool", keys + place))
             elif name in roles.in_contact:
-                expected = f"conditions on other curves: what it does is told in [contacts.{roles.in_contact[name]}]"
+                expected = f"conditions on other curves: what it does belongs in [contacts.{roles.in_contact[name]}]"
                 found = f"conditions on '{name}', which is in contact '{roles.in_contact[name]}'"
                 faults.append(Fault.at(loc, found, expected))
             elif name not in case.curves:
@@ -183,7 +183,7 @@ def _check_names(case: Case, roles: Roles) -> list[Fault]:
                         f"an outer curve of region '{roles.outer[name]}'")
                 expected = "a curve shared by two regions, or a crack"
                 if name in roles.in_contact:
-                    expected += f"; what '{name}' does is told in [contacts.{roles.in_contact[name]}]"
+                    expected += f"; what '{name}' does belongs in [contacts.{roles.in_contact[name]}]"
                 faults.append(Fault.at(loc, f"a law for '{name}', {kind}", expected))
             elif name not in case.curves:
                 faults.append(unknown_name(loc, name, "interface or crack", two_sided))

@@ -46,7 +46,7 @@ def check_pulled(model: Model) -> Iterator[Fault]:
                 where = list_names([f"'{contact}'" for contact in touched])
                 yield Fault.at(("tools", name), f"a force of {format_point(pulls[0])} in stage "
                                f"'{stage.name}', which pulls it off {where}",
-                               "a force towards what it touches, a motion in its place (ux, uy), or a law that bears "
+                               "a force towards what it touches, a motion in its place (ux, uy), or a law that carries "
                                "tension")
                 break
 

@@ -123,7 +123,7 @@ def _resolve_contacts(
             if curve not in case.curves:
                 faults.append(unknown_name(loc, curve, "curve", outer or case.curves))
             elif curve in kinds:
-                expected = "curves that bound one region each; what touches along one curve is told in [interfaces]"
+                expected = "curves that bound one region each; contact along a shared curve belongs in [interfaces]"
                 faults.append(Fault.at(loc, f"curve '{curve}', {kinds[curve]}", expected))
             elif index and curve == table.between[0]:
                 faults.append(Fault.at(loc, f"curve '{curve}' twice", "two different curves"))

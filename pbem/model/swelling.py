@@ -131,7 +131,7 @@ def _check_region(case: Case, loc: KeyPath, name: str, heated: bool) -> Iterator
         return
     if region.infinite:
         what = "a temperature" if heated else "an eigenstrain"
-        expected = "a finite region: one without end grows without end"
+        expected = "a finite region, as the swelling of an infinite one is unbounded"
         yield Fault.at(loc, f"{what} of the infinite region '{name}'", expected)
     material = case.materials.get(region.material)
     if heated and material is not None and not material.expansion:

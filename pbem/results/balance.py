@@ -61,18 +61,18 @@ def describe_balance(balances: Balances | None) -> list[str]:
         return []
     worst = int(np.argmax(balances.relative[-1]))
     lines = [
-        f"forces and moments on every region balance to {balances.relative[-1, worst]:.1e} of their sums without signs"
+        f"forces and moments on every region balance to {balances.relative[-1, worst]:.1e} of the sums of magnitudes"
         f" (worst: {balances.names[worst]})"
     ]
     if len(balances.part_names):
         at = int(np.argmax(balances.part_relative[-1]))
         lines.append(
-            f"on every part that cracks cut off to {balances.part_relative[-1, at]:.1e} (worst: "
+            f"on every part cut off by cracks to {balances.part_relative[-1, at]:.1e} (worst: "
             f"{balances.part_names[at]})"
         )
     x, y, moment = balances.whole[-1]
     lines.append(
-        f"all that acts from outside, to {balances.whole_relative[-1]:.1e}: ({x:.3g}, {y:.3g}) and a moment of "
+        f"all external forces together, to {balances.whole_relative[-1]:.1e}: ({x:.3g}, {y:.3g}) and a moment of "
         f"{moment:.3g} are left"
     )
     if balances.carried[-1].any():

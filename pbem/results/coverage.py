@@ -23,7 +23,7 @@ def describe_sparse_contacts(model: Model, mesh: Mesh, mode: Modes) -> tuple[str
         facing, closed = (len(np.unique(element[where])) for where in (own, own & (mode != OPEN)))
         if 0 < closed < FEWEST <= facing:
             notes.append(
-                f"'{name}' is closed on {closed} of its {facing} elements, which do not resolve its pressure: "
+                f"'{name}' is closed on {closed} of its {facing} elements, too few to resolve its pressure: "
                 f"{FEWEST} or more are needed."
             )
     return tuple(notes)

@@ -191,8 +191,9 @@ def _describe_runaways(results: Results) -> list[str]:
     before = {name: np.concatenate([[0.0], values[:-1]]) for name, values in vars(results.energy).items()}
     released = results.energy.released - before["released"]
     at_hand = np.abs(before["elastic"]) + np.abs(results.energy.external - before["external"])
-    return [f"in step {results.steps.number[k]} faces ran away and released {100 * released[k] / at_hand[k]:.2g} % of "
-            f"the stored energy ({_number(released[k])})" for k in np.flatnonzero(released > 0)]
+    return [f"in step {results.steps.number[k]} faces moved unstably and released "
+            f"{100 * released[k] / at_hand[k]:.2g} % of the stored energy "
+            f"({_number(released[k])})" for k in np.flatnonzero(released > 0)]
 
 
 def _describe_tips(results: Results) -> list[str]:

@@ -33,7 +33,7 @@ def find_smooth(model: Model) -> list[str]:
     if not names:
         return []
     return [f"{name_many(names)}: Coulomb's law without friction, the default; closed faces slide freely. Give "
-            "`friction` or `friction_angle`, or say law = \"frictionless\" if that is meant."]
+            "`friction` or `friction_angle`, or set law = \"frictionless\" if that is intended."]
 
 
 def _find_sparse(model: Model, mesh: Mesh) -> list[str]:

@@ -55,14 +55,14 @@ def plot(
         if field is not None:
             raise ValueError("field: found a list; a map shows one field, with curve= several quantities are drawn")
         if ax is not None:
-            raise ValueError("ax: the picture of the bodies has axes of its own; give curve=, field= or both")
+            raise ValueError("ax: the picture of the bodies has its own axes; give curve=, field= or both")
         return draw_results(results, at)
 
 
 def _choose_step(results: Results, step: Any) -> int:
     chosen = results.choose_steps(step)
     if len(chosen) != 1:
-        raise ValueError(f"step: found {step!r}; expected the place of one stored step")
+        raise ValueError(f"step: found {step!r}; expected the index of one stored step")
     return chosen[0]
 
 

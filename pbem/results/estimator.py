@@ -84,7 +84,7 @@ class Estimator:
         """What the user should know of the steps so far; on the first rank."""
         notes = [f"errors are not estimated throughout: {self.missing}"] if self.missing else []
         return notes + [
-            f"{VIOLATED[kind].format(part)}, on {name} at step {number}; more elements there bring it down"
+            f"{VIOLATED[kind].format(part)}, on {name} at step {number}; more elements there reduce it"
             for kind, (part, name, number) in self._worst.items() if part > NOTABLE
         ]
 

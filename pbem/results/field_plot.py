@@ -102,7 +102,7 @@ class FieldPicture:
         self._box = choose_box(results, options.box)
         self._triangles = self._triangulate()
         if not len(self._triangles.corners):
-            raise ValueError("the box shows nothing: no region has a part in it")
+            raise ValueError("the box is empty: no region extends into it")
         self._values: VertexValues = VertexField(results, self._triangles).evaluate(steps)
         self._steps = list(steps)
         formula = FIELDS[name][2]

@@ -33,7 +33,7 @@ def check_output_path(
         if target.exists() and Path(each).exists() and target.samefile(each):
             raise ResultFileError(str(path), f"is the file {each} that the case is read from; name another output file")
     if resume and force:
-        raise ResultFileError(str(path), "cannot be gone on with and replaced; choose one of --resume and --force")
+        raise ResultFileError(str(path), "cannot be both resumed and replaced; choose one of --resume and --force")
     if resume and not target.exists():
         raise ResultFileError(str(path), "there is no such file to resume; run without resuming")
     if target.exists() and not resume:
@@ -84,7 +84,7 @@ def _refuse_to_replace(target: Path, force: bool, source: str | None, overrides:
         with target.open("rb") as file:
             known, other = file.read(len(SIGNATURE)) == SIGNATURE, False
     if not known:
-        raise ResultFileError(str(target), "is there already, and is no result file of pbem; name another output file")
+        raise ResultFileError(str(target), "exists already and is not a result file of pbem; name another output file")
     if not force:
         what = "the results of another case, or of this case before it was changed" if other else "results"
         go_on = "" if other else "--resume goes on with them, "

@@ -28,8 +28,8 @@ def choose_overrides(target: Path, given: Mapping[str, Any] | None) -> Mapping[s
         had = write_overrides(stored).replace("\n", ", ")
         raise ResultFileError(
             str(target),
-            f"was computed with {f'the values {had}' if had else 'no values set'}; it goes on with these and no "
-            "others: set the same, or none, or run without resuming",
+            f"was computed with {f'the values {had}' if had else 'no values set'}; only these can be "
+            "used to resume it: set the same, or none, or run without resuming",
         )
     return stored
 

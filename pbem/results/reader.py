@@ -160,10 +160,10 @@ class Results:
             return list(range(count))
         chosen = np.atleast_1d(np.asarray(steps))
         if chosen.ndim != 1 or (chosen.size and chosen.dtype.kind not in "iu"):
-            raise ValueError(f"steps: found {steps!r}; expected places of stored steps, such as [-1]")
+            raise ValueError(f"steps: found {steps!r}; expected indices of stored steps, such as [-1]")
         for each in chosen:
             if not -count <= each < count:
-                raise IndexError(f"steps: there is no stored step at place {each}; {count} are stored")
+                raise IndexError(f"steps: there is no stored step with index {each}; {count} are stored")
         return [int(each) % count for each in chosen]
 
     def to_dataframe(self, what: str) -> Any:

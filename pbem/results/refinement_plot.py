@@ -26,7 +26,7 @@ def read_refined(results: Results) -> tuple[Model, Mesh, Integer]:
     Raises ResultFileError if the file is of a run that refines nothing.
     """
     if results.fractions is None:
-        why = "analysis.accuracy is not in its case, and contacts settled on its first mesh"
+        why = "its case has no analysis.accuracy, and contacts settled on the first mesh"
         raise ResultFileError(str(results.path), f"was not refined: {why}")
     first = parse_model(results.case, str(results.path), results.overrides)[1]
     model = impose_fractions(first, results.fractions)

@@ -40,7 +40,7 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         change = find_change(str(file.attrs.get("configuration", "")), model)
         if change:
             raise ResultFileError(path, f"holds the results of another case, or the case file was changed since: "
-                                        f"{change}; only stages can be added to a history that is gone on with; run "
+                                        f"{change}; only stages can be added to a run that is resumed; run "
                                         "without resuming, or name another output file")
     before = json.loads(str(file.attrs.get("custom_laws", "{}")))
     for name, text in model.law_texts.items():

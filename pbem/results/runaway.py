@@ -25,6 +25,6 @@ def describe_runaway(step: Step, runaway: Runaway) -> str:
     named, more = runaway.names[:MOST_NAMES], len(runaway.names) - MOST_NAMES
     names = ", ".join(f"'{name}'" for name in named) + (f" and {more} more" if more > 0 else "")
     return (
-        f"Step {step.number} is no path of equilibria: {names} ran away and released {100 * runaway.share:.2g} % of "
-        f"the stored energy ({runaway.released:.4g})."
+        f"Step {step.number} is not a path of equilibria: {names} moved unstably and released "
+        f"{100 * runaway.share:.2g} % of the stored energy ({runaway.released:.4g})."
     )

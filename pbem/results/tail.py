@@ -141,7 +141,7 @@ def _refuse_cut(disk: int) -> None:
     if size < length:
         raise DamageError(errno.EIO, f"it was cut off, or damaged: it has {size} of {length} bytes")
     if size > length:
-        raise DamageError(errno.EIO, "it was cut off, or damaged: its checksums are not whole")
+        raise DamageError(errno.EIO, "it was cut off, or damaged: its checksums are incomplete")
 
 
 def find_unapplied(disk: int) -> Tail | None:

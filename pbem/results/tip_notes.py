@@ -42,7 +42,7 @@ def compare_release(results: Results) -> list[str]:
     names = list_names([name for _, name in found], MOST_NAMES)
     return [
         f"J and (KI^2 + KII^2)/E' differ by up to {100 * found[0][0]:.2g} % at {names}: the elements there are too "
-        "long for what the crack carries, or those beside the tip too unequal."
+        "long for the tractions on the crack, or those beside the tip too unequal."
     ]
 
 
@@ -109,7 +109,7 @@ def _find_reason(results: Results, name: str, touching: list[int]) -> str:
         return (f"the crack ends on {_name(results, shared)}, an interface, where the stress grows with another power "
                 "of the distance than -1/2 unless both sides are of one material")
     if len(boundary):
-        return "the crack ends on a boundary, where nothing is singular as at a tip"
+        return "the crack ends on a boundary, where the stress is not singular as at a tip"
     if len(cracks) > 1 or len(others) > 2:
         return "cracks meet there, and the stress grows with another power of the distance than -1/2"
     return ""

@@ -261,4 +261,4 @@ def _refuse_empty(results: Results) -> None:
     if not len(results.steps):
         raise ResultFileError(str(results.path), "holds no load step yet")
     if not results.pairs.names:
-        raise ResultFileError(str(results.path), "has no cracks or interfaces that traces could be drawn of")
+        raise ResultFileError(str(results.path), "has no cracks or interfaces to draw as traces")

@@ -136,7 +136,7 @@ class TableFile:
         except (UnicodeDecodeError, csv.Error):
             lines = []
         if not lines or tuple(lines[0][-len(LAST_COLUMNS):]) != LAST_COLUMNS:
-            raise ResultFileError(str(self.path), "is there already, and is no table of a sweep; name another file")
+            raise ResultFileError(str(self.path), "exists already and is not a table of a sweep; name another file")
         if force:
             return
         if lines[0] != self.header:
@@ -147,7 +147,7 @@ class TableFile:
         for number, cells in enumerate(rows, start=2):
             row = self._read(cells)
             if row is None:
-                raise ResultFileError(str(self.path), f"line {number} is none of such a table; mend or delete it")
+                raise ResultFileError(str(self.path), f"line {number} is no row of such a table; correct or delete it")
             if cells[-1] != self._mark:
                 raise ResultFileError(
                     str(self.path), "holds rows of another case, of this case before it was changed, or of other "

@@ -91,7 +91,7 @@ def check_combinations(values: Mapping[str, Sequence[Any]]) -> None:
     """Raise CaseError if there are none or too many, or a value is there twice."""
     faults = []
     if not values:
-        faults.append(Fault("values", "nothing", "what is to be varied: lists of values by keys, one key or more"))
+        faults.append(Fault("values", "nothing", "values to vary: lists of values by keys, at least one key"))
     for key, given in values.items():
         written = [write_cell(each) for each in given]
         if not given:

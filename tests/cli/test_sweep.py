@@ -137,7 +137,7 @@ def test_a_table_of_another_sweep_is_refused(folder: Path, capsys: Capture) -> N
     Path("blocks.toml").write_text(BLOCKS.replace("young = 1000.0", "young = 1001.0"))
     assert main([*command, "--force"]) == 0 and Path("t.csv").read_bytes() != before
     Path("other.csv").write_text("a,b\n1,2\n")
-    assert main([*command[:4], "-o", "other.csv"]) == 2 and "no table of a sweep" in capsys.readouterr().err
+    assert main([*command[:4], "-o", "other.csv"]) == 2 and "not a table of a sweep" in capsys.readouterr().err
     assert main([*command[:4], "-o", "blocks.toml"]) == 2 and "the case is read from" in capsys.readouterr().err
 
 

@@ -255,7 +255,7 @@ WRONG = {
         "[materials",
         "[[stages]]\n[stages.boundary.top]\nspring = { kn = 1 }\n[materials",
         "stages[1].boundary.top.spring (line 4)",
-        "spring cannot change: it is told in [boundary.top]",
+        "spring cannot change: it belongs in [boundary.top]",
     ),
     "initial stress nan": (
         "[materials",

@@ -59,7 +59,7 @@ WRONG = {
                                         ["a rigid tool", "in [stages.tools.punch]"]),
     "a law of a tool": ("[interfaces.punch]\nfriction = 0.3", "interfaces.punch", ["a rigid tool", "[contacts.seat]"]),
     "friction in a stage's tool": ("[[stages]]\n[stages.tools.punch]\nfriction = 0.3", "stages[1].tools.punch.friction",
-                                   ["unknown key 'friction';", "told in the table [contacts.NAME]"]),
+                                   ["unknown key 'friction';", "belongs in the table [contacts.NAME]"]),
     "heat of what is gone": ('[[stages]]\nremove = ["up"]\n[[stages]]\n[stages.temperature]\nup = 5.0',
                              "stages[2].temperature.up", ["region 'up', which is gone"]),
     "misfit of what is gone": ('[[stages]]\nremove = ["up"]\n[stages.eigenstrain.up]\nexx = 0.1',

@@ -52,8 +52,8 @@ def test_a_value_by_time_that_jumps_as_a_stage_begins_is_noted(first: str, secon
     if noted is None:
         assert not found
     else:
-        assert found == ["What is prescribed on 'crack' jumps when stage 'b' begins: the time t goes on from stage to "
-                         f"stage, and {noted}."]
+        assert found == ["What is prescribed on 'crack' jumps when stage 'b' begins: the time t continues from "
+                         f"stage to stage, and {noted}."]
 
 
 @pytest.mark.parametrize(

@@ -298,7 +298,7 @@ def test_output_is_refused_where_it_would_destroy_something(tmp_path: Path) -> N
         (results, {}, "holds results; --resume goes on with them, --force replaces them"),
         (results, {"source": "another"}, "holds the results of another case"),
         (results, {"resume": True, "force": True}, "choose one"),
-        (case, {}, "no result file of pbem"), (case, {"force": True}, "no result file of pbem"),
+        (case, {}, "not a result file of pbem"), (case, {"force": True}, "not a result file of pbem"),
         (link, {"force": True, "inputs": [case]}, "that the case is read from"),
         (link, {"resume": True, "inputs": [case]}, "that the case is read from"),
         (tmp_path / "none.h5", {"resume": True}, "no such file to resume"),

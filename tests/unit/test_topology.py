@@ -267,7 +267,7 @@ def test_wrong_topology_is_told(old: str, new: str, place: str, text: str) -> No
 
 def test_conditions_on_an_interface() -> None:
     fault = find_only_fault(change(BLOCKS, ("[boundary.top]", "[boundary.interface]\nux = 0\n[boundary.top]")))
-    assert "boundary.interface" in fault and "told in [interfaces.interface]" in fault
+    assert "boundary.interface" in fault and "belongs in [interfaces.interface]" in fault
 
 
 def test_curve_of_three_regions() -> None:

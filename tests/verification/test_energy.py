@@ -440,8 +440,8 @@ def test_released_energy_is_stored_shown_and_kept_on_resume(tmp_path: Path) -> N
         (told,) = [note for step in steps for note in writer.append(step)]
     results = open_results(path)
     at = int(np.argmax(results.energy.released > 0))
-    assert told.startswith(f"Step {steps[at].number} ") and "'fault' ran away and released" in told
-    assert f"in step {steps[at].number} faces ran away and released" in describe_results(results)
+    assert told.startswith(f"Step {steps[at].number} ") and "'fault' moved unstably and released" in told
+    assert f"in step {steps[at].number} faces moved unstably and released" in describe_results(results)
     broken = tmp_path / "broken.h5"
     first = ResultWriter(broken, model, mesh, 1, "")
     for step in steps[: at + 1]:

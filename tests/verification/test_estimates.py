@@ -331,7 +331,7 @@ def test_statuses_that_do_not_settle_on_the_coarser_mesh_are_those_of_the_run(
     settled = pbem.run(tmp_path / "blocks.toml", tmp_path / "settled.h5").errors
 
     def refuse(*_: Any, **__: Any) -> None:
-        raise ConvergenceError("unsound mesh", "pairs part when they are pressed")
+        raise ConvergenceError("unsound mesh", "pairs open under compression")
 
     monkeypatch.setattr(second_solution, "solve_step", refuse)
     held = pbem.run(tmp_path / "blocks.toml", tmp_path / "held.h5").errors

@@ -171,8 +171,8 @@ def test_needs_the_file_alone_and_no_mpi(griffith: Results, tmp_path: Path) -> N
 @pytest.mark.parametrize(("points", "options", "kind", "said"), [
     ([1.0, 2.0, 3.0], {}, ValueError, r"expected shape \(q, 2\)"),
     ("here", {}, ValueError, "expected numbers"),
-    ([[0, 2.0]], {"steps": [4]}, IndexError, "no stored step at place 4; 1 are stored"),
-    ([[0, 2.0]], {"steps": "last"}, ValueError, "expected places of stored steps"),
+    ([[0, 2.0]], {"steps": [4]}, IndexError, "no stored step with index 4; 1 are stored"),
+    ([[0, 2.0]], {"steps": "last"}, ValueError, "expected indices of stored steps"),
     ([[0, 2.0]], {"side": "third"}, ValueError, "expected one of first, second"),
 ])  # fmt: skip
 def test_wrong_arguments_are_named(griffith: Results, points: object, options: dict, kind: type, said: str) -> None:

@@ -44,7 +44,7 @@ def test_the_solution_is_that_of_the_true_laws(stage: int, unit: float) -> None:
     np.testing.assert_array_equal(softly.memory.modes.mode, memory.modes.mode)
     assert [each.number for each in softly.iterations] == list(range(1, len(softly.iterations) + 1))
     assert len(softly.iterations) > len(SOFTNESS)
-    assert any("made stiffer in steps" in note for note in listener.notes)
+    assert any("compliance of the contacts that was reduced in steps" in note for note in listener.notes)
 
 
 def test_other_errors_and_laws_are_left_alone() -> None:

@@ -46,7 +46,7 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
         f"{100 * amount:.2g} % of their sum without signs"
     )
     if at < 0 and float(balance.carried[worst]) > NOTED:
-        left += ", which nothing but the condition on its mean motion carries"
+        left += ", which only the condition on its mean motion carries"
     if wrong.any():
         raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")
     return left

@@ -44,9 +44,9 @@ def describe_unsettled(
     if failed is not None and failed.wrong.any():
         return ConvergenceError(
             "unsound mesh",
-            f"single pairs part when they are pressed, or move against a shear: {_name(problem, group[failed.wrong])}; "
+            f"single pairs open under compression, or slip against the shear: {_name(problem, group[failed.wrong])}; "
             "with the others in their present modes contact there has none or several solutions; where elements are "
-            "longer than the distance to the next face, use shorter ones",
+            "longer than the distance to the nearest face, use shorter ones",
             _list_places(problem, group[failed.wrong]),
         )
     if reason == "no admissible modes" and failed is not None:

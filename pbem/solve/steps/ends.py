@@ -113,8 +113,8 @@ def end_march(
         return ConvergenceError(
             "limit load",
             f"limit load reached at fraction {reached:.6g} of stage {name!r}: the bonds of {softening} soften, and no "
-            f"equilibrium was found at {target:.6g} ({error.detail}); more than this they do not bear, or the faces "
-            f"snap back; {BEYOND}",
+            f"equilibrium was found at {target:.6g} ({error.detail}); they cannot carry more, or the response "
+            f"snaps back; {BEYOND}",
         )
     # Of the whole stage: whether a try went beyond the bound depends on the steps.
     balanced = find_balanced(problem, memory, stage, reached, 1.0)

@@ -70,6 +70,6 @@ def describe_nonlinearity(regions: Sequence[str], interfaces: Sequence[str], lin
         largest = int(np.argmax(linearity.slip))
         notes.append(
             f"faces of '{interfaces[largest]}' slip by {linearity.slip[largest]:.2g} times the mean length of "
-            "their elements, and the equations still pair them as they lay at the start"
+            "their elements, but the equations still use the initial pairs"
         )
     return notes

@@ -46,8 +46,8 @@ def solve_softly(
         return None
     if problem.comm.rank == 0:
         reporter.note(
-            "Statuses of the contacts did not settle by themselves; they were found from those of contacts that were "
-            "made stiffer in steps."
+            "Statuses of the contacts did not settle by themselves; they were found with a "
+            "compliance of the contacts that was reduced in steps."
         )
     return replace(found, memory=replace(found.memory, modes=begin.modes), iterations=tuple(iterations))
 

@@ -182,7 +182,7 @@ def _reach_tolerance(
             raise ConvergenceError(
                 "linear solver",
                 f"products of the hierarchical operator have a relative error of {error:.1e} (asked: solver.tolerance "
-                f'= {tolerance:g}); ask for less, or for operator = "dense"',
+                f'= {tolerance:g}); use a larger tolerance, or operator = "dense"',
             )
         weak = 0.0
         terms = min(MOST_TERMS, max(terms + 2, choose_terms(tolerance**2 / error)))

@@ -114,7 +114,7 @@ class KrylovTangent(TangentOperator):
             raise ConvergenceError(
                 "linear solver",
                 f"PETSc's preconditioner {kind!r} needs a stored matrix, which the hierarchical operator has not; "
-                'leave pc_type out, or ask for operator = "dense"',
+                'omit pc_type, or use operator = "dense"',
             )
         # The user's ksp_rtol and ksp_atol, if they are given.
         self._tolerance, self._least = (float(each) for each in solver.getTolerances()[:2])
@@ -218,7 +218,7 @@ class KrylovTangent(TangentOperator):
                 self.preconditioner.update(constraints)
                 self._solver.getPC().setUp()
         singular = int(add_up(problem.comm, np.array([float(self.preconditioner.singular)]))[0])
-        loose = f"; {singular} groups of elements are held by nothing near to them" if singular else ""
+        loose = f"; {singular} groups of elements are not held by any neighbour" if singular else ""
         raise ConvergenceError(
             "linear solver",
             f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"

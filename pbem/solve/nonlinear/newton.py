@@ -13,9 +13,7 @@ from pbem.contact.closure import choose_traction
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import (
-    OPEN,
     SLIP,
-    STICK,
     Memory,
     ModeState,
     PairState,
@@ -39,13 +37,15 @@ from pbem.contact.modes import (
 from pbem.contact.seat import find_seat
 from pbem.contact.separating import begin_jump, choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
-from pbem.errors import ConvergenceError, StopError
+from pbem.errors import ConvergenceError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import run_cascade
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
-from pbem.solve.nonlinear.search import PLAIN, PLAIN_IF_LOOSE, Globalisation, Search
+from pbem.solve.nonlinear.recorded import Record
+from pbem.solve.nonlinear.search import PLAIN, PLAIN_FROM_SMOOTHED, PLAIN_IF_LOOSE, Globalisation, Search
+from pbem.solve.nonlinear.smooth_search import SmoothSearch
 from pbem.solve.nonlinear.unsettled import Unsettled, describe_unsettled
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
@@ -145,7 +145,8 @@ def _search_modes(
         laws, hold.apply(memory.modes, problem.approached, np.zeros(laws.count))))
     normal_traction, slip, jump = memory.normal_traction, begin_slip(laws, modes, memory), begin_jump(laws, memory)
     fixed_point, kept = FixedPoint(), (modes, normal_traction, slip, jump)
-    products = problem.system.products
+    record = Record(problem, reporter, iterations)
+    smoothing = SmoothSearch(problem, memory, load, search.sweeps)
     while True:
         begin = time.perf_counter()
         law = linearise(
@@ -157,7 +158,7 @@ def _search_modes(
             solved = tangent.solve(constraints, load, law, forcing.choose(search.level > 0))
             loosely = solved.loosely
             forcing.used |= loosely
-            search.plain = PLAIN_IF_LOOSE if loosely else PLAIN
+            search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN
             outcome = _judge(hold, modes, memory, load, law, solved, search.globalisation)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)
@@ -179,9 +180,7 @@ def _search_modes(
             memory = memory.lose(cascade.broken)
             proposal = _judge(hold, modes, memory, load, law, solved, search.globalisation).proposal
             search.restart()
-        iterations.append(_record(len(iterations) + 1, solved, modes, proposal, begin, problem, products))
-        products = problem.system.products
-        _tell(reporter, iterations[-1], modes)
+        record.add(solved, modes, proposal.changed, begin)
         driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
         if driven:
             search.restart()
@@ -204,6 +203,13 @@ def _search_modes(
             raise _end(hold, "iteration limit", proposal, search)
         if left:
             modes, normal_traction, slip, jump = kept
+            continue
+        if smoothing.begins(search.counts, pairs):
+            search.go_on_from_smoothed()
+            modes, pairs = smoothing.find(tangent, hold, forcing, modes, record)
+            normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
+            modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
+                laws, hold.apply(new, at.g_n, slipped)))
             continue
         chosen = cascade.modes if cascade else None
         # The first rank alone knows which pairs hold a body.
@@ -233,15 +239,6 @@ def _search_modes(
         jump = choose_jump(laws, former, memory, pairs, load.pressure)
         if search.just_returned:
             kept = (modes, normal_traction, slip, jump)
-
-
-def _tell(reporter: Reporter, iteration: Iteration, modes: ModeState) -> None:
-    """Report an iteration; where the run is stopped by that, say with which modes a search can go on."""
-    try:
-        reporter.iterate(iteration)
-    except StopError as stop:
-        stop.unfinished = modes
-        raise
 
 
 def _go_on(forcing: Forcing, search: Search) -> bool:
@@ -364,14 +361,3 @@ def _judge(
         return _Outcome(pairs, proposal, settled, failing, law_error)
 
     return problem.decide(judge)
-
-
-def _record(
-    number: int, solved: Solved, modes: ModeState, proposal: Proposal, begin: float, problem: Problem, products: int
-) -> Iteration:
-    """products: so many there were before."""
-    stick, slip, is_open = (int((modes.mode == kind).sum()) for kind in (STICK, SLIP, OPEN))
-    seconds = time.perf_counter() - begin
-    changed = int(proposal.changed.sum())
-    return Iteration(number, solved.residual, changed, stick, slip, is_open, seconds, solved.linear_iterations,
-                     problem.system.products - products)

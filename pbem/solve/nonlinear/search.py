@@ -59,6 +59,8 @@ LONG = 10
 # Iterations that are plain Newton steps whatever they change; and where systems are solved loosely, so that such a step
 # takes far fewer products than the responses of a few pairs.
 PLAIN, PLAIN_IF_LOOSE = 3, 6
+# After modes of smoothed laws hardly any pair is far from what it will be.
+PLAIN_FROM_SMOOTHED = 1
 # Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
 COSTLY = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
@@ -93,6 +95,7 @@ class Search:
         self.sweeps, self.swept = sweeps, False
         self.unsettled = False  # whether it ended as modes came back, or took too long
         self.wary = wary
+        self.smoothed = False  # whether it goes on from the modes of smoothed laws
         self.plain = PLAIN
         self.restart()
 
@@ -111,6 +114,14 @@ class Search:
         self.returned = self.just_returned = False
         self.near, self.error, self.entered = NEAR, np.inf, 0
         self.seen: set[bytes] = set()
+
+    def go_on_from_smoothed(self) -> None:
+        """Begin anew from modes of smoothed laws: few pairs change, which groups that settle alone would disturb.
+
+        Where that does not settle, another search begins anew, without.
+        """
+        self.restart()
+        self.swept, self.sweeping, self.smoothed = True, False, True
 
     @property
     def globalisation(self) -> Globalisation:

@@ -1,0 +1,125 @@
+"""Laws of contact that are smoothed: every pair gives way to tension and to pressure, more or less (theory, 122, 123).
+
+The normal law as a projection, p = max(p - r g, 0) for the contact pressure p and the opening g, becomes p = (x +
+sqrt(x^2 + 4 e^2)) / 2 of the trial value x = p - r g: the hyperbola r p g = e^2 (B. Chen, P. T. Harker, SIAM J. Matrix
+Anal. Appl. 14, 1993; C. Kanzow, SIAM J. Matrix Anal. Appl. 17, 1996). The projection of friction on its bound is the
+sum of two such maxima. With e -> 0 the laws are the true ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.arrays import Bool, Real
+from pbem.contact.friction_bound import Strength
+from pbem.contact.laws import (
+    OPEN,
+    SLIP,
+    STICK,
+    Memory,
+    ModeState,
+    PairLaws,
+    PairState,
+    evaluate_strength,
+    find_linear,
+    follow_leaders,
+    plastic_slip,
+    tensile_limit,
+)
+from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
+
+
+def find_smooth(laws: PairLaws, memory: Memory, pressure: Real) -> Bool:
+    """Pairs (m,) whose laws can be smoothed: of Coulomb's friction without cohesion, tensile strength or dilation.
+
+    Not those that are bonded or parted for good, nor those that follow others.
+    """
+    at_rest = evaluate_strength(laws, -pressure, memory.look_ahead(np.zeros(laws.count)), pressure).bound
+    dilates = np.zeros(laws.count, dtype=bool)
+    for group in laws.strengths:
+        dilates[group.pairs] = group.law.dilates
+    odd = laws.brittle | dilates | (laws.stiffening > 0) | (laws.rest != 0)
+    plain = find_linear(laws) & (at_rest == 0) & (tensile_limit(laws, memory) == 0) & ~odd
+    return np.asarray(plain & ~laws.bonded & ~laws.parted & ~laws.follows)
+
+
+def stick_all(laws: PairLaws, modes: ModeState) -> ModeState:
+    """Modes in which all pairs stick that can touch: a smoothed contact holds what they hold."""
+    return ModeState(np.where(laws.parted, OPEN, STICK).astype(np.int8), modes.sign)
+
+
+def linearise_smoothly(
+    laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real, traction_scale: float,
+    width: float,
+) -> Linearisation:
+    """The tangents of the smoothed laws of pairs (m,) at a state; others stick, or are open for good.
+
+    width: e, a stress. (theory, 122, 123)
+    """
+    r, scale = laws.stiffness, traction_scale
+    x, y = _try(laws, state, memory, pressure)
+    held, a = _smooth_maximum(x, width)
+    strength = _find_bound(laws, held, memory, pressure)
+    above, by_above = _smooth_maximum(y - strength.bound, width)
+    below, by_below = _smooth_maximum(-y - strength.bound, width)
+    d, c = by_above + by_below, (by_above - by_below) * strength.by_traction * a
+    # In units of the traction scale: (a - 1) p_n + a r g_n = P - a x + (1 - a) pressure; with what the other gives,
+    # d p_s + (d - 1) r slip = d y - (P1 - P2) + c (x + pressure) + c (p_n + r g_n).
+    normal = np.stack([a - 1, a * r / scale], axis=1)
+    along = np.stack([d, (d - 1) * r / scale], axis=1)
+    tangent, offset = np.zeros((laws.count, 4, 2)), np.zeros((laws.count, 4))
+    tangent[:, P_N::2, 0], offset[:, P_N::2] = _solve_row(normal, (held - a * x + (1 - a) * pressure) / scale)
+    tangent[:, P_S::2, 1], offset[:, P_S::2] = _solve_row(
+        along, (d * y - above + below + c * (x + pressure)) / scale + along[:, 1] * memory.slip)
+    for values in (tangent[:, :, 0], offset):
+        values[:, P_S::2] += _solve_row(along, c * (values[:, P_N] + r / scale * values[:, G_N]))[1]
+    tangent[:, :G_N] *= scale
+    offset[:, :G_N] *= scale
+    for compliance, traction, jump in ((laws.compliance_n, P_N, G_N), (laws.compliance_s, P_S, G_S)):
+        tangent[:, jump] += compliance[:, None] * tangent[:, traction]
+        offset[:, jump] += compliance * offset[:, traction]
+    sticking = stick_all(laws, ModeState(np.zeros(laws.count, dtype=np.int8), np.ones(laws.count)))
+    other = linearise(laws, sticking, state.p_n, memory.slip, memory, pressure, scale)
+    return Linearisation(
+        np.where(smooth[:, None, None], tangent, other.tangent), np.where(smooth[:, None], offset, other.offset),
+        laws.leader,
+    )
+
+
+def read_modes(
+    laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real
+) -> ModeState:
+    """The modes that the trial values of smoothed pairs are in: those of the true laws, once the width is small."""
+    x, y = _try(laws, state, memory, pressure)
+    bound = _find_bound(laws, np.maximum(x, 0.0), memory, pressure).bound
+    mode = np.where(smooth & (x < 0), OPEN, np.where(smooth & (np.abs(y) > bound), SLIP, STICK))
+    mode = np.where(laws.parted, OPEN, mode).astype(np.int8)
+    return follow_leaders(laws, ModeState(mode, np.where(y < 0, -1.0, 1.0)))
+
+
+def _try(laws: PairLaws, state: PairState, memory: Memory, pressure: Real) -> tuple[Real, Real]:
+    """x and y (m,): contact pressure less r times the opening; traction along the faces plus r times the slip."""
+    opening = state.g_n - laws.compliance_n * state.p_n
+    slip = plastic_slip(laws, state) - memory.slip
+    return -(state.p_n + pressure) - laws.stiffness * opening, state.p_s + laws.stiffness * slip
+
+
+def _find_bound(laws: PairLaws, held: Real, memory: Memory, pressure: Real) -> Strength:
+    """The friction bound under a contact pressure (m,), and its slope by the normal traction."""
+    return evaluate_strength(laws, -held - pressure, memory.look_ahead(np.zeros(laws.count)), pressure)
+
+
+def _smooth_maximum(values: Real, width: float) -> tuple[Real, Real]:
+    """Of values and zero, and its slope, which is between 0 and 1 (theory, 122)."""
+    root = np.sqrt(values * values + 4 * width * width)
+    # Without cancellation where a value is far below zero.
+    result = np.where(values > 0, 0.5 * (values + root), 2 * width * width / (root + np.abs(values)))
+    return result, result / root
+
+
+def _solve_row(row: Real, right: Real) -> tuple[Real, Real]:
+    """Of one equation row (m, 2) . (traction, jump) = right (m,): the direction (m, 2) that it leaves free, of length
+    one, and its shortest solution (m, 2)."""
+    size = np.hypot(row[:, 0], row[:, 1])
+    unit = row / size[:, None]
+    return np.stack([-unit[:, 1], unit[:, 0]], axis=1), unit * (right / size)[:, None]

@@ -1,0 +1,94 @@
+"""Statuses of a contact whose laws are smoothed less and less, where those of the true one do not settle.
+
+In open fractures hang thin blocks that single pairs hold. What holds them changes from one iteration to the next, they
+turn by a multiple of what there is room for, and take the statuses of all around with them. Under smoothed laws every
+pair holds what is near to it, the more the nearer it comes: blocks stay where there is room for them, and the solutions
+change little from one width to the next (X. Chen, Math. Programming 134, 2012, reviews such methods). From the statuses
+of the last the search goes on with the true laws; of the smoothed ones nothing is left but where it begins.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from pbem.contact.constraints import evaluate_pairs
+from pbem.contact.laws import SLIP, Memory, ModeState, PairState
+from pbem.contact.loads import Load
+from pbem.contact.smoothed import find_smooth, linearise_smoothly, read_modes, stick_all
+from pbem.solve.nonlinear.forcing import Forcing
+from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.recorded import Record
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import TangentOperator
+
+# The laws are smoothed where after so many iterations ...
+FIRST = 4
+# ... more than this part of all pairs goes on changing, and more than so many, as pivoting does for fewer ...
+MANY, LEAST = 0.03, 60
+# ... and that is more than this part of those that changed in the iteration before.
+SLOW = 0.5
+# The width begins with the largest traction, and each is this part of the one before.
+NARROWER = 0.3
+# It ends after so many iterations, or so many in turn in which no more than this part of all pairs change.
+LONGEST, ENOUGH, FEW = 12, 2, 1e-3
+# The part of the residual that is left: blocks that are nearly free move by far more than it tells.
+CLOSELY = 1e-3
+
+
+class SmoothSearch:
+    """Whether the laws are smoothed in a search, once, and the modes that this leads to.
+
+    Decided by counts and modes that all ranks know. allowed: whether it may be so at all.
+    """
+
+    def __init__(self, problem: Problem, memory: Memory, load: Load, allowed: bool) -> None:
+        laws = problem.laws
+        self._problem, self._memory, self._load = problem, memory, load
+        self._smooth = find_smooth(laws, memory, load.pressure) if allowed else np.zeros(laws.count, dtype=bool)
+        self._allowed = bool((self._smooth | laws.bonded | laws.parted | laws.follows).all() and self._smooth.any())
+        self._first: PairState | None = None
+
+    def begins(self, counts: Sequence[int], state: PairState) -> bool:
+        """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
+
+        state: of all pairs in this one; that of the first is where it begins.
+        """
+        if self._first is None:
+            self._first = state
+        many = len(counts) >= FIRST and counts[-1] > max(MANY * self._problem.laws.count, LEAST)
+        if not (self._allowed and many and counts[-1] > SLOW * counts[-2]):
+            return False
+        self._allowed = False
+        return True
+
+    def find(
+        self, tangent: TangentOperator, hold: Hold, forcing: Forcing, modes: ModeState, record: Record
+    ) -> tuple[ModeState, PairState]:
+        """Modes (m,), and the state of all pairs that they were read from; modes: those before.
+
+        Raises ConvergenceError: "singular tangent", "linear solver".
+        """
+        problem, memory, load, state = self._problem, self._memory, self._load, self._first
+        assert state is not None
+        holding, quiet = stick_all(problem.laws, modes), 0
+        width = float(max(np.abs(state.p_n).max(), np.abs(state.p_s).max()))
+        for _ in range(LONGEST):
+            begin = time.perf_counter()
+            law = linearise_smoothly(
+                problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width)
+            constraints = hold.release(problem.constrain(law, load), holding)
+            solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
+            forcing.used |= solved.loosely
+            before, state = modes, evaluate_pairs(problem.mesh, law, solved.unknowns)
+            modes = problem.decide(lambda at=state: read_modes(  # type: ignore[misc]
+                problem.laws, self._smooth, at, memory, load.pressure))
+            changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
+            record.add(solved, modes, changed, begin)
+            quiet = quiet + 1 if changed.sum() <= FEW * len(changed) else 0
+            if quiet == ENOUGH:
+                break
+            width *= NARROWER
+        return modes, state

@@ -1,0 +1,165 @@
+"""Smoothed laws of contact: their hyperbola, their tangents, the true laws as their limit; and the search with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, PairLaws, PairState, plastic_slip
+from pbem.contact.modes import Linearisation, linearise
+from pbem.contact.smoothed import find_smooth, linearise_smoothly, read_modes
+from pbem.solve.nonlinear.smooth_search import FIRST, LEAST, SmoothSearch
+from tests.unit.test_laws import make_laws, remember
+from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over
+
+Real = NDArray[np.float64]
+__all__ = ["many_groups"]
+
+COUNT, SCALE, WIDTH = 40, 7.0, 0.3
+
+
+def make_case(friction: float = 0.6, **values: object) -> tuple[PairLaws, Memory, Real]:
+    """Laws of pairs with fluid inside, what they remember, and its pressure."""
+    random = np.random.default_rng(3)
+    laws = make_laws(COUNT, friction, fluid_inside=True, stiffness=2.0, **values)
+    memory = replace(remember(0.0, COUNT), slip=random.normal(size=COUNT))
+    return laws, memory, random.uniform(0.0, 0.5, COUNT)
+
+
+def draw_state(seed: int) -> PairState:
+    return PairState(*np.random.default_rng(seed).normal(size=(4, COUNT)) * 2)
+
+
+def converge(
+    laws: PairLaws, memory: Memory, pressure: Real, seed: int, width: float
+) -> tuple[PairState, Linearisation]:
+    """States that fulfil the smoothed laws, where tractions follow from jumps by a stiffness of each pair alone."""
+    everywhere = np.ones(COUNT, dtype=bool)
+    random = np.random.default_rng(seed)
+    root = random.normal(size=(COUNT, 2, 2))
+    stiffness = root @ root.transpose(0, 2, 1) + np.eye(2)
+    given = random.normal(size=(COUNT, 2)) * 3
+    state = PairState(given[:, 0], given[:, 1], np.zeros(COUNT), np.zeros(COUNT))
+    for _ in range(60):
+        law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, width)
+        # p = given - stiffness g, of states that the laws leave.
+        rows = np.concatenate([np.tile(np.eye(2), (COUNT, 1, 1)), stiffness], axis=2)
+        right = given - np.einsum("mij,mj->mi", rows, law.offset)
+        state = law.evaluate(np.linalg.solve(rows @ law.tangent, right[..., None])[..., 0])
+    return state, law
+
+
+@pytest.mark.parametrize("compliance", [0.0, 0.2])
+def test_states_lie_on_the_hyperbola_and_within_the_bound(compliance: float) -> None:
+    laws, memory, pressure = make_case(compliance_n=compliance, compliance_s=2 * compliance)
+    state, _ = converge(laws, memory, pressure, 1, WIDTH)
+    pressed, opening = -(state.p_n + pressure), state.g_n - compliance * state.p_n
+    assert (pressed > 0).all() and (opening > 0).all()
+    np.testing.assert_allclose(laws.stiffness * pressed * opening, WIDTH**2, rtol=1e-9)
+    # Friction acts with the slip, and stays within its bound but for the width.
+    ahead = plastic_slip(laws, state) - memory.slip
+    assert (state.p_s * ahead >= 0).all() and (np.abs(ahead) > 1e-3).any()
+    assert (np.abs(state.p_s) <= 0.6 * pressed + WIDTH).all()
+
+
+def test_pairs_without_friction_bear_no_shear() -> None:
+    laws, memory, pressure = make_case(friction=0.0)
+    state, _ = converge(laws, memory, pressure, 2, WIDTH)
+    np.testing.assert_allclose(state.p_s, 0.0, atol=1e-12)
+    assert np.abs(state.g_s).max() > 0.1
+
+
+def test_the_limit_is_the_true_law() -> None:
+    laws, memory, pressure = make_case()
+    state, _ = converge(laws, memory, pressure, 3, 1e-9)
+    modes = read_modes(laws, np.ones(COUNT, dtype=bool), state, memory, pressure)
+    assert {STICK, SLIP, OPEN} == set(modes.mode)
+    law = linearise(laws, modes, state.p_n, memory.slip, memory, pressure, SCALE)
+    values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1) - law.offset
+    for pair in range(COUNT):
+        fitted = law.tangent[pair] @ np.linalg.lstsq(law.tangent[pair], values[pair], rcond=None)[0]
+        np.testing.assert_allclose(fitted, values[pair], rtol=0, atol=1e-6)
+    # The modes are those of the laws' inequalities.
+    is_open, slips = modes.mode == OPEN, modes.mode == SLIP
+    assert (state.p_n[~is_open] + pressure[~is_open] < 0).all() and (state.g_n[is_open] > 0).all()
+    assert (modes.sign[slips] * (state.g_s - memory.slip)[slips] > 0).all()
+
+
+def test_tangents_are_those_of_the_laws() -> None:
+    laws, memory, pressure = make_case(compliance_n=0.1, compliance_s=0.3)
+    everywhere, (state, _) = np.ones(COUNT, dtype=bool), converge(laws, memory, pressure, 4, WIDTH)
+    law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, WIDTH)
+    values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
+    for direction in ([1.0, 0.0], [0.0, 1.0]):
+        off = []
+        for step in (1e-2, 1e-3):
+            moved = values + step * law.tangent @ np.array(direction)
+            near = linearise_smoothly(laws, everywhere, PairState(*moved.T), memory, pressure, SCALE, WIDTH)
+            left = moved - near.offset
+            fitted = np.stack([near.tangent[k] @ np.linalg.lstsq(near.tangent[k], left[k], rcond=None)[0]
+                               for k in range(COUNT)])
+            off.append(np.abs(left - fitted).max())
+        # What a step along the tangent leaves of the laws falls with its square.
+        assert off[1] < 0.02 * off[0] and off[0] < 1e-2
+
+
+def test_laws_that_are_not_coulombs_are_not_smoothed() -> None:
+    laws, memory, pressure = make_case()
+    assert find_smooth(laws, memory, pressure).all()
+    for name in ("bonded", "parted", "brittle"):
+        assert not find_smooth(make_case(**{name: True})[0], memory, pressure).any()
+    assert not find_smooth(make_case(tensile_strength=0.1)[0], memory, pressure).any()
+    assert not find_smooth(make_laws(COUNT, 0.6, 0.1), memory, np.zeros(COUNT)).any()
+    # A pressure that is in open parts alone presses faces together that it parts.
+    assert not find_smooth(make_laws(COUNT, 0.6), memory, pressure + 0.1).any()
+    follower = replace(laws, leader=np.where(np.arange(COUNT) == 3, 2, np.arange(COUNT)))
+    assert list(np.flatnonzero(~find_smooth(follower, memory, pressure))) == [3]
+
+
+def test_laws_are_smoothed_where_many_pairs_go_on_changing() -> None:
+    problem = assemble(grow_branches(0, 6))
+    count, load = problem.laws.count, problem.evaluate_load(0, 1.0)
+    memory = remember(0.0, count)
+    state = PairState(*np.ones((4, count)))
+    many = max(LEAST, count // 10) + 1
+
+    def ask(*counts: int, allowed: bool = True) -> list[bool]:
+        search = SmoothSearch(problem, memory, load, allowed)
+        return [search.begins(counts[: k + 1], state) for k in range(len(counts))]
+
+    assert ask(*[many] * (FIRST + 2)) == [False] * (FIRST - 1) + [True] + [False] * 2
+    assert not any(ask(*[many] * (FIRST + 2), allowed=False))
+    assert not any(ask(*[LEAST] * (FIRST + 2)))
+    assert not any(ask(*[many * 3**k for k in range(FIRST + 2)][::-1]))
+
+
+@pytest.fixture
+def at_once(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Every search of a network smooths its laws after the first iteration; how often one did."""
+    begun: list[int] = []
+
+    def begins(search: SmoothSearch, counts: list[int], state: PairState) -> bool:
+        search._first = state
+        begun.extend([1] * search._allowed)
+        search._allowed, allowed = False, search._allowed
+        return allowed
+
+    monkeypatch.setattr(SmoothSearch, "begins", begins)
+    return begun
+
+
+def test_the_search_ends_in_the_same_solution(many_groups: None, at_once: list[int]) -> None:
+    text = grow_branches(0, 6)
+    found = march_over(text)
+    assert at_once == [1] and len(found.iterations) <= 16
+    assert [each.number for each in found.iterations] == list(range(1, len(found.iterations) + 1))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SmoothSearch, "begins", lambda *arguments: False)
+        usual = march_over(text)
+    assert {STICK, SLIP, OPEN} <= set(usual.contact.mode)
+    np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
+    slip = usual.contact.slip
+    np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-7 * np.abs(slip).max())

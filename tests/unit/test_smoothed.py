@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, PairLaws, PairState, plastic_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip
 from pbem.contact.modes import Linearisation, linearise
 from pbem.contact.smoothed import find_smooth, linearise_smoothly, read_modes
+from pbem.solve.nonlinear import smooth_search
 from pbem.solve.nonlinear.smooth_search import FIRST, LEAST, SmoothSearch
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over
@@ -133,7 +135,7 @@ def test_laws_are_smoothed_where_many_pairs_go_on_changing() -> None:
     assert ask(*[many] * (FIRST + 2)) == [False] * (FIRST - 1) + [True] + [False] * 2
     assert not any(ask(*[many] * (FIRST + 2), allowed=False))
     assert not any(ask(*[LEAST] * (FIRST + 2)))
-    assert not any(ask(*[many * 3**k for k in range(FIRST + 2)][::-1]))
+    assert not any(ask(*[many + k for k in range(FIRST + 2)][::-1]))
 
 
 @pytest.fixture
@@ -163,3 +165,30 @@ def test_the_search_ends_in_the_same_solution(many_groups: None, at_once: list[i
     np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
     slip = usual.contact.slip
     np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-7 * np.abs(slip).max())
+
+
+def test_smoothing_ends_before_a_width_at_which_most_pairs_change(
+    many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[ModeState] = []
+
+    def read_badly(*arguments: Any) -> ModeState:
+        modes = read_modes(*arguments)
+        if len(asked) == 6:
+            modes = ModeState(((modes.mode + 1) % 3).astype(np.int8), modes.sign)
+        asked.append(modes)
+        return modes
+
+    found: list[ModeState] = []
+    find = SmoothSearch.find
+
+    def listen(search: SmoothSearch, *arguments: Any) -> tuple[ModeState, PairState]:
+        result = find(search, *arguments)
+        found.append(result[0])
+        return result
+
+    monkeypatch.setattr(smooth_search, "read_modes", read_badly)
+    monkeypatch.setattr(SmoothSearch, "find", listen)
+    step = march_over(grow_branches(0, 6))
+    assert len(asked) == 7 and found[0].fingerprint() == asked[5].fingerprint()
+    assert step.iterations[7].changed > 0.5 * len(step.contact.mode)

@@ -26,14 +26,14 @@ from pbem.solve.problem.tangent import TangentOperator
 
 # The laws are smoothed where after so many iterations ...
 FIRST = 4
-# ... more than this part of all pairs goes on changing, and more than so many, as pivoting does for fewer ...
+# ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer.
 MANY, LEAST = 0.03, 60
-# ... and that is more than this part of those that changed in the iteration before.
-SLOW = 0.5
 # The width begins with the largest traction, and each is this part of the one before.
 NARROWER = 0.3
 # It ends after so many iterations, or so many in turn in which no more than this part of all pairs change.
 LONGEST, ENOUGH, FEW = 12, 2, 1e-3
+# Where so many times more pairs change than at best, and many, a few of them are unsound: it ends with what was before.
+WORSE = 2.0
 # The part of the residual that is left: blocks that are nearly free move by far more than it tells.
 CLOSELY = 1e-3
 
@@ -59,7 +59,7 @@ class SmoothSearch:
         if self._first is None:
             self._first = state
         many = len(counts) >= FIRST and counts[-1] > max(MANY * self._problem.laws.count, LEAST)
-        if not (self._allowed and many and counts[-1] > SLOW * counts[-2]):
+        if not (self._allowed and many and counts[-1] >= min(counts[:-1])):
             return False
         self._allowed = False
         return True
@@ -73,7 +73,7 @@ class SmoothSearch:
         """
         problem, memory, load, state = self._problem, self._memory, self._load, self._first
         assert state is not None
-        holding, quiet = stick_all(problem.laws, modes), 0
+        holding, quiet, least = stick_all(problem.laws, modes), 0, np.inf
         width = float(max(np.abs(state.p_n).max(), np.abs(state.p_s).max()))
         for _ in range(LONGEST):
             begin = time.perf_counter()
@@ -82,12 +82,15 @@ class SmoothSearch:
             constraints = hold.release(problem.constrain(law, load), holding)
             solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
             forcing.used |= solved.loosely
-            before, state = modes, evaluate_pairs(problem.mesh, law, solved.unknowns)
+            before, former, state = modes, state, evaluate_pairs(problem.mesh, law, solved.unknowns)
             modes = problem.decide(lambda at=state: read_modes(  # type: ignore[misc]
                 problem.laws, self._smooth, at, memory, load.pressure))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
-            quiet = quiet + 1 if changed.sum() <= FEW * len(changed) else 0
+            count = np.count_nonzero(changed)
+            if count > max(WORSE * least, MANY * len(changed)):
+                return before, former
+            least, quiet = min(least, count), quiet + 1 if count <= FEW * len(changed) else 0
             if quiet == ENOUGH:
                 break
             width *= NARROWER

@@ -21,6 +21,8 @@ from pbem.geometry.tolerance import Tolerance
 from pbem.wording import list_names
 
 HalfEdge = tuple[str, bool]
+# Ends that are nearer to each other than this part of the shorter curve are thought to be meant as one.
+ROUNDED = 1e-2
 
 
 @dataclass(frozen=True)
@@ -174,14 +176,26 @@ def _open_end(
         expected += f" (the point lies on curve '{touched[0]}': split that one there)"
     elif near:
         expected += f" (the nearest end is that of '{near[1]}' at {format_point(near[2])}, {near[0]:.3g} away)"
+        # The end of an arc follows from its centre, radius and angle: users write it with the digits that they have.
+        arc = next((end for end, leg in ((point, _leg_at(curves[names[0]], edges[0][1])), (near[2], near[3]))
+                    if leg.sweep), None)
+        if arc is not None and near[0] <= ROUNDED * min(curves[names[0]].length, curves[near[1]].length):
+            expected += f": the arc's end, with all its digits, is [{arc.real!r}, {arc.imag!r}]"
     return Fault.at(("regions", region, "boundary"), found, expected)
 
 
-def _nearest_end(point: complex, own: list[str], curves: Mapping[str, Curve]) -> tuple[float, str, complex] | None:
+def _leg_at(curve: Curve, start: bool) -> Leg:
+    return curve.legs[0 if start else -1]
+
+
+def _nearest_end(
+    point: complex, own: list[str], curves: Mapping[str, Curve]
+) -> tuple[float, str, complex, Leg] | None:
     ends = [
-        (abs(end - point), name, end)
+        (abs(end - point), name, end, _leg_at(curve, start))
         for name, curve in curves.items() if not curve.closed
-        for end in (curve.start, curve.end) if end != point and not (name in own and len(curves) > 1)
+        for start, end in ((True, curve.start), (False, curve.end))
+        if end != point and not (name in own and len(curves) > 1)
     ]
     return min(ends, key=lambda entry: entry[0], default=None)
 

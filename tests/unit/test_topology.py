@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -165,6 +167,26 @@ def test_inclusion_that_touches_a_side_with_a_corner_splits_it() -> None:
     model = build(change(text, (side, f'{side}, grading = "both"')))
     assert [leg.elements for leg in model.curves["bottom"].legs] == [4, 4]
     assert find_area(model, "body") == pytest.approx(4 - 0.25)
+
+
+def test_a_point_with_few_digits_at_an_arc_is_told_with_all_of_them() -> None:
+    wedge = """
+    materials.rock = { young = 1000.0, poisson = 0.2 }
+    curves.bottom = { points = [[0, 0], [1, 0]], elements = 8 }
+    curves.bow = { center = [0, 0], radius = 1, angles = [0, 30], elements = 8 }
+    curves.back = { points = [[0.866, 0.5], [0, 0]], elements = 8 }
+    regions.wedge = { material = "rock", boundary = ["bottom", "bow", "back"] }
+    boundary.bottom = { ux = 0.0, uy = 0.0 }
+    boundary.bow = { tn = -1.0 }
+    """
+    faults = find_faults(wedge)
+    assert len(faults) == 2 and all("2.54e-05 away" in fault.expected for fault in faults)
+    for fault in faults:
+        told = fault.expected.split("the arc's end, with all its digits, is ")[1]
+        model = build(change(wedge, ("[0.866, 0.5]", told)))
+        assert find_area(model, "wedge") == pytest.approx(math.pi / 12, rel=1e-12)
+    straight = find_faults(change(SQUARE, ("[2, 2], [0, 2]", "[2, 2], [0.001, 2]")))
+    assert straight and not any("digits" in fault.expected for fault in straight)
 
 
 def test_gap_in_a_loop_tells_both_ends() -> None:

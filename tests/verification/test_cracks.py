@@ -191,7 +191,10 @@ def test_elimination_gives_the_same_as_both_faces(
 
 
 @pytest.mark.parametrize("tips", [False, True], ids=["no_tips", "tips"])
-@pytest.mark.parametrize(("ux", "uy", "expected"), [(-0.01, -0.003, {SLIP, OPEN}), (0.002, -0.003, {STICK, SLIP})])
+# Beside the corner, within 2e-4 of it, the leg that slips on is opened by the other one.
+@pytest.mark.parametrize(("ux", "uy", "expected"), [
+    (-0.01, -0.003, {SLIP, OPEN}), (0.002, -0.003, {STICK, SLIP, OPEN}),
+])
 def test_elimination_gives_the_same_on_a_kinked_crack_in_several_modes(
     ux: float, uy: float, expected: set[int], tips: bool
 ) -> None:

@@ -1,4 +1,4 @@
-"""What a result file holds, as frozen arrays: nodes, elements, steps, stress-intensity factors, energies."""
+"""The contents of a result file as frozen arrays: nodes, elements, steps, stress-intensity factors, energies."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Nodes:
 @dataclass(frozen=True)
 class Elements:
     """vertices (e, 2, 2): start and end point in the direction of travel; region, curve (e,); crack (e,) bool.
-    sweep (e,): the signed angle (radians, counter-clockwise positive) that an arc turns through, 0 if straight.
-    tip (e,): 1 or 2 where the jump has the square-root shape of a crack tip at the element's start or end, else 0.
+    sweep (e,): the signed angle (radians, counter-clockwise positive) of an arc, 0 if straight.
+    tip (e,): 1 or 2 where the jump has the square-root shape of a crack tip at the start or end of the element, else 0.
 
     The nodes of element i are i * (order + 1) and the `order` that follow.
     """
@@ -57,12 +57,12 @@ class Elements:
 
 @dataclass(frozen=True)
 class Tips:
-    """At the start and at the end of a crack, over the k stored steps: KI, KII, J, T (k, 2). NaN where no tip is.
+    """At the start and at the end of a crack, over the k stored steps: KI, KII, J, T (k, 2). NaN if there is no tip.
 
     KI, KII: stress-intensity factors, stress times the root of length. KI >= 0 opens. KII > 0 if the face on the left
-    of the crack's direction moves along it, at both ends. J: J-integral, stress times length, the energy that growth
-    straight ahead would release per length; (KI^2 + KII^2)/E' if the mesh is good enough. T: T-stress, what stays
-    finite at the tip of the normal stress along the crack. plane_modulus: E', stress.
+    of the crack's direction moves along it, at both ends. J: J-integral, stress times length, the energy released per
+    length of growth straight ahead; (KI^2 + KII^2)/E' if the mesh is fine enough. T: T-stress, the finite part of the
+    normal stress along the crack at the tip. plane_modulus: E', stress.
     """
 
     KI: Real
@@ -74,11 +74,10 @@ class Tips:
 
 @dataclass(frozen=True)
 class Energies:
-    """Over the k stored steps (k,), per unit of thickness (stress times length squared), since before any load.
+    """Over the k stored steps (k,), per unit of thickness (stress times length squared), from the unloaded state.
 
-    external: work of loads and conditions; elastic: stored; dissipated: by friction and by bonds that were lost;
-    released: set free where faces ran away within a step; removed: taken out where stages open faces or take regions
-    away.
+    external: work of loads and conditions; elastic: stored; dissipated: by friction and by failed bonds; released: set
+    free where faces moved unstably within a step; removed: taken out where stages open faces or remove regions.
     external = elastic + dissipated + released + removed.
     """
 
@@ -93,10 +92,10 @@ class Energies:
 class Errors:
     """Estimated discretisation errors over the k stored steps; NaN where there is no estimate (`missing` says why).
 
-    reactions: per outer curve (k, 2), force. opening, slip: per interface (k,), largest error, length; traction_n,
-    traction_s: root of the mean square error along it, stress. KI, KII: per crack (k, 2), at start and end.
+    reactions: for each outer curve (k, 2), force. opening, slip: for each interface (k,), largest error, length;
+    traction_n, traction_s: root mean square error along it, stress. KI, KII: for each crack (k, 2), at start and end.
     displacement (k,): largest error. relative: `reactions`, `jumps`, `tractions`, `factors`, `displacement` (k,), the
-    largest of each kind over the largest value in the model so far.
+    largest error of each kind divided by the largest value in the model so far.
     """
 
     reactions: Mapping[str, Real]
@@ -113,11 +112,11 @@ class Errors:
 
 @dataclass(frozen=True)
 class Linearities:
-    """How large strains, rotations and slips are, over the k stored steps.
+    """Magnitude of strains, rotations and slips, over the k stored steps.
 
-    regions, interfaces: their names. strain, rotation (k, regions): of the boundary along itself, what a hundredth of
-    its length exceeds (radians). slip (k, interfaces): the largest, to the mean length of the elements. NaN where not
-    known.
+    regions, interfaces: their names. strain, rotation (k, regions): strain along the boundary and its rotation
+    (radians), the value exceeded on 1 % of its length. slip (k, interfaces): the largest slip relative to the mean
+    length of the elements. NaN where not known.
     """
 
     regions: tuple[str, ...]
@@ -129,15 +128,15 @@ class Linearities:
 
 @dataclass(frozen=True)
 class Balances:
-    """What is left over of the forces on r regions, over the k stored steps.
+    """Imbalance of the forces on r regions, over the k stored steps.
 
-    names: of the regions. resultant (k, r, 3): force along x and y (stress times length) and moment about the region's
-    centre, the mean of its boundary; of weight and in-situ stress too. relative (k, r): the larger of force and moment,
-    to the sums of their parts without signs; of infinite regions, which may carry a moment, the force. carried (k, r):
-    of what keeps the mean motion of bodies at zero that nothing else holds; 0 where nothing has to.
-    part_names (p,): of the parts that cracks cut off. part_resultant (k, p, 3), part_relative (k, p): the same of them,
-    with the tractions of the cracks' faces. whole (k, 3), whole_relative (k,): of all that acts from outside - on outer
-    curves, and weight - about the middle of the model. NaN where not known.
+    names: of the regions. resultant (k, r, 3): force along x and y (stress times length) and moment about the centre of
+    the region, the mean of its boundary; includes weight and in-situ stress. relative (k, r): the larger of force and
+    moment, relative to the sums of the magnitudes of their parts; for infinite regions, which may carry a moment, only
+    the force. carried (k, r): the part carried by the condition on the mean motion of a body that nothing else holds;
+    0 for other bodies. part_names (p,): parts cut off by cracks. part_resultant (k, p, 3), part_relative (k, p): the
+    same for these parts, with the tractions on the crack faces. whole (k, 3), whole_relative (k,): the same for all
+    external forces (on outer curves, and weight), about the middle of the model. NaN where not known.
     """
 
     names: tuple[str, ...]
@@ -153,9 +152,9 @@ class Balances:
 
 @dataclass(frozen=True)
 class Steps:
-    """Of every stored step (k,): its number (from 1), stage (index), factor in (0, 1], Newton iterations, residual.
+    """For every stored step (k,): its number (from 1), stage (index), factor in (0, 1], Newton iterations, residual.
 
-    stage_names: of all stages; removed: regions that are gone in each of them, if any ever is.
+    stage_names: names of all stages; removed: regions that have been removed by each stage, if any are.
     """
 
     number: Integer

@@ -1,4 +1,4 @@
-"""`results.plot`: a picture of any kind as a matplotlib Figure, or drawn into axes that the caller has."""
+"""`results.plot`: a picture of any kind as a matplotlib Figure, or drawn into given axes."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ def plot(
     step: int = -1, x: str = "arc_length", xlim: tuple[float, float] | None = None,
     ylim: tuple[float, float] | None = None, ax: Axes | None = None, **how: Any,
 ) -> Figure:
-    """Without options the bodies; field alone: a map of it; curve: quantities along an interface, crack or outer curve.
+    """Draw the bodies; with field alone, a map; with curve, quantities along an interface, crack or outer curve.
 
-    curve: a name, or several. field: of a map ux, uy, u, sxx, syy, sxy, s1, s2, shear or mises; along a curve opening,
-    slip, traction_n, traction_s, a variable of the law, or of the nodes ux, uy, u, tx, ty, normal, shear, hoop; several
-    as a list. step: place of a stored step, negative from the end. x: arc_length, angle (about a circle's centre), x or
-    y. xlim, ylim: of the axes. ax: axes to draw into, of which the figure is returned. how: of the lines along a curve
-    in given axes, as `pbem.results.curve_plot.draw_quantity` takes them (line, color, marks, text).
+    curve: one name or more. field: for a map ux, uy, u, sxx, syy, sxy, s1, s2, shear or mises; along a curve opening,
+    slip, traction_n, traction_s, an internal variable of the law, or at nodes ux, uy, u, tx, ty, normal, shear, hoop; a
+    list for several. step: index of a stored step, negative from the end. x: arc_length, angle (about the centre of a
+    circle), x or y. xlim, ylim: limits of the axes. ax: axes to draw into, whose figure is returned. how: options of
+    lines along a curve in given axes, passed to `pbem.results.curve_plot.draw_quantity` (line, color, marks, text).
 
-    Raises ValueError for no such curve, field or x, IndexError for no such step, ResultFileError if none is stored.
+    Raises ValueError for an unknown curve, field or x, IndexError for a step that is not stored, ResultFileError if no
+    step is stored.
     """
     if not len(results.steps):
         raise ResultFileError(str(results.path), "holds no load step yet")

@@ -1,4 +1,4 @@
-"""The parts of a result file that are loaded when they are first asked for."""
+"""The parts of a result file that are loaded on first access."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Contact:
     """One interface or crack with its m pairs over the k stored steps.
 
     position, normal (m, 2), arc_length (m,); mode (k, m): 0 stick, 1 slip, 2 open; opening, slip (k, m): lengths;
-    traction_n, traction_s (k, m): traction on the first side, compression negative. Loaded at first use.
+    traction_n, traction_s (k, m): traction on the first side, compression negative. Loaded on first access.
     first, second: names of the regions (second is None for a crack). law: its attributes in the file.
     """
 
@@ -79,10 +79,10 @@ class Contact:
         return self._arrays["traction_s"]
 
     def integrate(self, quantity: str) -> Real:
-        """(k,): integral over the curve of a quantity of its pairs: opening, slip, traction_n or traction_s.
+        """(k,): integral of opening, slip, traction_n or traction_s over the curve.
 
-        By the elements' quadrature; beside the tips of a crack slip and opening have the square-root shape. Where the
-        normal turns it is the component that is integrated, no force. Raises ValueError for no such quantity.
+        Uses the quadrature of the elements; next to crack tips slip and opening have the square-root shape. On a curved
+        contact the component is integrated, which does not give a force. Raises ValueError for an unknown quantity.
         """
         if quantity not in INTEGRABLE:
             raise ValueError(f"found {quantity!r}{suggest(str(quantity), INTEGRABLE)}; expected one of: "
@@ -98,17 +98,17 @@ class Contact:
 
     @property
     def internal(self) -> Mapping[str, Real]:
-        """The internal variables (k, m) that the law declares for itself, by their names."""
+        """The internal variables (k, m) that the law declares, by name."""
         known = ("position", "normal", "arc_length", "mode", "opening", "slip", "traction_n", "traction_s")
         return {name: values for name, values in self._arrays.items() if name not in known}
 
 
 @dataclass(frozen=True)
 class JoinedContact(Contact):
-    """A trace that crossings cut, or that was cut by hand: its pieces in their order along it, one after the other.
+    """A trace that was cut at crossings or by hand: its pieces in order along it, one after the other.
 
-    arc_length goes on from piece to piece, from the start of the first; law: what all pieces have in common. Otherwise
-    as of one crack; internal variables are those that all pieces have.
+    arc_length continues from piece to piece, from the start of the first; law: attributes common to all pieces;
+    otherwise as for one crack, with the internal variables that all pieces have.
     """
 
     pieces: tuple[Contact, ...] = ()

@@ -123,7 +123,10 @@ def _sum_tractions(
         moment += float((np.conj(lever) * weight).imag)
         power += float((np.conj(weight) * (a + 1j * spin * lever)).real)
         scale += float(np.abs(weight) * (np.abs(a) + np.abs(spin * lever)))
+        gone = region.name in stage.construction.removed
         for side in (side for loop in region.loops for side in loop.sides):
+            if gone and side.curve in stage.walls:
+                continue  # what acts there acts on the side that is left
             condition, values = _find_load(model, stage, side.curve)
             for piece in _divide_side(model.curves, side, values):
                 points = piece.places.point

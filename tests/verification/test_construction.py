@@ -297,3 +297,11 @@ def test_tractions_on_a_wall_keep_their_axes(tmp_path: Path) -> None:
     said = str(raised.value)
     assert "stages[1].boundary.s2.tn: found ty together with tn" in said
     assert "stages[2].boundary.s1: found tractions on 's1' along other axes than in a stage before" in said
+
+
+@pytest.mark.parametrize("given", [{"ty": 1.0}, {"tn": {"expression": "-y"}, "ts": {"expression": "-x"}}])
+def test_a_net_force_on_a_wall_is_refused(given: dict[str, Any], tmp_path: Path) -> None:
+    """That of a unit traction on a circle of radius 1 is its length; the core, which is gone, bears none of it."""
+    case = make_tunnel([REST, {**CUT, "boundary": {"wall": given}}])
+    with pytest.raises(pbem.CaseError, match=r"stage 'cut' drive it, with resultant \(\S+, 6\.28319\)"):
+        pbem.run(case, tmp_path / "net.h5")

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import lapack
 
 from pbem.arrays import Integer, Real
 from pbem.bem.rigid_motions import RigidMotions
@@ -24,6 +23,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractions
+from pbem.solve.preconditioner.inversion import invert_rows
 from pbem.solve.preconditioner.local_operator import LocalOperator
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 
@@ -199,19 +199,19 @@ class SchwarzPreconditioner:
         wanted = -(back @ effect.reshape(len(back), 2, -1)).reshape(effect.shape)
         kept = np.flatnonzero(~local[inside])
         wanted[kept, np.searchsorted(left, inside[kept])] = 1.0
-        # The transposed matrix is factorised where it is: of large groups every copy is tens of megabytes.
-        whole = whole if rest.all() else whole[rest]
-        factors, pivots, zero_pivot = lapack.dgetrf(whole.T, overwrite_a=True)
         inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
-        if not zero_pivot:
-            matrix = lapack.dgetrs(factors, pivots, wanted[inverse.solved].T, overwrite_b=True)[0].T
+        matrix, found = invert_rows(
+            whole if rest.all() else whole[rest], wanted[inverse.solved],
+            lambda: self._local.form(elements, around, rows[rest], left, constraints, free, less),
+        )
+        if matrix is not None:
             # All groups together are much of what is stored: of large models in single precision.
             stored: Real | Single = np.ascontiguousarray(matrix)
             if len(around) < 2 * self._mesh.nodes >= SINGLE:
                 with np.errstate(over="ignore"):
                     stored = stored.astype(np.float32)
             inverse.matrix = stored if np.isfinite(stored).all() else None
-        self.singular += inverse.matrix is None
+        self.singular += found > 0 or inverse.matrix is None
 
     def respond(
         self, constraints: sparse.csr_matrix, offsets: sparse.csr_matrix, elements: Integer, unknowns: Integer

@@ -245,7 +245,7 @@ def find_tractions(spread: Spread, curves: Mapping[str, Curve], values: Values) 
     scales = np.array([1.0, 1.0, 1 / size])
     gram = (weights[:, None, None] * (np.conj(motions)[:, :, None] * motions[:, None, :]).real).sum(axis=0)
     inverse = scales[:, None] * np.linalg.inv(scales[:, None] * gram * scales) * scales
-    x, y = (f"({axis} - ({part!r}))" for axis, part in zip("xy", (about.real, about.imag), strict=True))
+    x, y = (f"({axis} - ({float(part)!r}))" for axis, part in zip("xy", (about.real, about.imag), strict=True))
 
     def combine(row: int, turned: str) -> Value:
         return _sum([

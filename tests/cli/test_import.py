@@ -235,7 +235,8 @@ def test_drawings_of_all_kinds(capsys: Capture) -> None:
     assert curves["t3"]["center"] == pytest.approx([10, 0]) and [first, last] == pytest.approx([-60, 60])
     # Seen from below, x is turned round: from the left end up to the top, clockwise.
     assert curves["t4"]["center"] == pytest.approx([20, 0]) and curves["t4"]["angles"] == pytest.approx([180, 90])
-    assert curves["t5"]["center"] == [30, 0] and curves["t5"]["radius"] == 1 and "angles" not in curves["t5"]
+    assert np.allclose(curves["t5"]["center"], [30, 0], atol=1e-12)
+    assert curves["t5"]["radius"] == 1 and "angles" not in curves["t5"]
     said = capsys.readouterr().out
     assert "CIRCLE 2: one point or none" in said and "1 TEXT: only LINE" in said
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from scipy.integrate import trapezoid
 
 from pbem.contact.laws import OPEN
 from pbem.mesh.mesh import second_face_nodes
@@ -96,7 +97,7 @@ def test_the_interfaces_where_most_happens_are_drawn(tmp_path: Path) -> None:
     figure = draw_results(results)
     assert len(figure.axes) == 1 + 2 * 4 + 1
     titles = [axes.get_title(loc="left") for axes in figure.axes[1:-1:2]]
-    moved = {name: np.trapz(np.abs(each.slip[0]) + np.abs(each.opening[0]), each.arc_length)
+    moved = {name: trapezoid(np.abs(each.slip[0]) + np.abs(each.opening[0]), each.arc_length)
              for name, each in results.contact.items()}
     assert titles == sorted(titles, key=list(results.contact).index)
     assert min(moved[name] for name in titles) >= 0.95 * sorted(moved.values())[-4]

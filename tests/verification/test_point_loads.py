@@ -87,9 +87,10 @@ def make_half_disc(center: complex, turn: complex, load: complex, along: complex
     degrees = float(np.degrees(np.angle(turn)))
     place = to_pairs([center + along * turn])[0]
     # Radial: the traction on the arc about the load, if that is the centre of the disc.
-    x, y = f"(x - ({place[0]!r}))", f"(y - ({place[1]!r}))"
-    factor = f"(-2/pi*({load.real!r}*{x} + {load.imag!r}*{y})/({x}**2 + {y}**2)**1.5)"
-    normal = f"(({x})*(x - ({center.real!r})) + ({y})*(y - ({center.imag!r})))/{size!r}/({x}**2 + {y}**2)**0.5"
+    x, y = f"(x - ({float(place[0])!r}))", f"(y - ({float(place[1])!r}))"
+    factor = f"(-2/pi*({float(load.real)!r}*{x} + {float(load.imag)!r}*{y})/({x}**2 + {y}**2)**1.5)"
+    outward = f"(({x})*(x - ({float(center.real)!r})) + ({y})*(y - ({float(center.imag)!r})))/{float(size)!r}"
+    normal = f"{outward}/({x}**2 + {y}**2)**0.5"
     return {
         "materials": {"m": MATERIAL},
         "curves": {"side": {"points": to_pairs(center + np.array([-1, 1]) * turn), "elements": 8},
@@ -163,7 +164,7 @@ def test_a_force_in_a_corner(half_angle: float, tmp_path: Path) -> None:
     ends = np.exp(1j * half_angle * np.array([-1, 1]))
     force = 1.0 + 0.6j
     sine = 0.5 * np.sin(2 * half_angle)
-    rr = f"-(1.0*x/{half_angle + sine!r} + 0.6*y/{half_angle - sine!r})"
+    rr = f"-(1.0*x/{float(half_angle + sine)!r} + 0.6*y/{float(half_angle - sine)!r})"
     points = np.array([1e-4 + 2e-5j, 0.3 - 0.2j])
     case = {
         "materials": {"m": MATERIAL},

@@ -31,7 +31,7 @@ def make_block(shift: complex, turn: complex, bottom: dict[str, Any], **more: An
                                                   ("THST", "dense"), ("SST", "hierarchical")])
 def test_springs_that_tilt_a_block(shift: complex, turn: complex, scheme: str, operator: str, tmp_path: Path) -> None:
     """Uniform pressure on springs kn = p/(c + d s) lets a block down by c + d s: by stress and rotation alone."""
-    size = abs(turn)
+    size = float(abs(turn))
     spring = {"kn": {"expression": f"10/(0.02 + 0.01*s/{size!r})/{size!r}"}}
     case = make_block(shift, turn, {"spring": spring}, analysis={"steps": 2, "scheme": scheme, "order": 1},
                       solver={"operator": operator})

@@ -39,7 +39,7 @@ def make_bent_beam(scheme: str, order: int, operator: str, origin: complex, unit
             "below": {"material": "m", "boundary": ["low", "right_below", "joint", "left_below"]},
             "above": {"material": "m", "boundary": ["high", "right_above", "joint", "left_above"]},
         },
-        boundary={f"{name}_{part}": {"tx": {"expression": f"{np.sign(at)!r}*{stress}"}}
+        boundary={f"{name}_{part}": {"tx": {"expression": f"{int(np.sign(at))}*{stress}"}}
                   for at, _, name in ends for part in ("below", "above")},
         analysis={"scheme": scheme, "order": order, "steps": 1},
         solver={"operator": operator},

@@ -171,7 +171,9 @@ def _place(mesh: Mesh, parts: Parts, body: int, origin: complex) -> str:
     own = (parts.first == body) | (parts.second == body)
     middles = 0.5 * (mesh.start[own] + mesh.end[own])
     size = float(np.abs(middles - middles[0]).max())
-    middle, least = complex(middles.mean()) + origin, ROUNDED * size
+    # By their lengths: meshes are finer beside corners.
+    middle = complex(np.average(middles, weights=np.abs(mesh.end[own] - mesh.start[own]))) + origin
+    least = ROUNDED * size
     x, y = (0.0 if abs(part) < least else part for part in (middle.real, middle.imag))
     # On a map far from its origin a block is found by the digits behind.
     digits = max(4, 2 + math.ceil(math.log10(max(abs(x), abs(y), size) / size)))

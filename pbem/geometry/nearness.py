@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes, Meetings
@@ -136,7 +138,8 @@ class Corner:
 
     ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
     two legs `sides`; beside: further legs that end at the point, in corners that are no wedges; branching: whether
-    three ends of cracks meet, and nothing else does; turning: whether two do, of a crack that does not go on smoothly.
+    three ends of cracks meet, and nothing else does; turning: whether two do, of a crack that does not go on smoothly
+    and ends in a tip.
     """
 
     point: complex
@@ -146,6 +149,18 @@ class Corner:
     beside: tuple[tuple[int, bool], ...] = ()
     branching: bool = False
     turning: bool = False
+
+
+def _find_legs_of_tips(
+    meetings: Mapping[complex, Sequence[tuple[int, complex, bool]]], legs: int, cracks: frozenset[int]
+) -> frozenset[int]:
+    """Legs of cracks from which a tip is reached along legs that meet nothing else: not those of closed rings."""
+    of_cracks = [[leg for leg, _, _ in ends] for ends in meetings.values() if all(leg in cracks for leg, _, _ in ends)]
+    passed = np.array([numbers for numbers in of_cracks if len(numbers) == 2], dtype=np.int64).reshape(-1, 2)
+    links = sparse.coo_matrix((np.ones(len(passed)), passed.T), shape=(legs, legs))
+    chain = csgraph.connected_components(links, directed=False)[1]
+    ending = {int(chain[numbers[0]]) for numbers in of_cracks if len(numbers) == 1}
+    return frozenset(number for number in cracks if int(chain[number]) in ending)
 
 
 def _find_meetings(
@@ -160,7 +175,9 @@ def _find_meetings(
     corners: list[Corner] = []
     narrow: set[tuple[int, int]] = set()
     met: set[tuple[int, int]] = set()
-    for point, ends in _collect_ends(legs).items():
+    meetings = _collect_ends(legs)
+    of_tips = _find_legs_of_tips(meetings, len(legs), cracks)
+    for point, ends in meetings.items():
         found: list[tuple[float, int, int]] = []
         around: dict[tuple[int, bool], None] = {}
         widest: list[tuple[float, int, int]] = []
@@ -178,7 +195,7 @@ def _find_meetings(
                     around |= {(one, one_end): None, (other, other_end): None}
         of_cracks = all(leg in cracks for leg, _, _ in ends)
         branching = len(ends) == 3 == len(widest) and of_cracks
-        turning = len(ends) == 2 and len(widest) == 1 and of_cracks and widest[0][0] < math.pi - KINK
+        turning = len(ends) == 2 and len(widest) == 1 and ends[0][0] in of_tips and widest[0][0] < math.pi - KINK
         if found or branching or turning:
             angle, one, other = min(found or widest)
             every = branching or turning

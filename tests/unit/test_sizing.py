@@ -196,3 +196,18 @@ def test_lengths_fall_geometrically_where_a_crack_turns_sharply(scale: float) ->
     assert (long[1:] <= 2 * from_corner).all() and len(long) > 8
     # Three elements a leg are too coarse for that to matter.
     assert len(measure(turn("0.1,0.3", "elements = [3, 3]"))[1]) == 3
+
+
+@pytest.mark.parametrize(("last", "refined"), [
+    ("[[1, 1], [0, 1], [0, 0]]", False), ("[[1, 1], [0, 1], [0, 0.5]]", True),
+])  # fmt: skip
+def test_corners_of_rings_are_ordinary_ones(last: str, refined: bool) -> None:
+    """No tip is near whose stress-intensity factor would need more; a crack with ends has corners that do."""
+    text = f"""
+materials.rock = {{ young = 1.0, poisson = 0.2 }}
+curves.one = {{ points = [[0, 0], [1, 0], [1, 1]], elements = 16 }}
+curves.other = {{ points = {last}, elements = 16 }}
+regions.plane = {{ material = "rock", infinite = true, cracks = ["one", "other"] }}
+remote = {{ syy = -1.0 }}
+"""
+    assert (generate_mesh(parse_model(text)[1]).elements > 40) == refined

@@ -145,7 +145,8 @@ def test_a_block_that_touches_nothing_is_free(
     text = write_plane({"a": SQUARE}, order=order, at=at, scale=scale, stress=stress, law=law, remote=remote)
     with pytest.raises(ConvergenceError, match="is held by nothing") as caught:
         run(text, tmp_path)
-    middle = at + scale * np.mean(SQUARE)
+    sides = np.array([SQUARE[k - 1:k] + SQUARE[k:k + 1] if k else [SQUARE[-1], SQUARE[0]] for k in range(len(SQUARE))])
+    middle = at + scale * np.average(sides.mean(axis=1), weights=np.abs(np.diff(sides, axis=1)[:, 0]))
     assert caught.value.reason == "free motion"
     assert f"block near ({middle.real:.4g}, {middle.imag:.4g}) is held by nothing" in str(caught.value)
 

@@ -389,7 +389,7 @@ def test_wrong_arguments_are_refused(folder: Path, values: Any, quantities: Any)
 
 
 def test_no_values_are_said_as_a_program_gives_them(folder: Path) -> None:
-    with pytest.raises(CaseError, match="values: found nothing; expected what is to be varied") as caught:
+    with pytest.raises(CaseError, match="values: found nothing; expected values to vary") as caught:
         pbem.sweep("blocks.toml", {})
     assert "--set" not in str(caught.value)
 

@@ -113,7 +113,7 @@ def test_a_run_that_never_settles_ends_with_its_reason_and_the_last_mesh(
     seen = _fail_first(monkeypatch, 100)
     case = tmp_path / "blocks.toml"
     case.write_text(BLOCKS)
-    with pytest.raises(ConvergenceError, match=r"still change; elements beside .* halved 3 times already"):
+    with pytest.raises(ConvergenceError, match=r"still change; elements near .* halved 3 times already"):
         pbem.run(case, tmp_path / "blocks.h5")
     assert len(seen) == 1 + MOST_TRIES and sorted(set(seen)) == seen
     results = pbem.open_results(tmp_path / "blocks.h5")

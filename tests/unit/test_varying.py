@@ -110,7 +110,7 @@ def test_a_moment_of_a_stage() -> None:
 FAULTS = {
     "boundary.top.ty": ('{ expression = "x +" }', "breaks off"),
     "boundary.left.tx": ('{ expression = "1/y" }', "no finite value at (0, 0) on curve 'left'"),
-    "boundary.right.tx": ("{ table = [[0, 1], [0, 2]] }", "s rises"),
+    "boundary.right.tx": ("{ table = [[0, 1], [0, 2]] }", "s increases from row to row"),
     "boundary.right.pressure": ("{ table = [[0, 1]] }", "{ table = [[s, value], ...] }"),
     "interfaces.crack.friction": ('{ expression = "x - 1" }', "a friction that is -0.5 at (0.5, 0.5)"),
     "interfaces.crack.cohesion": ('{ expression = "t" }', "unknown name 't'"),

@@ -7,7 +7,7 @@ import numpy as np
 from pbem.contact.laws import SLIP
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
-from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, Search
+from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, LONG, Search
 from tests.unit.test_laws import make_modes
 
 COUNT = 100
@@ -75,6 +75,13 @@ def test_a_group_that_grows_too_large_is_left_for_its_latest_pairs() -> None:
     assert follow(search, [0], [1], [2], [3, 4], [5, 6])[-2:] == [[2, 3, 4], [3, 4, 5, 6]]
     assert follow(search, [7, 8, 9]) == [[7, 8, 9]]
     assert follow(search, [10, 11, 12, 13, 14]) == [[]]
+
+
+def test_groups_may_cost_more_where_changes_no_longer_fall() -> None:
+    search, turns = Search(4), ([1, 2, 3, 4, 5], [4, 5, 6, 7, 8])
+    groups = follow(search, *(turns[k % 2] for k in range(2 * LONG + 1)))
+    assert all(len(group) <= 4 for group in groups[: 2 * LONG - 1])
+    assert groups[-1] == [1, 2, 3, 4, 5, 6, 7, 8]
 
 
 def test_the_full_tangent_comes_back_once_no_mode_changes_under_a_frozen_bound() -> None:

@@ -63,6 +63,8 @@ PLAIN, PLAIN_IF_LOOSE = 3, 6
 PLAIN_FROM_SMOOTHED = 1
 # Failed groups of more pairs than this are tried again after one iteration more, then three more, seven, ...
 COSTLY = 60
+# Pairs of a group at most where changes no longer fall, even if every pair costs a solution of the whole model.
+MOST_IF_STUCK = 60
 # Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
 FUTILE = 6
 # Where a group fails, all pairs of models with so few are pivoted at once; of those with so many at the end of all.
@@ -189,10 +191,12 @@ class Search:
             return nothing
         if not len(self.group) and self.counts[-1] <= SLOW * min(self.counts[:-1]):
             return nothing
+        # Groups that cost much are still cheaper than iterations that lead nowhere.
+        most = self.most_pivoted if not self.is_stuck() else max(self.most_pivoted, MOST_IF_STUCK)
         lately = np.unique(np.concatenate(self.changed[-2:]))
         whole = np.union1d(self.group, lately)
         for group in (np.union1d(whole, self._find_neighbours(self.changed[-1])), whole, lately, self.changed[-1]):
-            if len(group) <= self.most_pivoted:
+            if len(group) <= most:
                 self.group = group
                 return group
         return nothing

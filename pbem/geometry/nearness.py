@@ -195,7 +195,8 @@ def _find_meetings(
                     around |= {(one, one_end): None, (other, other_end): None}
         of_cracks = all(leg in cracks for leg, _, _ in ends)
         branching = len(ends) == 3 == len(widest) and of_cracks
-        turning = len(ends) == 2 and len(widest) == 1 and ends[0][0] in of_tips and widest[0][0] < math.pi - KINK
+        turning = len(ends) == 2 and len(widest) == 1 and of_cracks and widest[0][0] < math.pi - KINK
+        turning = turning and ends[0][0] in of_tips
         if found or branching or turning:
             angle, one, other = min(found or widest)
             every = branching or turning

@@ -119,7 +119,7 @@ def move_until_closed(opening: Real, rates: Real, power: Real, size: float, roug
 
 def _move(opening: Real, rates: Real, power: Real, most: float, stopped: bool = True) -> Real | None:
     # The programme's tolerances are absolute: lengths are counted in the largest opening, whatever their units.
-    unit = float(opening.max(initial=0.0)) or most
+    unit = float(opening.max(initial=0.0)) or most or 1.0
     bounds = [(-most / unit, most / unit)] * len(power)
     found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening / unit, bounds=bounds)
     if found.status != 0 or (stopped and -found.fun > 0.1 * most / unit):

@@ -31,3 +31,8 @@ def test_what_nothing_stops_is_told_and_friction_stops_it_where_it_touches(size:
     moved = move_until_closed(opening, rates, power, size, np.ones(2, dtype=bool))
     assert moved is not None
     np.testing.assert_allclose(moved, size * np.array([0.0, 1e-3]), atol=1e-9 * size)
+
+
+def test_what_lies_flat_on_another_body_is_there_already() -> None:
+    moved = move_until_closed(np.zeros(3), np.zeros((3, 1)), np.array([1.0]), 1.0, np.ones(3, dtype=bool))
+    assert moved is not None and not moved.any()

@@ -173,11 +173,12 @@ class Hold:
         overloaded = np.flatnonzero((before.mode == STICK) & (modes.mode == SLIP))
         return np.intersect1d(overloaded, self.pairs)
 
-    def excuse(self, modes: ModeState, state: PairState, proposal: Proposal) -> Proposal:
+    def excuse(self, modes: ModeState, state: PairState, proposal: Proposal, pressure: Real) -> Proposal:
         """The proposal, without a change where only a pair that holds a body is overloaded and by next to nothing,
-        after its neighbours were found to be so too (see BEYOND). On the first rank, which knows what holds a body."""
+        after its neighbours were found to be so too (see BEYOND), or where those of a body that rolled pull by next to
+        nothing. pressure (m,): of fluid. On the first rank, which knows what holds a body."""
         at = np.flatnonzero(proposal.changed)
-        if self.rolls and self._rests(modes, state, proposal):
+        if self.rolls and self._rests(modes, state.p_n + pressure, proposal):
             return Proposal(modes, np.zeros_like(proposal.violation))
         if self.count < TRIED or len(at) != 1 or at[0] not in self.pairs:
             return proposal
@@ -186,13 +187,14 @@ class Hold:
             return proposal
         return Proposal(modes, np.zeros_like(proposal.violation))
 
-    def _rests(self, modes: ModeState, state: PairState, proposal: Proposal) -> bool:
+    def _rests(self, modes: ModeState, carried: Real, proposal: Proposal) -> bool:
         """Whether nothing changes but that pairs open which pull by next to nothing, and without which a body would be
         free: a round one that rests on a pair, and rolled until it touches another one."""
         opens = proposal.changed & (modes.mode != OPEN) & (proposal.modes.mode == OPEN)
         if not opens.any() or (opens != proposal.changed).any() or not self.find_free(proposal.modes):
             return False
-        return bool(state.p_n[opens].max() <= SLIGHT * np.abs(state.p_n).max())
+        bodies = (modes.mode != OPEN) & ~self.problem.mesh.pairs.crack
+        return bool(carried[opens].max() <= SLIGHT * np.abs(carried[bodies]).max(initial=0.0))
 
     def _stick(
         self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]

@@ -206,7 +206,10 @@ def _search_modes(
             continue
         if smoothing.begins(search.counts, pairs):
             search.go_on_from_smoothed()
-            modes, pairs = smoothing.find(tangent, hold, forcing, modes, record)
+            try:
+                modes, pairs = smoothing.find(tangent, hold, forcing, modes, record)
+            except ConvergenceError:  # the true laws may have what smoothed ones have not
+                continue
             normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
             modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped)))
@@ -354,7 +357,7 @@ def _judge(
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
         floor = _find_floor(problem, solved)
         proposal = _make_judge(problem, solved, globalisation)(laws, modes, pairs, memory, load.pressure)
-        proposal = hold.excuse(modes, pairs, proposal)
+        proposal = hold.excuse(modes, pairs, proposal, load.pressure)
         law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
         failing = find_failures(laws, pairs, memory, load.pressure, floor)
         settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance

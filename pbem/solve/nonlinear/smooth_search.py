@@ -74,7 +74,9 @@ class SmoothSearch:
         problem, memory, load, state = self._problem, self._memory, self._load, self._first
         assert state is not None
         holding, quiet, least = stick_all(problem.laws, modes), 0, np.inf
-        width = float(max(np.abs(state.p_n).max(), np.abs(state.p_s).max()))
+        width = float(max(np.abs(state.p_n + load.pressure).max(), np.abs(state.p_s).max()))
+        if not 0 < width < np.inf:
+            return modes, state
         for _ in range(LONGEST):
             begin = time.perf_counter()
             law = linearise_smoothly(

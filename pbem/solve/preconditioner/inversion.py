@@ -28,12 +28,12 @@ def invert_rows(matrix: Real, wanted: Real, form: Callable[[], Real]) -> tuple[R
     """
     size, found = float(np.abs(matrix).sum(axis=1).max(initial=0.0)), 0
     left, right = np.zeros((len(matrix), 0)), np.zeros((len(matrix), 0))
-    for _ in range(MOST_ROUNDS if size else 0):
+    for left_over in reversed(range(MOST_ROUNDS if size else 0)):
         # The transposed matrix is factorised where it is: of large groups every copy is tens of megabytes.
         factors, pivots, _ = lapack.dgetrf(matrix.T, overwrite_a=True)
         if lapack.dgecon(factors, size)[0] > SINGULAR:
             return np.asarray(lapack.dgetrs(factors, pivots, wanted.T, overwrite_b=True)[0].T), found
-        if not np.isfinite(factors).all():
+        if not left_over or not np.isfinite(factors).all():
             break
         more = _find_singular(factors, pivots, size)
         left, right = np.hstack([left, more[0]]), np.hstack([right, more[1]])

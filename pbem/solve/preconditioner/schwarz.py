@@ -70,7 +70,7 @@ class SchwarzPreconditioner:
         self._formed: sparse.csr_matrix | None = None
         self._widening = 1
         self._less: Elimination | None = None
-        self.singular = 0  # groups without an inverse, of those formed last
+        self.singular = 0  # groups whose matrix was singular, of those formed last
         self.most_drift = 0.0  # inverses serve until the constraint map has changed by more than this part
         self.inverses = [self._place(group) for group in groups]
 

@@ -128,14 +128,15 @@ def solve_stiffly(text: str, factor: float, most_pivoted: int) -> Solved | str:
 
     most_pivoted: pairs; with 0 the search makes plain Newton steps only.
     """
-    usual = laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS
+    usual = laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS, search.MOST_IF_STUCK
     laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS = factor * usual[0], most_pivoted, usual[2][:1]
+    search.MOST_IF_STUCK = min(most_pivoted, search.MOST_IF_STUCK)
     try:
         return solve_model(parse_model(text)[1])
     except ConvergenceError as error:
         return error.reason
     finally:
-        laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS = usual
+        laws.SOFTNESS, tangent.MOST_SETTLED, search.GLOBALISATIONS, search.MOST_IF_STUCK = usual
 
 
 def stiff_trials(factor: float) -> Outcome:

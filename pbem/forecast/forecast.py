@@ -23,9 +23,10 @@ from pbem.forecast.usual import (
     list_memory,
     list_overhead,
     list_seconds,
+    measure_beside,
     measure_size,
 )
-from pbem.forecast.work import count_work
+from pbem.forecast.work import Work, count_work
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -40,7 +41,7 @@ class Forecast:
     memory: bytes of all ranks together, by what they are for; rank_memory: of the rank that has most. seconds: of wall
     time on a core for each rank, by piece; disk: bytes of the result file. passes: whether `analysis.accuracy` asks for
     further solutions on finer meshes, which are not forecast. speed: None where it was not measured, and there are no
-    seconds. cores: of the machine at hand, None where they were not counted.
+    seconds. cores_here: of the machine at hand, None where they were not counted.
     """
 
     ranks: int
@@ -52,12 +53,12 @@ class Forecast:
     disk: float
     passes: bool
     speed: Speed | None = None
-    cores: float | None = None
+    cores_here: float | None = None
 
     @property
     def turns(self) -> float:
         """Ranks that share a core of the machine at hand; 1 where each has one, or may have one elsewhere."""
-        return max(1.0, self.ranks / self.cores) if self.cores else 1.0
+        return max(1.0, self.ranks / self.cores_here) if self.cores_here else 1.0
 
     @property
     def whole_memory(self) -> float:
@@ -69,7 +70,7 @@ class Forecast:
         return {
             "ranks": self.ranks, "unknowns": self.unknowns, "operator": self.operator, "memory": self.whole_memory,
             "memory_by_use": self.memory, "rank_memory": self.rank_memory, "seconds": sum(self.seconds.values()),
-            "cores": self.ranks, "cores_here": self.cores, "seconds_here": self.turns * sum(self.seconds.values()),
+            "cores": self.ranks, "cores_here": self.cores_here, "seconds_here": self.turns * sum(self.seconds.values()),
             "seconds_by_piece": self.seconds, "disk": self.disk, "first_pass_only": self.passes,
         }  # fmt: skip
 
@@ -103,15 +104,14 @@ def make_forecast(
             seconds["estimate"] += sum(list_seconds(second, size, ranks, speed, settled).values())
     return Forecast(
         ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
-        memory=memory, rank_memory=_find_largest(memory, ranks), seconds=seconds, disk=count_disk(model, mesh),
-        passes=model.analysis.accuracy is not None, speed=speed, cores=cores,
+        memory=memory, rank_memory=_find_largest(memory, ranks, work), seconds=seconds, disk=count_disk(model, mesh),
+        passes=model.analysis.accuracy is not None, speed=speed, cores_here=cores,
     )  # fmt: skip
 
 
-def _find_largest(memory: dict[str, float], ranks: int) -> float:
+def _find_largest(memory: dict[str, float], ranks: int, work: Work) -> float:
     """Bytes of the rank that has most."""
-    beside = memory.get(BESIDE, 0.0)
-    return (sum(memory.values()) - beside) / ranks + beside
+    return (sum(memory.values()) - memory.get(BESIDE, 0.0)) / ranks + measure_beside(work)
 
 
 # Bytes for each squared unknown of the dense operator, and for each unknown of the hierarchical one, that no run takes.

@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from pbem.arrays import Integer
+from pbem.bem.group_sizes import (
+    BODY_ELEMENTS,
+    BODY_SHARE,
+    GROUP_ELEMENTS,
+    MOST_LEFT_OF_BODIES,
+    MOST_TIMES,
+    NEIGHBOUR_SHARE,
+    NEIGHBOUR_UNKNOWNS,
+    join_elements,
+)
 from pbem.mesh.mesh import Mesh
 
-# See pbem.solve.preconditioner: what is connected and more than so many elements is divided into groups of bodies'
-# elements, and has so many times as many around it, with so many unknowns in all, or so many times the group's own.
-GROUP_ELEMENTS, BODY_ELEMENTS, BODY_SHARE, MOST_LEFT, MOST_TIMES = 48, 192, 3.0, 1700, 2.0
-# Others have so many unknowns around them, or so many times their own.
-NEIGHBOUR_UNKNOWNS, NEIGHBOUR_SHARE = 100, 0.5
 # Unknowns that are left of a node of a body, and as a rule of one of a crack: its traction is eliminated.
 LEFT, LEFT_OF_CRACK = 2.0, 1.2
 
@@ -46,7 +49,7 @@ def count_groups(mesh: Mesh) -> Groups:
         own = LEFT * width * elements
         each = width * (LEFT_OF_CRACK * crack + LEFT * (1 - crack))  # unknowns left of an element around
         if size > GROUP_ELEMENTS:
-            room = max(MOST_LEFT, MOST_TIMES * own) - own
+            room = max(MOST_LEFT_OF_BODIES, MOST_TIMES * own) - own
             around = min(BODY_SHARE * elements, room / each, float(mesh.elements) - elements)
         else:
             around = min(max(NEIGHBOUR_UNKNOWNS, NEIGHBOUR_SHARE * own) / each, float(mesh.elements) - elements)
@@ -63,16 +66,6 @@ def count_groups(mesh: Mesh) -> Groups:
 
 
 def _list_sizes(mesh: Mesh) -> Integer:
-    """Elements of each set of bodies' elements that have ends in common or face each other."""
+    """Elements (s,) of each set of bodies' elements that have ends in common or face each other."""
     own = np.flatnonzero(~mesh.crack)
-    points, at = np.unique(np.concatenate([mesh.start[own], mesh.end[own]]), return_inverse=True)
-    pairs, element = mesh.pairs, mesh.node_element
-    facing = ~pairs.crack
-    size = mesh.elements + len(points)
-    joined = (
-        np.concatenate([np.tile(own, 2), element[pairs.first[facing]]]),
-        np.concatenate([mesh.elements + at.ravel(), element[pairs.second[facing]]]),
-    )
-    meeting = (np.ones(len(joined[0])), joined)
-    _, label = csgraph.connected_components(sparse.coo_matrix(meeting, shape=(size, size)), directed=False)
-    return np.unique(label[own], return_counts=True)[1]
+    return np.unique(join_elements(mesh, own)[own], return_counts=True)[1]

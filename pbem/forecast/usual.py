@@ -126,7 +126,7 @@ def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:
 def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, float]:
     """Bytes over all ranks by use, without the processes themselves; part: of the pairs, see Changes. steps: of load.
 
-    BESIDE is what one rank has, the first or one that forms a group, but not at once.
+    BESIDE is what the first rank has, or the ranks that form groups, but not at once; see `measure_beside`.
     """
     sparse = SPARSE_FACTORS if ranks == 1 else SPARSE_FACTORS_SHARED
     if work.hierarchical and work.sparse:
@@ -136,10 +136,10 @@ def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, fl
     if work.hierarchical:
         near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
         everywhere = EVERYWHERE_FAR if steps == 1 else EVERYWHERE_FAR_STEPS
-        groups = 8 * work.groups.largest * min(ranks, work.groups.count)
+        at_once = min(ranks, work.groups.count) * 8 * work.groups.largest
         return {"operator": 8 * near * work.entries, "preconditioner": 8 * (inverses + work.groups.kept),
                 "mesh and vectors": everywhere * ranks * work.unknowns,
-                BESIDE: max(FIRST + FIRST_UNKNOWN * work.unknowns, groups)}
+                BESIDE: max(FIRST + FIRST_UNKNOWN * work.unknowns, at_once)}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
     factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
     copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
@@ -150,6 +150,11 @@ def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, fl
         "columns at a time": 8 * min(AT_ONCE, work.unknowns / 2) * copies * work.unknowns * ranks**SHARED,
         "mesh and vectors": EVERYWHERE * ranks * work.unknowns,
     }  # fmt: skip
+
+
+def measure_beside(work: Work) -> float:
+    """Bytes that one rank has at most of what `list_memory` calls BESIDE; none with the dense operator."""
+    return max(FIRST + FIRST_UNKNOWN * work.unknowns, 8 * work.groups.largest) if work.hierarchical else 0.0
 
 
 def list_seconds(work: Work, size: Size, ranks: int, speed: Speed, changes: Changes) -> dict[str, float]:

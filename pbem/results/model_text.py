@@ -269,7 +269,7 @@ def _tell_turns(forecast: Forecast) -> str:
     if forecast.turns == 1.0:
         return ""
     seconds = format_seconds(forecast.turns * sum(forecast.seconds.values()))
-    return f", or {seconds} on the {forecast.cores:g} cores here, on which the ranks take turns"
+    return f", or {seconds} on the {forecast.cores_here:g} cores here, on which the ranks take turns"
 
 
 def format_seconds(seconds: float) -> str:

@@ -14,11 +14,10 @@ from pbem.case.build import parse_model
 from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import OPEN, SLIP, ModeState, collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
-from pbem.forecast import groups as counted
 from pbem.forecast.disk import count_disk, count_stored_steps
 from pbem.forecast.forecast import make_forecast
 from pbem.forecast.groups import count_groups
-from pbem.forecast.usual import BESIDE, FIRST, FIRST_UNKNOWN, expect_changes, list_memory
+from pbem.forecast.usual import BESIDE, FIRST, FIRST_UNKNOWN, expect_changes, list_memory, measure_beside
 from pbem.forecast.work import _eliminate, _make_blocks, count_work
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -26,7 +25,6 @@ from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.results.model_text import describe_forecast
 from pbem.solve.estimate.coarser_mesh import put_beside
-from pbem.solve.preconditioner import schwarz, subdomains
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.tangent.krylov import KrylovTangent
 from scripts.bench_connected import write_layers
@@ -212,12 +210,10 @@ def test_memory_of_groups_of_bodies_is_that_while_they_are_formed() -> None:
     assert work.groups == groups
     one, four = (list_memory(work, ranks, 0.0, 1)[BESIDE] for ranks in (1, 4))
     assert one == four == max(8 * groups.largest, FIRST + FIRST_UNKNOWN * work.unknowns)
-
-
-def test_sizes_of_groups_are_those_of_the_preconditioner() -> None:
-    for name in ("GROUP_ELEMENTS", "BODY_ELEMENTS", "BODY_SHARE", "NEIGHBOUR_UNKNOWNS", "NEIGHBOUR_SHARE"):
-        assert getattr(counted, name) == getattr(subdomains, name)
-    assert (counted.MOST_LEFT, counted.MOST_TIMES) == (schwarz.MOST_LEFT_OF_BODIES, schwarz.MOST_TIMES)
+    # Of several groups each rank forms one at a time, whatever the others do.
+    several = replace(work, groups=replace(groups, count=3, largest=1e9))
+    assert measure_beside(several) == 8e9
+    assert [list_memory(several, ranks, 0.0, 1)[BESIDE] for ranks in (1, 2, 4)] == [8e9, 16e9, 24e9]
 
 
 def test_ranks_without_cores_take_turns() -> None:

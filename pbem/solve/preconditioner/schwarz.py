@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
+from pbem.bem.group_sizes import MOST_LEFT_OF_BODIES, MOST_TIMES
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
@@ -29,9 +30,8 @@ from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
 
 Single = NDArray[np.float32]
 
-# Unknowns that are left in the matrix of a group and the nearest elements around it, at most, of cracks and of bodies;
-# or so many times those of the group alone.
-MOST_LEFT, MOST_LEFT_OF_BODIES, MOST_TIMES = 900, 1700, 2.0
+# Unknowns that are left in the matrix of a group of cracks and the nearest elements around it, at most.
+MOST_LEFT = 900
 # Models with so many unknowns keep the inverses of groups in single precision.
 SINGLE = 20_000
 
@@ -141,7 +141,7 @@ class SchwarzPreconditioner:
                 seen = (single if inverse.matrix.dtype == np.float32 else turned / size)[inverse.seen]
                 result[inverse.own[inverse.solved]] += size * (inverse.matrix @ seen)
             else:
-                # A group that nothing holds without the rest of the model: its residual serves as it is.
+                # A group without an inverse, as of a matrix that overflows: its residual serves as it is.
                 result[inverse.own] = residual[inverse.around[inverse.inside]]
 
     def turn(self, residual: Real) -> Real:

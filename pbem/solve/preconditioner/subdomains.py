@@ -5,34 +5,33 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.group_sizes import (
+    BODY_ELEMENTS,
+    BODY_SHARE,
+    GROUP_ELEMENTS,
+    NEIGHBOUR_SHARE,
+    NEIGHBOUR_UNKNOWNS,
+    join_elements,
+)
 from pbem.bem.tree import build_forest
 from pbem.mesh.mesh import Mesh
 from pbem.parallel import share_nodes
 
 # A model of so few unknowns is one group, whose matrix is the whole tangent operator.
 ONE_GROUP = 1500
-# Elements of a group at most; both sides of an interface count.
-GROUP_ELEMENTS = 48
 # What is connected - cracks that meet, the boundary of a body, bodies in contact, faces of a slit - and is more than
 # a group is divided by place, not by curve: blocks between cracks and slices of thin bodies move as a whole, whatever
 # curves their boundaries are cut into. Such groups have so many elements at most, and around them the nearest elements,
 # so many times as many, whichever group those belong to.
 CONNECTED_ELEMENTS = 128
 NEAREST_SHARE = 2.0
-# The same of bodies, of whose unknowns none are eliminated, and through which forces go from one end to the other.
-BODY_ELEMENTS = 192
-BODY_SHARE = 3.0
 # Candidates for the nearest, as a multiple of those taken.
 CANDIDATES = 3
-# Groups around a group are taken until they have so many unknowns together, or so many times those of the group. One
-# that has an end point in common with others, like a piece of a longer boundary, always takes these, and more of them.
-NEIGHBOUR_UNKNOWNS = 100
-NEIGHBOUR_SHARE = 0.5
+# A group that has an end point in common with others, like a piece of a longer boundary, always takes these, and more
+# of them.
 TOUCHING_SHARE = 4.0
 MOST_NEIGHBOURS = 24
 # A group and those around it have so many unknowns at most, but for the groups that touch it: factors of more would
@@ -80,32 +79,16 @@ def connect_elements(mesh: Mesh) -> tuple[Integer, Bool]:
 
     Elements are connected that have an end in common, or face each other in a contact.
     """
-    sets = _connect(mesh, np.arange(mesh.elements))
+    sets = join_elements(mesh, np.arange(mesh.elements))
     return sets, np.bincount(sets, minlength=mesh.elements) > GROUP_ELEMENTS
 
 
 def do_cracks_meet(mesh: Mesh) -> bool:
     """Whether any cracks have an end in common."""
     own = np.flatnonzero(mesh.crack)
-    sets = _connect(mesh, own)[own]
+    sets = join_elements(mesh, own)[own]
     curve_of_set = np.unique(np.stack([sets, mesh.curve[own]]), axis=1)
     return bool(len(curve_of_set[0]) > len(np.unique(sets)))
-
-
-def _connect(mesh: Mesh, own: Integer) -> Integer:
-    """Of every element the number of the first one of its set, where some of them (k,) are connected."""
-    points, at = np.unique(np.concatenate([mesh.start[own], mesh.end[own]]), return_inverse=True)
-    pairs, element = mesh.pairs, mesh.node_element
-    facing = ~pairs.crack
-    size = mesh.elements + len(points)
-    joined = (
-        np.concatenate([np.tile(own, 2), element[pairs.first[facing]]]),
-        np.concatenate([mesh.elements + at.ravel(), element[pairs.second[facing]]]),
-    )
-    meeting = (np.ones(len(joined[0])), joined)
-    _, label = csgraph.connected_components(sparse.coo_matrix(meeting, shape=(size, size)), directed=False)
-    _, first, inverse = np.unique(label[: mesh.elements], return_index=True, return_inverse=True)
-    return np.asarray(first[inverse.ravel()])
 
 
 def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tuple[int, int]:

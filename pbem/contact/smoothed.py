@@ -24,6 +24,7 @@ from pbem.contact.laws import (
     find_linear,
     follow_leaders,
     plastic_slip,
+    resists_slip,
     tensile_limit,
 )
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
@@ -43,9 +44,13 @@ def find_smooth(laws: PairLaws, memory: Memory, pressure: Real) -> Bool:
     return np.asarray(plain & ~laws.bonded & ~laws.parted & ~laws.follows)
 
 
-def stick_all(laws: PairLaws, modes: ModeState) -> ModeState:
-    """Modes in which all pairs stick that can touch: a smoothed contact holds what they hold."""
-    return ModeState(np.where(laws.parted, OPEN, STICK).astype(np.int8), modes.sign)
+def close_all(laws: PairLaws, modes: ModeState) -> ModeState:
+    """Modes in which all pairs are closed that can touch: a smoothed contact holds what they hold.
+
+    Without friction it holds nothing along the faces.
+    """
+    closed = np.where(resists_slip(laws) | laws.bonded, STICK, SLIP)
+    return ModeState(np.where(laws.parted, OPEN, closed).astype(np.int8), modes.sign)
 
 
 def linearise_smoothly(
@@ -78,7 +83,7 @@ def linearise_smoothly(
     for compliance, traction, jump in ((laws.compliance_n, P_N, G_N), (laws.compliance_s, P_S, G_S)):
         tangent[:, jump] += compliance[:, None] * tangent[:, traction]
         offset[:, jump] += compliance * offset[:, traction]
-    sticking = stick_all(laws, ModeState(np.zeros(laws.count, dtype=np.int8), np.ones(laws.count)))
+    sticking = close_all(laws, ModeState(np.zeros(laws.count, dtype=np.int8), np.ones(laws.count)))
     other = linearise(laws, sticking, state.p_n, memory.slip, memory, pressure, scale)
     return Linearisation(
         np.where(smooth[:, None, None], tangent, other.tangent), np.where(smooth[:, None], offset, other.offset),
@@ -92,7 +97,8 @@ def read_modes(
     """The modes that the trial values of smoothed pairs are in: those of the true laws, once the width is small."""
     x, y = _try(laws, state, memory, pressure)
     bound = _find_bound(laws, np.maximum(x, 0.0), memory, pressure).bound
-    mode = np.where(smooth & (x < 0), OPEN, np.where(smooth & (np.abs(y) > bound), SLIP, STICK))
+    slips = (np.abs(y) > bound) | ~resists_slip(laws)
+    mode = np.where(smooth & (x < 0), OPEN, np.where(smooth & slips, SLIP, STICK))
     mode = np.where(laws.parted, OPEN, mode).astype(np.int8)
     return follow_leaders(laws, ModeState(mode, np.where(y < 0, -1.0, 1.0)))
 

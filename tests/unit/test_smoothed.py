@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip
 from pbem.contact.modes import Linearisation, linearise
-from pbem.contact.smoothed import find_smooth, linearise_smoothly, read_modes
+from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, read_modes
 from pbem.solve.nonlinear import smooth_search
 from pbem.solve.nonlinear.smooth_search import FIRST, LEAST, SmoothSearch
 from tests.unit.test_laws import make_laws, remember
@@ -72,6 +72,17 @@ def test_pairs_without_friction_bear_no_shear() -> None:
     state, _ = converge(laws, memory, pressure, 2, WIDTH)
     np.testing.assert_allclose(state.p_s, 0.0, atol=1e-12)
     assert np.abs(state.g_s).max() > 0.1
+
+
+@pytest.mark.parametrize(("friction", "mode"), [(0.0, SLIP), (0.6, STICK)])
+def test_closed_pairs_hold_the_faces_along_each_other_by_friction_alone(friction: float, mode: int) -> None:
+    laws, memory, pressure = make_case(friction)
+    modes = ModeState(np.full(COUNT, OPEN, dtype=np.int8), np.ones(COUNT))
+    assert (close_all(laws, modes).mode == mode).all()
+    # At rest, where nothing acts along the faces.
+    at_rest = PairState(-pressure - 1.0, np.zeros(COUNT), np.zeros(COUNT), memory.slip)
+    found = read_modes(laws, np.ones(COUNT, dtype=bool), at_rest, memory, pressure)
+    assert (found.mode == mode).all()
 
 
 def test_the_limit_is_the_true_law() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
-from pbem.contact.smoothed import find_smooth, linearise_smoothly, read_modes, stick_all
+from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, read_modes
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
@@ -28,7 +28,7 @@ from pbem.solve.problem.tangent import TangentOperator
 FIRST = 4
 # ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer.
 MANY, LEAST = 0.03, 60
-# The width begins with the largest traction, and each is this part of the one before.
+# The width begins with the largest contact traction, and each is this part of the one before.
 NARROWER = 0.3
 # It ends after so many iterations, or so many in turn in which no more than this part of all pairs change.
 LONGEST, ENOUGH, FEW = 12, 2, 1e-3
@@ -73,7 +73,7 @@ class SmoothSearch:
         """
         problem, memory, load, state = self._problem, self._memory, self._load, self._first
         assert state is not None
-        holding, quiet, least = stick_all(problem.laws, modes), 0, np.inf
+        holding, quiet, least = close_all(problem.laws, modes), 0, np.inf
         width = float(max(np.abs(state.p_n + load.pressure).max(), np.abs(state.p_s).max()))
         if not 0 < width < np.inf:
             return modes, state

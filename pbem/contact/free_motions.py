@@ -128,6 +128,13 @@ def _list_velocities(mesh: Mesh, motions: Sequence[RigidBodyMode]) -> Complex:
 CLOSED_AT_LEAST = 3
 
 
+def find_contacts_of(mesh: Mesh, motions: Sequence[RigidBodyMode]) -> Bool:
+    """Pairs (m,), not those of cracks, of the regions that move in rigid motions."""
+    moving = {name for motion in motions for name in motion.velocities}
+    own, pairs = np.array([name in moving for name in mesh.region_names])[mesh.node_region], mesh.pairs
+    return np.asarray((own[pairs.first] | own[pairs.second]) & ~pairs.crack)
+
+
 def close_nearest_pairs(
     mesh: Mesh, laws: PairLaws, modes: ModeState, opening: Real, least: int = CLOSED_AT_LEAST,
     left: Bool | None = None,

@@ -16,6 +16,7 @@ from pbem.contact.free_motions import (
     FreeMotions,
     close_nearest_beside,
     close_nearest_pairs,
+    find_contacts_of,
     stick_calmest_pairs,
 )
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, resists_slip
@@ -126,8 +127,7 @@ class Hold:
         left = None
         if before is not None:
             self._note_sense(before)
-        if before is not None and self.rolls:
-            modes, left = self._roll(modes, before)
+            modes, left = self._roll(modes, before) if self.rolls else (modes, None)
         # No more than hold it: a third pair beside the two on which a round body lies would pull at it.
         for least in range(2, CLOSED_AT_LEAST + 1):
             closed = close_nearest_pairs(mesh, laws, modes, opening, least, left)
@@ -151,11 +151,11 @@ class Hold:
         the sense in which they were dragged when they stuck, as two that stick pull at each other.
         """
         pairs, count = self.problem.mesh.pairs, len(self.problem.mesh.interface_names)
-        closed = modes.mode != OPEN
-        alone = closed & (np.bincount(pairs.interface[closed], minlength=count) == 1)[pairs.interface] & ~pairs.crack
+        closed, rolls = modes.mode != OPEN, find_contacts_of(self.problem.mesh, self.list_free(modes))
+        alone = closed & (np.bincount(pairs.interface[closed], minlength=count) == 1)[pairs.interface] & rolls
         sticks = alone & resists_slip(self.problem.laws)
         mode = np.where(sticks, STICK, modes.mode).astype(np.int8)
-        sign = np.where(~closed & (self.sense != 0), self.sense, modes.sign)
+        sign = np.where(~closed & rolls & (self.sense != 0), self.sense, modes.sign)
         held = np.bincount(pairs.interface[sticks & (before.mode == STICK)], minlength=count) > 0
         return ModeState(mode, sign), np.asarray((before.mode != OPEN) & ~closed & held[pairs.interface])
 
@@ -193,8 +193,8 @@ class Hold:
         opens = proposal.changed & (modes.mode != OPEN) & (proposal.modes.mode == OPEN)
         if not opens.any() or (opens != proposal.changed).any() or not self.find_free(proposal.modes):
             return False
-        bodies = (modes.mode != OPEN) & ~self.problem.mesh.pairs.crack
-        return bool(carried[opens].max() <= SLIGHT * np.abs(carried[bodies]).max(initial=0.0))
+        of_body = (modes.mode != OPEN) & find_contacts_of(self.problem.mesh, self.list_free(proposal.modes))
+        return bool(carried[opens].max() <= SLIGHT * np.abs(carried[of_body]).max(initial=0.0))
 
     def _stick(
         self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]

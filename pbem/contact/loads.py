@@ -188,6 +188,8 @@ def evaluate_walls(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
     moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
     for name, wall in model.stages[stage].walls.items():
         at = np.flatnonzero(mesh.pairs.interface == mesh.interface_names.index(name))
+        if not len(at):
+            continue
         places = Places(mesh.pairs.position[at] + model.origin, mesh.pairs.arc_length[at])
         pairs = zip(before.get(name, Wall(wall.frame)).values, wall.values, strict=True)
         first, second = (blend(old, new, places, moment) for old, new in pairs)

@@ -27,6 +27,8 @@ FARTHEST = 10.0
 CLOSED = 1e-6
 # Where friction has to stop a body it moves so many times the least opening.
 BEYOND = 2.0
+# Openings are known to this part of the model's size.
+ROUNDED = 1e-14
 
 
 def find_closing(model: Model) -> frozenset[str]:
@@ -108,6 +110,8 @@ def find_rates(
 def move_until_closed(opening: Real, rates: Real, power: Real, size: float, rough: Bool) -> Real | None:
     """Openings (k,) after the motion that the loads take; None if nothing stops it. rough (k,): places with friction,
     which may stop what would slide on along them."""
+    # Openings of rounding are none.
+    opening = np.where(opening > ROUNDED * size, opening, 0.0)
     moved = _move(opening, rates, power, FARTHEST * size)
     if moved is None and rough.any():
         # Not much further than it takes to get there.

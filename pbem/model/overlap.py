@@ -54,13 +54,14 @@ def _make_body(case: Case, curves: Mapping[str, Curve], name: str, loops: tuple[
     return _Body(name, {side.curve: side.forward for loop in loops for side in loop.sides}, legs, infinite, low, high)
 
 
-def _list_pressed(case: Case, roles: Roles) -> dict[frozenset[str], float]:
-    """Pairs of regions that may be drawn into each other, with the depth that their contacts allow."""
-    pressed: dict[frozenset[str], float] = {}
+def _list_pressed(case: Case, roles: Roles) -> dict[frozenset[str], tuple[float, str]]:
+    """Pairs of regions that may be drawn into each other, with the depth that their contacts allow at most, and the
+    contact that says so."""
+    pressed: dict[frozenset[str], tuple[float, str]] = {}
     for name, curves in roles.contacts.items():
         regions, depth = frozenset(roles.outer[curve] for curve in curves), case.contacts[name].overlap
         if depth > 0 and len(regions) == 2:
-            pressed[regions] = max(depth, pressed.get(regions, 0.0))
+            pressed[regions] = max((depth, name), pressed.get(regions, (0.0, "")))
     return pressed
 
 
@@ -86,7 +87,7 @@ def find_overlaps(
     touching = {curve: other for pair in roles.contacts.values() for curve, other in (pair, pair[::-1])}
     for (i, j), near in _pair_near(bodies, curves, touching).items():
         first, second = bodies[i], bodies[j]
-        allowed = pressed.get(frozenset((first.name, second.name)), 0.0)
+        allowed, _ = pressed.get(frozenset((first.name, second.name)), (0.0, ""))
         found = _overlap(curves, first, second, near, tolerance, allowed)
         if found:
             expected = "regions side by side; the loop of a region inside another belongs in the boundary of both"
@@ -165,13 +166,15 @@ def check_contacts(
             if region not in loops or region == roles.outer[curve] or curve not in curves:
                 continue
             depth, point = _find_deepest(curves[curve], _make_body(case, curves, region, loops[region]))
-            allowed = pressed.get(frozenset((region, roles.outer[curve])), 0.0)
+            # Where a contact says nothing, its bodies are as deep in each other as another of their contacts says.
+            own = case.contacts[name].overlap
+            allowed, saying = (own, name) if own else pressed.get(frozenset((region, roles.outer[curve])), (0.0, name))
             if depth > max(tolerance.of(curve), allowed * (1 + ROUNDED)):
                 found = f"curve '{curve}' inside region '{region}', {depth:.3g} deep at {format_point(point)}"
                 expected = ("bodies that at most touch before they are loaded; or, for a press fit, "
                             f"overlap = {_round_up(depth):g} in [contacts.{name}], the depth that is meant, at most")
                 if allowed:
-                    expected = f"at most overlap = {allowed:g} deep, as [contacts.{name}] says, or a larger overlap"
+                    expected = f"at most overlap = {allowed:g} deep, as [contacts.{saying}] says, or a larger overlap"
                 faults.append(Fault.at(("contacts", name), found, expected))
                 break
             if depth > tolerance.of(curve):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 from pbem.description.case import Case
@@ -62,4 +62,4 @@ def update_wall(walls: dict[str, Wall], name: str, table: StageConditionTable) -
         if getattr(table, key) is not None:
             first, second = walls.get(name, Wall(frame)).values
             value = read_value((), getattr(table, key), timed=True)[0] or 0.0
-            walls[name] = replace(Wall(frame), values=(value, second) if direction == 0 else (first, value))
+            walls[name] = Wall(frame, (value, second) if direction == 0 else (first, value))

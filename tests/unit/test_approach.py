@@ -36,3 +36,11 @@ def test_what_nothing_stops_is_told_and_friction_stops_it_where_it_touches(size:
 def test_what_lies_flat_on_another_body_is_there_already() -> None:
     moved = move_until_closed(np.zeros(3), np.zeros((3, 1)), np.array([1.0]), 1.0, np.ones(3, dtype=bool))
     assert moved is not None and not moved.any()
+
+
+@pytest.mark.parametrize("opening", [0.0, 1e-17])
+def test_openings_of_rounding_are_none(opening: float) -> None:
+    """A block pressed on a base that it touches at three places, of which one is known to rounding."""
+    rates = np.array([[1.0, -1.0], [1.0, 0.0], [1.0, 1.0]])
+    moved = move_until_closed(np.array([0.0, opening, 0.0]), rates, np.array([-1.0, 0.0]), 1.0, np.zeros(3, dtype=bool))
+    assert moved is not None and np.abs(moved).max() < 1e-12

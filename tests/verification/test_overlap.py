@@ -162,3 +162,22 @@ def test_other_sides_lie_no_deeper_than_the_contact_allows(tmp_path: Path) -> No
     case["curves"]["head"]["points"][0] = [1.8, 1.999]
     with pytest.raises(pbem.CaseError, match=r"'side' lies inside, 0\.29 deep"):
         pbem.run(case, tmp_path / "lip.h5")
+
+
+def test_each_contact_of_two_bodies_has_the_depth_that_it_says(tmp_path: Path) -> None:
+    """Two contacts side by side between the same blocks: what the one allows is not allowed to the other."""
+    case = lay_blocks(2.0, 1e-3, 0j, 1 + 0j, drawn=True)
+    curves = case["curves"]
+    curves["seat"]["points"], curves["left_seat"] = [[2, 1], [1, 1]], {"points": [[1, 1], [0, 1]], "elements": 8}
+    curves["sole"]["points"] = [[0, 0.999], [1, 0.999]]
+    curves["right_sole"] = {"points": [[1, 0.999], [2, 0.999]], "elements": 8}
+    case["regions"]["lower"]["boundary"].insert(3, "left_seat")
+    case["regions"]["upper"]["boundary"].insert(1, "right_sole")
+    case["contacts"] = {"left": {"between": ["left_seat", "sole"], "friction": 0.3, "overlap": 1.5e-3},
+                        "right": {"between": ["seat", "right_sole"], "friction": 0.3, "overlap": 2e-4}}  # fmt: skip
+    with pytest.raises(pbem.CaseError, match=r"0\.001 deep .* at most overlap = 0\.0002 deep, as \[contacts\.right\]"):
+        pbem.run(case, tmp_path / "shallow.h5")
+    case["contacts"]["right"]["overlap"] = 1.5e-3
+    results = pbem.run(case, tmp_path / "both.h5")
+    for name in ("left", "right"):
+        np.testing.assert_allclose(results.contact[name].traction_n[-1], -0.5, rtol=1e-6)

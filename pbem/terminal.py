@@ -22,7 +22,9 @@ def say(text: str, rank: int) -> None:
         with contextlib.suppress(OSError):  # of a pipe or terminal that has been closed
             sys.stdout.flush()
         with contextlib.suppress(OSError):
-            print(printable(text, keep="\n"), file=sys.stderr, flush=True)
+            # In one write: Open MPI 5 tells a line that comes in pieces on standard output, or its pieces apart.
+            sys.stderr.write(printable(text, keep="\n") + "\n")
+            sys.stderr.flush()
 
 
 def discard_output() -> None:

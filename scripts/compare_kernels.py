@@ -7,7 +7,8 @@ A cluster's nodes need not be alike: what one rank computes may differ in the la
 The kernels are compiled once more, without AVX and hardly optimised; one rank (in turn) takes them in the second run of
 each pair. Statuses, iterations, steps and the reason of an end must be the same; the largest difference of
 displacements and tractions is told. Models are those of scripts/torture.py of up to --nodes nodes. Exit code 1 if any
-pair differs or does not end.
+pair differs or does not end. Every third model takes the hierarchical operator, the others the one that the program
+chooses.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ from types import ModuleType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-KINDS = ("edge", "cut", "plate", "pin", "wedge", "loose", "stack", "field")
+# Compiled modules, and the modules of the program that take them.
+COMPILED = {"_kernels": ("rows",), "_expansions": ("expansion", "near")}
 # Other instructions, another order of sums, no vector functions: the last bits differ in most entries.
 OTHER_FLAGS = "-O1 -mno-avx -mno-avx2 -mno-fma"
 Found = dict[str, Any]
@@ -40,7 +42,7 @@ def main() -> int:
     parser.add_argument("--nodes", type=int, default=400, help="of the largest model")
     parser.add_argument("--records", type=Path, help="a line for each pair is added; pairs that are there are not run")
     parser.add_argument("--timeout", type=float, default=600.0, help="seconds for a pair")
-    parser.add_argument("--worker", nargs=2, metavar=("KERNELS", "RECORDS"), help=argparse.SUPPRESS)
+    parser.add_argument("--worker", nargs=2, metavar=("FOLDER", "RECORDS"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.worker:
         work(Path(options.worker[0]), Path(options.worker[1]), options.first, options.count, options.nodes)
@@ -51,7 +53,7 @@ def main() -> int:
         return launch_all(build_others(Path(name)), records, options)
 
 
-def launch_all(kernels: Path, records: Path, options: argparse.Namespace) -> int:
+def launch_all(others: Path, records: Path, options: argparse.Namespace) -> int:
     """Workers until all pairs are there; one that hangs is ended, and the next goes on after its pair."""
     from tests.parallel.launch import kill_session, make_environment
 
@@ -60,7 +62,7 @@ def launch_all(kernels: Path, records: Path, options: argparse.Namespace) -> int
     while sum("equal" in each for each in done) < options.count:
         missing = options.count - sum("equal" in each for each in done)
         command = ["mpirun", "-n", "2", sys.executable, "-m", "scripts.compare_kernels", "--first", str(first),
-                   "--count", str(missing), "--nodes", str(options.nodes), "--worker", str(kernels), str(records)]
+                   "--count", str(missing), "--nodes", str(options.nodes), "--worker", str(others), str(records)]
         process = subprocess.Popen(command, cwd=ROOT, env=make_environment(), start_new_session=True,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         size, since = -1, time.monotonic()
@@ -96,42 +98,59 @@ def read_records(path: Path) -> list[Found]:
 
 
 def build_others(folder: Path) -> Path:
-    """The kernels built with other instructions; the path of the library."""
+    """The compiled modules built with other instructions; the folder that holds them."""
     environment = os.environ | {"PBEM_MARCH": "x86-64", "CFLAGS": f"{os.environ.get('CFLAGS', '')} {OTHER_FLAGS}"}
     command = [sys.executable, "setup.py", "-q", "build_ext", "--build-lib", str(folder), "--build-temp", str(folder)]
     subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
-    return next(folder.rglob("_kernels*.so"))
+    return folder
 
 
-def load_kernels(path: Path) -> ModuleType:
-    """The library as a module beside the one in use."""
-    loader = importlib.machinery.ExtensionFileLoader("pbem.bem._kernels", str(path))
-    spec = importlib.util.spec_from_file_location("pbem.bem._kernels", path, loader=loader)
+def load_compiled(name: str, folder: Path) -> ModuleType:
+    """A compiled module of this folder, beside the one in use."""
+    path = str(next(folder.rglob(f"{name}*.so")))
+    loader = importlib.machinery.ExtensionFileLoader(f"pbem.bem.{name}", path)
+    spec = importlib.util.spec_from_file_location(f"pbem.bem.{name}", path, loader=loader)
     assert spec is not None
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
+    assert module.__file__ == path
     return module
 
 
-def work(kernels: Path, records: Path, first: int, count: int, most_nodes: int) -> None:
+def use(modules: dict[str, ModuleType]) -> None:
+    """These compiled modules from now on, in place of others of their names."""
+    for name, users in COMPILED.items():
+        for user in users:
+            setattr(importlib.import_module(f"pbem.bem.{user}"), name, modules[name])
+
+
+def write_case(seed: int, case: Path) -> str:
+    """The case of a seed; returns its kind."""
+    from scripts.torture.kinds import draw_sample
+
+    sample = draw_sample(seed)
+    case.write_text(sample.text() + ('\n[solver]\noperator = "hierarchical"\n' if (seed + seed // 12) % 3 == 0 else ""))
+    return sample.kind
+
+
+def work(others: Path, records: Path, first: int, count: int, most_nodes: int) -> None:
     """On all ranks: so many pairs from a seed on; the first rank adds a line for each."""
-    from pbem.bem import rows
     from pbem.case.build import read_model
     from pbem.errors import CaseError
     from pbem.mesh.generate import generate_mesh
     from pbem.parallel import world
-    from scripts.torture.kinds import draw_sample
 
-    own, other = rows._kernels, load_kernels(kernels)
-    assert Path(str(other.__file__)) == kernels and own.__file__ != other.__file__
+    own = {name: importlib.import_module(f"pbem.bem.{name}") for name in COMPILED}
+    other = {name: load_compiled(name, others) for name in COMPILED}
+    assert all(own[name].__file__ != other[name].__file__ for name in COMPILED)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(world.bcast(name))
         case, pairs, seed = folder / "case.toml", 0, first
         while pairs < count:
             found: Found = {"seed": seed}
             if world.rank == 0:
-                case.write_text(draw_sample(seed, KINDS).text())
-            world.Barrier()
+                found["kind"] = write_case(seed, case)
+            found = world.bcast(found)
             try:
                 nodes = generate_mesh(read_model(case)[1]).nodes
             except CaseError as error:  # before any kernel is asked
@@ -139,10 +158,10 @@ def work(kernels: Path, records: Path, first: int, count: int, most_nodes: int) 
             if 0 < nodes <= most_nodes:
                 ends = []
                 for turn, mixed in enumerate((False, True)):
-                    rows._kernels = other if mixed and world.rank == seed % 2 else own
+                    use(other if mixed and world.rank == seed % 2 else own)
                     ends.append(compute(case, folder / f"{turn}.h5"))
-                rows._kernels = own
-                found |= {"nodes": nodes, "kind": KINDS[seed % len(KINDS)], **compare(*ends)}
+                use(own)
+                found |= {"nodes": nodes, **compare(*ends)}
                 pairs += 1
             # All ranks must have found the same.
             alike = world.allgather({name: value for name, value in found.items() if name != "largest"})

@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip, start_memory
 from pbem.contact.modes import Linearisation, linearise
 from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, read_modes
+from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import smooth_search
+from pbem.solve.nonlinear.newton import PATIENCE, solve_step
 from pbem.solve.nonlinear.smooth_search import FIRST, LEAST, SmoothSearch
+from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over
 
@@ -176,6 +179,47 @@ def test_the_search_ends_in_the_same_solution(many_groups: None, at_once: list[i
     np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
     slip = usual.contact.slip
     np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-7 * np.abs(slip).max())
+
+
+class Counter(SilentReporter):
+    """Keeps the numbers of the iterations."""
+
+    def __init__(self) -> None:
+        self.numbers: list[int] = []
+
+    def iterate(self, iteration: Iteration) -> None:
+        self.numbers.append(iteration.number)
+
+
+def search_once(text: str, limit: int) -> tuple[int, list[int], str]:
+    """Iterations of a step's first search; those after which the loads were asked about; the reason of its end."""
+    problem = assemble(text.replace("solver.", f"solver.newton_max_iterations = {limit}\nsolver.", 1))
+    told, asked, reason = Counter(), list[int](), "settled"
+
+    def refuse(memory: Memory) -> None:
+        asked.append(len(told.numbers))
+
+    tangent = problem.make_tangent()
+    try:
+        solve_step(problem, tangent, start_memory(problem.laws), problem.evaluate_load(0, 1.0), told, refuse, once=True)
+    except ConvergenceError as error:
+        reason = error.reason
+    tangent.destroy()
+    assert told.numbers == list(range(1, len(told.numbers) + 1))
+    return len(told.numbers), asked, reason
+
+
+def test_limits_hold_for_iterations_with_smoothed_laws_too(many_groups: None, at_once: list[int]) -> None:
+    text = grow_branches(0, 6)
+    whole, asked, reason = search_once(text, 50)
+    # The first with the true laws, those with smoothed ones, and at least one more: past the eighth at once.
+    assert reason == "settled" and whole > PATIENCE and len(asked) == 1 and asked[0] > PATIENCE
+    assert search_once(text, whole)[::2] == (whole, "settled")
+    for limit in (whole - 1, 3):
+        assert search_once(text, limit)[::2] == (limit, "iteration limit")
+    assert len(at_once) == 4
+    # None is left for them.
+    assert search_once(text, 1)[::2] == (1, "iteration limit")
 
 
 def test_smoothing_ends_before_a_width_at_which_most_pairs_change(

@@ -147,6 +147,7 @@ def _search_modes(
     fixed_point, kept = FixedPoint(), (modes, normal_traction, slip, jump)
     record = Record(problem, reporter, iterations)
     smoothing = SmoothSearch(problem, memory, load, search.sweeps)
+    asked, most = len(iterations) // PATIENCE, problem.model.solver.newton_max_iterations
     while True:
         begin = time.perf_counter()
         law = linearise(
@@ -192,24 +193,28 @@ def _search_modes(
             whole = pairs.bear(load.carried)
             return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations),
                             load.pressure)
-        refused = refuse(memory) if len(iterations) % PATIENCE == 0 else None
+        before, asked = asked, len(iterations) // PATIENCE  # iterations with smoothed laws come several at a time
+        refused = refuse(memory) if asked > before else None
         if refused:
             forcing.used = False  # no solution was asked for that
             moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
             raise ConvergenceError(refused.reason, refused.detail + moves)
         frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(proposal, outcome.law_error)
-        if len(search.counts) == problem.model.solver.newton_max_iterations or (hurried and search.is_stuck()):
+        if search.taken >= most or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
         if left:
             modes, normal_traction, slip, jump = kept
             continue
-        if smoothing.begins(search.counts, pairs):
+        # One iteration at least is left for the true laws.
+        if smoothing.begins(search.counts, pairs) and search.taken + 1 < most:
             search.go_on_from_smoothed()
             try:
-                modes, pairs = smoothing.find(tangent, hold, forcing, modes, record)
+                modes, pairs = smoothing.find(tangent, hold, forcing, modes, record, most - search.taken - 1)
             except ConvergenceError:  # the true laws may have what smoothed ones have not
                 continue
+            finally:
+                search.spent += smoothing.taken
             normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
             modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped)))

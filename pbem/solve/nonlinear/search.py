@@ -103,6 +103,7 @@ class Search:
 
     def restart(self) -> None:
         """Begin anew, as after the failure of a bond."""
+        self.spent = 0  # iterations that are no longer, or were never, among the counts
         self.counts: list[int] = []
         self.changed: list[Integer] = []
         self.group: Integer = np.zeros(0, dtype=np.int64)
@@ -120,10 +121,17 @@ class Search:
     def go_on_from_smoothed(self) -> None:
         """Begin anew from modes of smoothed laws: few pairs change, which groups that settle alone would disturb.
 
-        Where that does not settle, another search begins anew, without.
+        Where that does not settle, another search begins anew, without. The limit of iterations holds for all together.
         """
+        taken = self.taken
         self.restart()
+        self.spent = taken
         self.swept, self.sweeping, self.smoothed = True, False, True
+
+    @property
+    def taken(self) -> int:
+        """Iterations of the search, those with smoothed laws too."""
+        return self.spent + len(self.counts)
 
     @property
     def globalisation(self) -> Globalisation:

@@ -50,6 +50,7 @@ class SmoothSearch:
         self._smooth = find_smooth(laws, memory, load.pressure) if allowed else np.zeros(laws.count, dtype=bool)
         self._allowed = bool((self._smooth | laws.bonded | laws.parted | laws.follows).all() and self._smooth.any())
         self._first: PairState | None = None
+        self.taken = 0  # iterations so far
 
     def begins(self, counts: Sequence[int], state: PairState) -> bool:
         """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
@@ -65,9 +66,11 @@ class SmoothSearch:
         return True
 
     def find(
-        self, tangent: TangentOperator, hold: Hold, forcing: Forcing, modes: ModeState, record: Record
+        self, tangent: TangentOperator, hold: Hold, forcing: Forcing, modes: ModeState, record: Record,
+        most: int = LONGEST,
     ) -> tuple[ModeState, PairState]:
-        """Modes (m,), and the state of all pairs that they were read from; modes: those before.
+        """Modes (m,), and the state of all pairs that they were read from, after `most` iterations at most; modes:
+        those before.
 
         Raises ConvergenceError: "singular tangent", "linear solver".
         """
@@ -77,7 +80,7 @@ class SmoothSearch:
         width = float(max(np.abs(state.p_n + load.pressure).max(), np.abs(state.p_s).max()))
         if not 0 < width < np.inf:
             return modes, state
-        for _ in range(LONGEST):
+        for _ in range(min(LONGEST, most)):
             begin = time.perf_counter()
             law = linearise_smoothly(
                 problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width)
@@ -89,6 +92,7 @@ class SmoothSearch:
                 problem.laws, self._smooth, at, memory, load.pressure))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
+            self.taken += 1
             count = np.count_nonzero(changed)
             if count > max(WORSE * least, MANY * len(changed)):
                 return before, former

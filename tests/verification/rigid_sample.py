@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pbem.arrays import Bool
 from pbem.case.build import parse_model
 from pbem.model.model import Model
 from tests.verification.proofs.proof import Complex, Real, Solved, line, write_case
@@ -45,6 +46,9 @@ class Place:
         nodes, turned = solved.nodes(curve), cmath.exp(1j * self.turn)
         place = (solved.mesh.position[nodes] + solved.model.origin - self.shift) / turned / self.size
         return place, solved.last.displacement[nodes] / turned / self.size
+
+
+UNMOVED = Place()
 
 
 def circle(radius: float, elements: int) -> dict[str, Any]:
@@ -108,19 +112,23 @@ def lay_half_plane(
 RADIUS, HUB, EDGE = 1.0, 0.05, 30.0
 
 
-def lay_pin(clearance: float, force: float, direction: float, elements: int, operator: str = "auto") -> Model:
+def lay_pin(
+    clearance: float, force: float, direction: float, elements: int, operator: str = "auto", scheme: str = "SST",
+    place: Place = UNMOVED,
+) -> Model:  # fmt: skip
     """A pin in the middle of a wider hole, pressed by a force on its hub towards a direction (degrees)."""
     push = cmath.rect(force, math.radians(direction))
+    around = {"hole": (RADIUS + clearance, elements), "rim": (RADIUS, elements), "hub": (HUB, 12), "edge": (EDGE, 16)}
     return parse_model(write_case({
-        "materials": {"m": {"young": YOUNG, "poisson": POISSON}},
-        "curves": {"hole": circle(RADIUS + clearance, elements), "rim": circle(RADIUS, elements),
-                   "hub": circle(HUB, 12), "edge": circle(EDGE, 16)},
+        "materials": {"m": {"young": YOUNG * place.stress, "poisson": POISSON}},
+        "curves": {name: {"center": place.point(0j), "radius": radius * place.size, "elements": count}
+                   for name, (radius, count) in around.items()},
         "regions": {"plate": {"material": "m", "boundary": ["hole", "edge"]},
                     "pin": {"material": "m", "boundary": ["rim", "hub"]}},
         "boundary": {"edge": {"ux": 0.0, "uy": 0.0},
-                     "hub": {"rigid": {"fx": push.real, "fy": push.imag, "rotation": 0.0}}},
+                     "hub": {"rigid": {**place.force(push.real, push.imag), "rotation": 0.0}}},
         "contacts": {"seat": {"between": ["rim", "hole"]}},
-        "analysis": {"steps": 1}, "solver": {"operator": operator},
+        "analysis": {"steps": 1, "scheme": scheme}, "solver": {"operator": operator},
     }))[1]  # fmt: skip
 
 
@@ -138,3 +146,49 @@ def find_persson_force(half_width: float, clearance: float) -> float:
     """The force at which the contact has that half-angle (radians)."""
     b = math.tan(0.5 * half_width)
     return PLANE_MODULUS * clearance * math.pi * b**2 * (b**2 + 1) / (2 - math.log(b**2 + 1) - 2 * b**4)
+
+
+@dataclass(frozen=True)
+class PinPressure:
+    """Pressures of a pin in its hole beside Persson's, over the largest of these, at pairs (m,) and on elements (e,).
+
+    found, exact: at the pairs, by the angle (radians) from the middle of contact; at_end: whether contact ends in the
+    pair's element. found_mean, exact_mean: over each element of the curve whose tractions are the unknowns.
+    """
+
+    angle: Real
+    found: Real
+    exact: Real
+    at_end: Bool
+    found_mean: Real
+    exact_mean: Real
+
+
+def compare_persson(
+    solved: Solved, force: float, half_width: float, direction: float, place: Place = UNMOVED
+) -> PinPressure:
+    """What `lay_pin` gives beside `evaluate_persson`; force in the model's own units, half_width in radians."""
+    mesh, pairs = solved.mesh, solved.pairs("seat")
+    centre = (mesh.pairs.position[pairs] + solved.model.origin - place.shift) / place.size
+    angle = np.angle(centre * cmath.exp(-1j * (math.radians(direction) + place.turn)))
+    # The force of a sector is the same on either circle.
+    radius = float(np.abs(centre).mean())
+    whole = force / radius * float(evaluate_persson(np.zeros(1), half_width)[0])
+    found = -solved.last.contact.traction_n[pairs] / (place.stress * whole)
+
+    def expect(at: Real) -> Real:
+        inside = np.abs(at) < half_width
+        return np.where(inside, force / radius * evaluate_persson(np.where(inside, at, 0.0), half_width), 0.0) / whole
+
+    element, weight = mesh.pairs.slave[pairs] // (mesh.order + 1), mesh.pairs.weight[pairs]
+    points, weights = np.polynomial.legendre.leggauss(400)
+    at_end, means = np.zeros(len(pairs), dtype=bool), []
+    for number in np.unique(element):
+        own = np.flatnonzero(element == number)
+        middle = own[1]  # of three nodes
+        half = 0.5 * weight[own].sum() / (radius * place.size)
+        at = angle[middle] + half * points
+        means.append((weight[own] @ found[own] / weight[own].sum(), 0.5 * weights @ expect(at)))
+        at_end[own] = (np.abs(at) < half_width).any() and (np.abs(at) > half_width).any()
+    found_mean, exact_mean = np.array(means).T
+    return PinPressure(angle, found, expect(angle), at_end, found_mean, exact_mean)

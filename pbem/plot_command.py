@@ -81,7 +81,7 @@ def add_plot_arguments(plot: argparse.ArgumentParser) -> None:
     how.add_argument("--magnify", type=read_finite, metavar="X", help="scale of the displacements")
     how.add_argument("--displaced", action="store_true", help="with --field: on the displaced bodies")
     how.add_argument("--shape", type=int, nargs=2, metavar=("NX", "NY"),
-                     help="with --field: points across and up (default: 96 along the longer side)")
+                     help="with --field: points across and up (default: as many as 96 by 96 in a square)")
     how.add_argument("--contours", type=int, metavar="N", help="with --field: about so many lines, 0 for none "
                      "(default: 10, none among 60 cracks and more)")
     how.add_argument("--limits", type=read_finite, nargs=2, metavar=("LOW", "HIGH"), help="ends of the colours")

@@ -20,6 +20,8 @@ from pbem.results.page import Page
 from pbem.results.plot_style import style
 
 FRAMES_PER_SECOND = 2.0
+# So many rows of pictures are enough to choose colours by.
+MOST_ROWS = 8000
 
 
 class Picture(Protocol):
@@ -78,12 +80,19 @@ def _render(picture: Picture, step: int, page: Page) -> NDArray[np.uint8]:
 def _write_gif(frames: Sequence[NDArray[np.uint8]], path: str | os.PathLike[str], rate: float) -> None:
     from PIL import Image  # a part of matplotlib's own needs
 
-    # One table of colours for all frames, else colours would change between them.
+    # One table of colours, made of all frames, else colours would change between them, or lack in some.
     images = [Image.fromarray(frame) for frame in frames]
-    last = images[-1].quantize(255)
-    images = [image.quantize(palette=last, dither=Image.Dither.NONE) for image in images]
+    table = Image.fromarray(np.concatenate(choose_samples(frames))).quantize(255)
+    images = [image.quantize(palette=table, dither=Image.Dither.NONE) for image in images]
     images[0].save(path, format="GIF", save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0,
                    optimize=False)
+
+
+def choose_samples(frames: Sequence[NDArray[np.uint8]]) -> list[NDArray[np.uint8]]:
+    """Rows of all frames that have their colours: of many frames every second, third, ... row."""
+    rows = sum(len(frame) for frame in frames)
+    every = -(-rows // MOST_ROWS)
+    return [frame[number % every :: every] for number, frame in enumerate(frames)]
 
 
 def _write_mp4(frames: Sequence[NDArray[np.uint8]], path: str | os.PathLike[str], rate: float) -> None:

@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.lines import Line2D
 from matplotlib.path import Path as OutlinePath
 from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Integer, Real
@@ -25,8 +26,9 @@ HALO = [withStroke(linewidth=1.8, foreground="white")]
 def draw_body(
     axes: Axes, results: Results, step: int | None, magnify: float, names: dict[str, list[str]], box: Box, page: Page,
     frame: Box,
-) -> list[Line2D]:
-    """Draw the body at a stored step (None: as it was), displaced magnify times; returns legend handles.
+) -> tuple[list[Line2D], list[tuple[Text, complex]]]:
+    """Draw the body at a stored step (None: as it was), displaced magnify times; returns legend handles, and the names
+    with the directions in which they may be moved.
 
     names: to be written, each with the interfaces that it stands for; box: what was asked for, frame: what is shown.
     """
@@ -44,16 +46,20 @@ def draw_body(
     places = _displace_pairs(results, displacement, magnify)
     marks = _mark_modes(axes, results, step, places, box) if step is not None else []
     marks += _mark_tips(axes, results, outlines, magnify, box)
-    write_names(axes, results, names, box, places)
+    written = write_names(axes, results, names, box, places)
     finish_plane(axes, results, frame, page)
-    return [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
-            Line2D([], [], color="0.7", linewidth=0.6, label="as it was"),
-            *([Line2D([], [], color="0.15", linewidth=TOOL_WIDTH, label="rigid tool")] if tools else []), *marks]
+    handles = [Line2D([], [], color="0.15", linewidth=0.8, label="displaced"),
+               Line2D([], [], color="0.7", linewidth=0.6, label="as it was"),
+               *([Line2D([], [], color="0.15", linewidth=TOOL_WIDTH, label="rigid tool")] if tools else []), *marks]
+    return handles, written
 
 
-def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: Box, places: Real) -> None:
+def write_names(
+    axes: Axes, results: Results, names: dict[str, list[str]], box: Box, places: Real
+) -> list[tuple[Text, complex]]:
     """Write names beside the middle of the longest piece that each stands for, where it is seen; places (m, 2): of all
-    pairs."""
+    pairs. Returns them with the directions in which they may be moved."""
+    written: list[tuple[Text, complex]] = []
     pairs = results.pairs
     number = {name: k for k, name in enumerate(pairs.names)}
     begins = np.searchsorted(pairs.interface, np.arange(len(pairs.names) + 1))
@@ -67,12 +73,14 @@ def write_names(axes: Axes, results: Results, names: dict[str, list[str]], box: 
             pair = longest[len(longest) // 3]
             # Off the line, below it or to its right.
             across = pairs.normal[pair] * (-1 if pairs.normal[pair] @ [-0.5, 1.0] > 0 else 1)
-            axes.annotate(
+            text = axes.annotate(
                 escape(name), places[pair], xytext=tuple(7.0 * across), textcoords="offset points", fontsize=7,
                 ha="left" if across[0] > 0.4 else "right" if across[0] < -0.4 else "center",
                 va="top" if across[1] < -0.4 else "bottom" if across[1] > 0.4 else "center",
                 zorder=6, path_effects=HALO, annotation_clip=True,
             )
+            written.append((text, complex(*across)))
+    return written
 
 
 def _fill_regions(

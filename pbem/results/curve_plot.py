@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from pbem.results.curve_profile import Profile, read_profile
-from pbem.results.picture_limits import Limits, limit_line, widen
+from pbem.results.picture_limits import SPOILT, Limits, limit_line, widen
 from pbem.results.plot_style import MODES, label, scale_axis
 from pbem.results.reader import Results
 
@@ -93,8 +93,11 @@ def finish_axes(
 
 
 def join_limits(several: list[Limits]) -> Limits:
-    """Of several lines in the same axes, zero among what is shown; a value is cut off if it is beyond all."""
+    """Of several lines in the same axes, zero among what is shown; a value is cut off if it is beyond all, and if with
+    it the axis of all would be much longer."""
     low, high = min([0.0, *(each.low for each in several)]), max([0.0, *(each.high for each in several)])
     least = min([0.0, *(each.least for each in several)])
     largest = max([0.0, *(each.largest for each in several)])
+    if largest - least <= SPOILT * (high - low):
+        low, high = least, largest
     return Limits(low, high, least, largest)

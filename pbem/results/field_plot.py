@@ -46,8 +46,8 @@ BOTH_SIDES = 0.1
 ROUNDING = 1e-9
 # What is smaller than this part of the colours' range is no more than what is left of an area without stress.
 NOTHING = 5e-3
-# About so many lines; and none from so many cracks in the picture on.
-CONTOURS, MANY_CRACKS = 10, 60
+# About so many lines; and none from so many cracks and interfaces in the picture on.
+CONTOURS, MANY_LINES = 10, 60
 HALO = [withStroke(linewidth=1.8, foreground="white")]
 
 
@@ -55,7 +55,7 @@ HALO = [withStroke(linewidth=1.8, foreground="white")]
 class FieldOptions:
     """box: x0, y0, x1, y1, None: the model. shape: points across and up. displaced: on the displaced bodies, magnify
     times, None: a visible displacement. limits: of the colours, None: chosen. contours: about so many, 0: none; None:
-    10, and none where so many cracks are shown that lines around each of them would hide the colours."""
+    10, and none where so many cracks and interfaces are shown that lines around each would hide the colours."""
 
     box: tuple[float, float, float, float] | None = None
     shape: tuple[int, int] | None = None
@@ -141,9 +141,9 @@ class FieldPicture:
 
     def _triangulate(self) -> Triangles:
         results, box = self._results, self._box
-        across, up = self._options.shape or (ACROSS, ACROSS)
-        spacing = float((box.size / (across, up)).max() if self._options.shape is None
-                        else (box.size / (across, up)).min())
+        # By its area, so that what is flat has as many points as what is square.
+        spacing = float(np.sqrt(box.size.prod()) / ACROSS if self._options.shape is None
+                        else (box.size / self._options.shape).min())
         view = View(box.low, box.high, spacing, spacing / CLOSER)
         triangles = triangulate(results.elements, read_infinite(results), view, find_tools(results))
         places = to_columns(triangles.position)[triangles.corners]
@@ -211,8 +211,11 @@ class FieldPicture:
             return self._options.contours
         elements = self._results.elements
         low, high = elements.geometry.bounds()
-        seen = elements.crack & (low <= self._box.high).all(axis=1) & (high >= self._box.low).all(axis=1)
-        return CONTOURS if len(np.unique(elements.curve[seen])) < MANY_CRACKS else 0
+        names = self._results.nodes.curve_names
+        inner = elements.crack | np.isin(elements.curve, [names.index(each) for each in self._results.contact
+                                                          if each in names])
+        seen = inner & (low <= self._box.high).all(axis=1) & (high >= self._box.low).all(axis=1)
+        return CONTOURS if len(np.unique(elements.curve[seen])) < MANY_LINES else 0
 
     def _draw_contours(
         self, axes: Axes, triangulation: Triangulation, values: Real, low: float, high: float, bar: object
@@ -250,7 +253,9 @@ class FieldPicture:
         inside = np.flatnonzero(self._shown)
         if not len(inside) or np.ptp(values[inside]) <= 1e-9 * np.abs(values[inside]).max():
             return []
-        middle = places[inside].mean(axis=0)
+        middle, frame = places[inside].mean(axis=0), self._frame
+        # A line of text needs half a centimetre.
+        room = 0.5 * frame.size[1] / max(frame.height((self._options.page.width or 17.8) - 4.0), 0.5)
         ends = {"max": int(inside[np.argmax(values[inside])]), "min": int(inside[np.argmin(values[inside])])}
         said: dict[str, list[str]] = {}
         for name, marker, other in (("max", "^", "min"), ("min", "v", "max")):
@@ -260,6 +265,8 @@ class FieldPicture:
                       markeredgewidth=0.8, zorder=6, clip_on=False, label=f"_{name}")
             # Away from each other, so that they do not meet.
             right, above = x < middle[0], y > places[ends[other]][1]
+            # Nor on the edge of the picture.
+            above = y < frame.low[1] + room or (above and y <= frame.high[1] - room)
             axes.annotate(
                 f"{name} {print_number(float(values[vertex]))}", (x, y), zorder=7, fontsize=7,
                 xytext=(5 if right else -5, 4 if above else -4), textcoords="offset points",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 from matplotlib.transforms import Bbox
 
 # A label is moved by so many times its height at most, first away from its curve, then to the other side.
@@ -15,7 +15,8 @@ APART = 0.15
 
 
 def part_labels(axes: Axes, labels: Sequence[tuple[Text, complex]]) -> None:
-    """Move labels along their directions (complex, in the plane of the axes) until they lie on no other text.
+    """Move labels along their directions (complex, in the plane of the axes) until they lie on no other text; those of
+    annotations are offsets in points.
 
     Where there is no room nearby they stay where they are.
     """
@@ -27,12 +28,12 @@ def part_labels(axes: Axes, labels: Sequence[tuple[Text, complex]]) -> None:
     for text, direction in labels:
         box = text.get_window_extent()
         step = (1 + APART) * min(box.width, box.height)
-        for number in STEPS:
-            moved = box.translated(number * step * direction.real, number * step * direction.imag)
-            if not any(_overlap(moved, other) for other in taken):
-                _move(axes, text, moved.x0 - box.x0, moved.y0 - box.y0)
-                box = moved
-                break
+        moves = [(number * step * direction.real, number * step * direction.imag) for number in STEPS]
+        free = [move for move in moves if not any(_overlap(box.translated(*move), other) for other in taken)]
+        # Within the axes rather than beside them.
+        for move in sorted(free, key=lambda move: not _is_within(box.translated(*move), axes.bbox))[:1]:
+            _move(axes, text, *move)
+            box = box.translated(*move)
         taken.append(box)
 
 
@@ -40,7 +41,17 @@ def _overlap(one: Bbox, other: Bbox) -> bool:
     return bool(one.x0 < other.x1 and other.x0 < one.x1 and one.y0 < other.y1 and other.y0 < one.y1)
 
 
+def _is_within(one: Bbox, other: Bbox) -> bool:
+    return bool(other.x0 <= one.x0 and one.x1 <= other.x1 and other.y0 <= one.y0 and one.y1 <= other.y1)
+
+
 def _move(axes: Axes, text: Text, right: float, up: float) -> None:
-    """Move a label by so many points of the picture."""
+    """Move a label by so many dots of the picture."""
+    if isinstance(text, Annotation):
+        figure = axes.figure
+        assert figure is not None
+        x, y = text.xyann
+        text.xyann = (x + right * 72.0 / figure.dpi, y + up * 72.0 / figure.dpi)
+        return
     x, y = axes.transData.transform(text.get_position())
     text.set_position(tuple(axes.transData.inverted().transform((x + right, y + up))))

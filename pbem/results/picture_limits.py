@@ -12,8 +12,9 @@ from pbem.arrays import Bool, Real
 
 # Values at the ends of a line are left out of its axis if with them it would be so many times as long.
 SPOILT = 1.8
-# The parts of a line at either end that may hold singular values.
-END_PART = 0.03
+# The parts of a line at either end that may hold singular values; and where points are so much closer than elsewhere:
+# meshes are graded towards corners and junctions.
+END_PART, CLOSE = 0.03, 0.2
 # Of a field, the share of the area at either end of the values that may be cut off ...
 CUT = 0.005
 # ... if the colours would else have to reach so many times the range further.
@@ -45,7 +46,8 @@ class Limits:
 
 
 def limit_line(place: Real, values: Real, closed: bool = False) -> Limits:
-    """Limits for values (m,) along a line at `place` (m,): those at its ends may be beyond them, others never.
+    """Limits for values (m,) along a line at `place` (m,): those at its ends, and where points are much closer than
+    elsewhere, may be beyond them, others never.
 
     closed: the line has no ends.
     """
@@ -54,7 +56,7 @@ def limit_line(place: Real, values: Real, closed: bool = False) -> Limits:
     if not len(values):
         return Limits(0.0, 0.0, 0.0, 0.0)
     least, largest = float(values.min()), float(values.max())
-    inner = values if closed else values[~find_ends(place)]
+    inner = values[~(find_close(place) if closed else find_ends(place) | find_close(place))]
     if len(inner) >= 4:
         # Zero belongs to what is shown, else a nearly constant value would look spoilt by its ends.
         low, high = min(float(inner.min()), 0.0), max(float(inner.max()), 0.0)
@@ -71,6 +73,15 @@ def find_ends(place: Real) -> Bool:
     ends = (along <= END_PART * total) | (along >= (1 - END_PART) * total)
     ends[:1] = ends[-1:] = True
     return np.asarray(ends)
+
+
+def find_close(place: Real) -> Bool:
+    """Which of the points (m,) along a line lie much closer to their neighbours than most do."""
+    if len(place) < 3:
+        return np.zeros(len(place), dtype=bool)
+    gaps = np.abs(np.diff(place))
+    spacing = 0.5 * (np.r_[gaps[0], gaps] + np.r_[gaps, gaps[-1]])
+    return np.asarray(spacing < CLOSE * np.median(spacing))
 
 
 def limit_field(values: Real, weights: Real, is_singular: Callable[[int], bool]) -> Limits:

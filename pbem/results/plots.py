@@ -15,6 +15,7 @@ from pbem.arrays import Real
 from pbem.results.body_plot import draw_body
 from pbem.results.curve_plot import LINE_STYLES, draw_profile, finish_axes
 from pbem.results.curve_profile import Profile, check_abscissa, read_profile
+from pbem.results.label_room import part_labels
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
 from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, widen_box, write_around
@@ -111,7 +112,7 @@ class BodyPicture:
         figure = page.make_figure(body + legend + each * rows + 1.2)
         grid = figure.add_gridspec(2 + rows, 2, height_ratios=[body, legend, *[each] * rows])
         axes = figure.add_subplot(grid[0, :])
-        handles = draw_body(axes, results, step, self._magnify, self._labels, self._box, page, self._frame)
+        handles, names = draw_body(axes, results, step, self._magnify, self._labels, self._box, page, self._frame)
         notes = [describe_box(self._box)]
         if step is None:
             write_around(figure, f"{escape(results.title)}\nno step stored".strip(), notes)
@@ -127,6 +128,7 @@ class BodyPicture:
                          [*notes, self._say_left_out()])
         # One for all axes, between the body and the lines.
         add_legend_row(figure, grid[1, :], handles, page)
+        part_labels(axes, names)
         return figure
 
     def _draw_panels(self, pair: tuple[Axes, Axes], contact: Contact, step: int) -> list[Line2D]:

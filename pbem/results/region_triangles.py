@@ -25,6 +25,8 @@ PIECES = 3
 # Points that differ by less than this part of a region's size are one.
 SAME = 1e-10
 MOST_ROUNDS = 14
+# Edges shorter than this part of the least spacing of points cannot be seen.
+UNSEEN = 0.01
 # An infinite region is shown beyond everything else by this part of the size.
 MARGIN = 0.02
 
@@ -127,6 +129,7 @@ def _triangulate_region(
     for turn in range(MOST_ROUNDS):
         delaunay = _find_delaunay((points - middle) / size)
         missing = ~np.isin(edges.key(len(points)), _list_edges(delaunay, len(points)))
+        missing &= ~_find_unseen(points, edges, UNSEEN * view.least)
         if not missing.any():
             break
         points, edges = _halve(points, edges, missing, elements, turn >= 2)
@@ -199,6 +202,14 @@ def _list_edges(corners: Integer, count: int) -> Integer:
     return np.unique(np.minimum(start, end) * count + np.maximum(start, end))
 
 
+def _find_unseen(points: Complex, edges: _Edges, least: float) -> Bool:
+    """Edges of cracks, with both of their faces, that are shorter than can be seen: where two cracks all but meet on a
+    length, halving them would not end. An outline is never left open."""
+    short = np.abs(points[edges.end] - points[edges.start]) < least
+    _, which, count = np.unique(edges.key(len(points)), return_inverse=True, return_counts=True)
+    return np.asarray(short & (count[which.ravel()] > 1))
+
+
 def _halve(
     points: Complex, edges: _Edges, missing: Bool, elements: Elements, near: bool
 ) -> tuple[Complex, _Edges]:
@@ -239,7 +250,7 @@ def _find_touching(points: Complex, edges: _Edges) -> tuple[Integer, Real]:
     near = tree.query_ball_point(np.column_stack([middle.real, middle.imag]), 0.5 * length)
     for number, others in enumerate(near):
         for other in others:
-            if other in (edges.start[number], edges.end[number]):
+            if other in (edges.start[number], edges.end[number]) or length[number] == 0.0:
                 continue
             t = (points[other] - a[number]) / (b[number] - a[number])
             if abs(t.imag) < 1e-6 and 0 < t.real < 1:

@@ -18,6 +18,7 @@ from pbem.arrays import Bool, Real
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.errors import ResultFileError
 from pbem.results.body_plot import write_names
+from pbem.results.label_room import part_labels
 from pbem.results.outline import trace_outlines
 from pbem.results.page import Page, add_legend_row, choose_box, describe_box, finish_plane, save, write_around
 from pbem.results.pair_weights import find_nodes, weigh_pairs
@@ -103,9 +104,10 @@ class TracePicture:
                 axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
         else:
             notes = self._draw_values(figure, axes, self._values[step])
-        write_names(axes, results, self._labels, box, results.pairs.position)
+        names = write_names(axes, results, self._labels, box, results.pairs.position)
         finish_plane(axes, results, box, page)
         write_around(figure, describe_step(results, step), [*notes, describe_box(box)])
+        part_labels(axes, names)
         return figure
 
     def _draw_values(self, figure: Figure, axes: Axes, values: Real) -> list[str]:

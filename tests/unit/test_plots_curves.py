@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import pbem
 from pbem.results.curve_picture import CurveOptions, CurvePicture
-from pbem.results.curve_plot import draw_quantity
+from pbem.results.curve_plot import draw_quantity, join_limits
 from pbem.results.curve_profile import measure_angles, read_profile
 from pbem.results.picture_limits import Limits, limit_line, print_number, widen
 from pbem.results.reader import Results, open_results
@@ -61,6 +61,27 @@ def test_singular_ends_do_not_spoil_the_limits() -> None:
     assert limit_line(x, singular, closed=True).high == singular[-1]
     low, high = widen(limit_line(x, np.full(100, 3e-9)))
     assert low < 3e-9 < high <= 6e-9
+
+
+def test_a_junction_within_a_line_does_not_spoil_the_limits() -> None:
+    # Another crack ends at 0.4; there the mesh is graded.
+    near = 0.4 + np.array([-1, 1])[:, None] * np.geomspace(1e-4, 0.02, 5)
+    x = np.sort(np.concatenate([np.linspace(0.01, 0.37, 12), near.ravel(), np.linspace(0.43, 0.99, 20)]))
+    values = -1.0 - 1e-2 / np.abs(x - 0.4)
+    for closed in (False, True):
+        limits = limit_line(x, values, closed)
+        assert limits.least == values.min() < -90 and limits.low > -20
+    # A line that is fine throughout its peak shows the peak.
+    fine = np.sort(np.concatenate([np.linspace(0.0, 1.0, 9), np.linspace(0.45, 0.55, 61)]))
+    peak = np.sqrt(np.maximum(0.0, 0.05**2 - (fine - 0.5) ** 2))
+    assert limit_line(fine, peak).high == peak.max()
+
+
+def test_what_is_cut_off_would_lengthen_the_axis_of_all_lines() -> None:
+    cut, other = Limits(0.0, 0.1, 0.0, 0.5), Limits(-2.0, 0.0, -2.0, 0.0)
+    assert join_limits([cut]) == cut
+    assert join_limits([cut, other]) == Limits(-2.0, 0.5, -2.0, 0.5)
+    assert join_limits([cut, Limits(-0.2, 0.0, -0.2, 0.0)]).high == 0.1
 
 
 def test_axes_say_what_is_cut_off(results: Results) -> None:

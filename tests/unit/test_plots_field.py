@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 import pbem.plot_command
 import pbem.results.field_plot
 import pbem.results.page
+import pbem.results.region_triangles
 from pbem.bem.location import locate_points
 from pbem.errors import ResultFileError
+from pbem.results.contents import Elements
 from pbem.results.field_formulas import FIELDS
 from pbem.results.field_plot import CONTOURS, FieldOptions, FieldPicture, draw_field, plot_field
 from pbem.results.outline import to_columns
@@ -124,6 +126,25 @@ def test_a_touching_crack_and_a_hole_in_an_infinite_plane(griffith: Results) -> 
     np.testing.assert_allclose(found.areas.sum(), np.ptp(places, axis=0).prod(), rtol=1e-12)
 
 
+def test_cracks_that_meet_in_tiny_elements_are_not_halved_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Three arms far from the origin, whose elements shrink towards the junction more than a triangulation can follow.
+    along = np.r_[0.0, np.geomspace(1e-7, 1.0, 34)]
+    arms = [along * arm + 4.66e5 + 6.691e6j for arm in np.exp(1j * np.array([0.0, 2.0, 4.1]))]
+    lines = np.concatenate([np.stack([arm[:-1], arm[1:]], axis=1) for arm in arms])
+    lines = np.stack([lines.real, lines.imag], axis=2)
+    vertices = np.concatenate([lines, lines[:, ::-1]])
+    none = np.zeros(len(vertices), dtype=np.int64)
+    elements = Elements(vertices, np.zeros(len(none)), none, none, np.ones(len(none), dtype=bool), none)
+    low, high = vertices.min(axis=(0, 1)) - 0.5, vertices.max(axis=(0, 1)) + 0.5
+    halved = []
+    halve = pbem.results.region_triangles._halve
+    monkeypatch.setattr(pbem.results.region_triangles, "_halve",
+                        lambda *given: halved.append(int(given[2].sum())) or halve(*given))
+    found = triangulate(elements, np.array([True]), View(low, high, 0.05, 0.005))
+    assert sum(halved) < 2000
+    assert (found.areas >= 0).all()
+
+
 def test_both_sides_of_a_crack_have_their_own_values(griffith: Results) -> None:
     picture = FieldPicture(griffith, "uy", FieldOptions(), [0])
     values, triangles = picture.values(0), picture.triangles
@@ -199,8 +220,18 @@ def test_displaced_pictures_and_parts(griffith: Results) -> None:
     assert "part from (0.5, \N{MINUS SIGN}0.25) to (1.5, 0.25)" in list_notes(figure)
     places = to_columns(picture.triangles.position[picture.triangles.corners])
     assert (places.max(axis=1)[:, 0] >= 0.5).all() and (places.min(axis=1)[:, 0] <= 1.5).all()
-    fine = FieldPicture(griffith, "uy", FieldOptions(box=(0.5, -0.25, 1.5, 0.25), shape=(150, 75)), [0])
+    fine = FieldPicture(griffith, "uy", FieldOptions(box=(0.5, -0.25, 1.5, 0.25), shape=(300, 150)), [0])
     assert len(fine.triangles.corners) > 1.5 * len(picture.triangles.corners)
+
+
+def test_marks_at_the_edge_are_written_inside(griffith: Results) -> None:
+    for box in ((-2.0, -1.5, 2.0, 0.05), (-2.0, -0.05, 2.0, 1.5), (-0.5, -0.02, 0.5, 0.02)):
+        figure = draw_field(griffith, "uy", options=FieldOptions(box=box))
+        figure.draw_without_rendering()
+        axes = figure.axes[0]
+        marks = [each.get_window_extent() for each in axes.texts if each.get_text().startswith(("max", "min"))]
+        assert len(marks) == 2
+        assert all(axes.bbox.y0 <= 0.5 * (each.y0 + each.y1) <= axes.bbox.y1 for each in marks)
 
 
 def test_wrong_fields_and_boxes(sample: Results, tmp_path: Path) -> None:
@@ -290,14 +321,21 @@ def test_triangles_are_fine_enough_for_the_lines_of_a_map(griffith: Results) -> 
 
 
 def test_lines_are_left_out_where_many_cracks_are_shown(
-    griffith: Results, monkeypatch: pytest.MonkeyPatch
+    griffith: Results, sample: Results, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def count_lines(options: FieldOptions) -> int:
         return FieldPicture(griffith, "syy", options, [0])._count_contours()
 
     assert count_lines(FieldOptions()) == CONTOURS
-    monkeypatch.setattr(pbem.results.field_plot, "MANY_CRACKS", 1)
+    monkeypatch.setattr(pbem.results.field_plot, "MANY_LINES", 1)
     assert count_lines(FieldOptions()) == 0 and count_lines(FieldOptions(contours=5)) == 5
+    # Interfaces count as cracks do.
+    several = FieldPicture(sample, "syy", FieldOptions(), [0])
+    monkeypatch.setattr(pbem.results.field_plot, "MANY_LINES", 2)
+    assert several._count_contours() == 0
+    monkeypatch.setattr(pbem.results.field_plot, "MANY_LINES", 3)
+    assert several._count_contours() == CONTOURS
+    monkeypatch.setattr(pbem.results.field_plot, "MANY_LINES", 1)
     # Nor is there a crack in this part.
     assert count_lines(FieldOptions(box=(1.5, 0.5, 2.0, 1.0))) == CONTOURS
     room = choose_box(griffith).size

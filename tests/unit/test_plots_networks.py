@@ -6,12 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 from pbem.case.build import parse_model
 from pbem.results.animation import animate
 from pbem.results.curve_picture import find_curves
 from pbem.results.curve_profile import read_profile
+from pbem.results.label_room import part_labels
 from pbem.results.page import Page
 from pbem.results.picture_limits import Limits
 from pbem.results.plots import BodyOptions, BodyPicture
@@ -29,8 +33,10 @@ from pbem.results.trace_plot import (
 )
 from pbem.results.writer import ResultWriter
 from tests.unit.results_sample import make_mesh, make_model, make_steps
+from tests.unit.test_label_room import find_overlaps
 
 MODEL = make_model(cracks=7)
+COLOURS = ("#D00000", "#00A000", "#0000B0", "#FFFFFF")
 
 
 @pytest.fixture(scope="module")
@@ -198,6 +204,36 @@ def test_animations_have_a_frame_for_each_step(results: Results, tmp_path: Path)
     with Image.open(tmp_path / "a.gif") as movie:
         assert movie.n_frames == len(steps) == 6
         assert movie.info["duration"] == 500
+
+
+class Colours:
+    """Frames of one colour each."""
+
+    def draw(self, step: int) -> Figure:
+        figure = Figure(figsize=(2, 1), facecolor=COLOURS[step])
+        FigureCanvasAgg(figure)
+        return figure
+
+
+def test_the_colours_of_an_animation_are_those_of_all_frames(tmp_path: Path) -> None:
+    from PIL import Image
+
+    animate(Colours(), range(len(COLOURS)), tmp_path / "a.gif", Page(dpi=40))
+    with Image.open(tmp_path / "a.gif") as movie:
+        for step, colour in enumerate(COLOURS):
+            movie.seek(step)
+            found = np.array(movie.convert("RGB").getpixel((3, 3))) / 255
+            np.testing.assert_allclose(found, to_rgb(colour), atol=0.02)
+
+
+def test_names_that_would_lie_on_each_other_are_parted(results: Results) -> None:
+    axes = BodyPicture(results, BodyOptions(interfaces=["joint"]), [1]).draw(1).axes[0]
+    text = axes.texts[0]
+    labels = [(axes.annotate(f"name {number}", text.xy, xytext=(5.0, 5.0), textcoords="offset points"), 1j)
+              for number in range(3)]
+    assert find_overlaps(axes)
+    part_labels(axes, labels)
+    assert not find_overlaps(axes)
 
 
 def test_all_frames_have_the_same_limits(results: Results) -> None:

@@ -15,6 +15,8 @@ OVERSHOOT = 1e-6
 MARGIN = 0.01
 # Points times elements that are crossed at a time: some 50 MB of arrays.
 CROSSED = 2**18
+# Of more elements than MANY only those that the normals of so many points pass are crossed.
+MANY, TOGETHER = 128, 64
 
 
 @dataclass(frozen=True)
@@ -39,10 +41,30 @@ def project_nodes(position: Complex, normal: Complex, elements: Elements, overla
 def _divide(points: int, elements: Elements) -> list[slice]:
     """Points (k,) in parts, of which the crossings with all elements take little memory; one part at least."""
     most = max(1, CROSSED // max(1, elements.count))
+    if elements.count > MANY:
+        most = min(most, TOGETHER)
     return [slice(start, start + most) for start in range(0, max(points, 1), most)]
 
 
+def _find_passed(position: Complex, normal: Complex, elements: Elements) -> Integer:
+    """The elements, rising, that lines along the normals of some points (k,) may cross, and others near to these."""
+    if elements.count <= MANY or not len(position):
+        return np.arange(elements.count)
+    middle, chord = 0.5 * (elements.start + elements.end), abs(elements.end - elements.start)
+    at, along = position.mean(), normal.mean()
+    away = middle - at
+    # A disc about its chord's middle holds an element. Each normal passes there as the mean one does, but for what its
+    # point and its direction differ; and for rounding.
+    reach = 1.01 * (0.5 * chord + elements.rises()) + abs(position - at).max() + abs(normal - along).max() * abs(away)
+    return np.flatnonzero(abs((np.conj(along) * away).imag) <= reach + OVERSHOOT * abs(away))
+
+
 def _project(position: Complex, normal: Complex, elements: Elements, overlap: Real) -> Projection:
+    passed = _find_passed(position, normal, elements)
+    if not len(passed) or not len(position):
+        nothing = np.zeros(len(position))
+        return Projection(np.full(len(position), -1), nothing, nothing)
+    elements, overlap = elements.select(passed), overlap[passed]
     distance, local, facing = (each.swapaxes(0, 1) for each in elements.cross(position, normal))
     crossings = distance.shape[2]
     inside = (np.abs(local) <= 1 + OVERSHOOT) & facing & (distance >= -overlap[:, None])
@@ -56,7 +78,7 @@ def _project(position: Complex, normal: Complex, elements: Elements, overlap: Re
     rows = np.arange(len(position))
     hit = np.isfinite(distance[rows, best])
     return Projection(
-        element=np.where(hit, best // crossings, -1),
+        element=np.where(hit, passed[best // crossings], -1),
         local=np.clip(np.where(hit, local[rows, best], 0.0), -1.0, 1.0),
         distance=np.where(hit, distance[rows, best], 0.0),
     )
@@ -70,7 +92,7 @@ def find_hidden(position: Complex, normal: Complex, distance: Real, elements: El
 
 
 def _is_hidden(position: Complex, normal: Complex, distance: Real, elements: Elements) -> Bool:
-    at, local, _ = elements.cross(position, normal)
+    at, local, _ = elements.select(_find_passed(position, normal, elements)).cross(position, normal)
     on_the_way = (at > MARGIN * distance[:, None]) & (at < (1 - MARGIN) * distance[:, None])
     hidden: Bool = ((np.abs(local) < 1) & on_the_way).any(axis=(0, 2))
     return hidden

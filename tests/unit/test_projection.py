@@ -46,3 +46,31 @@ def test_thousands_of_elements_are_crossed_in_little_memory(monkeypatch: pytest.
     again = project_nodes(position[:50], normal[:50], faces, np.full(count, 0.1))
     for name in ("element", "local", "distance"):
         assert np.array_equal(getattr(again, name), getattr(seen, name)[:50])
+
+
+@pytest.mark.parametrize("shift", [0.0, 3e7 - 2e7j])
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("sweep", [0.0, 0.3, -2.0, 5.5])
+def test_elements_that_no_normal_passes_change_nothing(
+    scale: float, sweep: float, shift: complex, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a curve around the points and one beside them, with arcs of all sizes."""
+    random = np.random.default_rng(3)
+    around = np.exp(2j * np.pi * np.sort(random.uniform(size=200))) * random.uniform(0.9, 1.1, 200)
+    ends = np.concatenate([around, 2 + np.linspace(-1, 1, 200) * 1j])
+    start, end = ends[:-1], ends[1:]
+    sweeps = np.where(np.arange(399) % 3 == 0, 0.0, sweep)
+    faces = Elements.by_ends(scale * (start + shift), scale * (end + shift), sweeps)
+    x = random.normal(size=300) * 0.7 + 0.7j * random.normal(size=300)
+    position, normal = scale * (x + shift), np.exp(2j * np.pi * random.uniform(size=300))
+    normal[100:] = np.exp(1j * np.linspace(0, 1, 200))
+    overlap, way = np.full(399, 0.3 * scale), np.full(300, 1.5 * scale)
+    quick = project_nodes(position, normal, faces, overlap), find_hidden(position, normal, way, faces)
+    monkeypatch.setattr(projection, "MANY", 1000)
+    whole = project_nodes(position, normal, faces, overlap), find_hidden(position, normal, way, faces)
+    for name in ("element", "local", "distance"):
+        assert np.array_equal(getattr(quick[0], name), getattr(whole[0], name))
+    assert np.array_equal(quick[1], whole[1])
+    assert len(np.unique(whole[0].element)) > 50 and 30 < whole[1].sum() < 290
+    nothing = np.zeros(0, dtype=complex)
+    assert not len(project_nodes(nothing, nothing, faces, overlap).element)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pbem.arrays import Integer, Real
 from pbem.case.build import Source, find_file, make_checked_model
@@ -43,11 +43,12 @@ from pbem.results.writer import ResultWriter
 from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
 from pbem.solve.estimate.second_solution import SecondSolution
 from pbem.solve.launch.account import describe_start
+from pbem.solve.launch.arguments import check_arguments
 from pbem.solve.launch.memory import check_memory
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
-from pbem.solve.petsc.options import check_kind, check_options
+from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
 from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
 from pbem.solve.steps.march import free_at_last, go_on, march, note_place, resume_modes, start_from
@@ -88,12 +89,10 @@ def run(
     every step reached), StorageError (the disk has no room for a step; the file holds the steps before it), LawError (a
     custom law failed), StopError (stopped by a signal; KeyboardInterrupt for SIGINT). Any other exception on one rank
     ends all ranks, unless the rank computes alone. ValueError: unknown operator. TypeError: comm is not a communicator,
-    or petsc is not a dictionary.
+    petsc is not a dictionary, or resume or force is neither True nor False.
     """
     comm = check_communicator(comm)
-    if operator is not None and operator not in get_args(Operator):
-        raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
-    check_kind(petsc)
+    check_arguments(operator, petsc, {"resume": resume, "force": force})
     path = find_file(case)
     name = UNNAMED if path is None else str(path)
     try:

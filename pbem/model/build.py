@@ -173,7 +173,7 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     loops, wrong = find_loops(boundaries, infinite, curves, shapes.tolerance, check_nesting=not crossings)
     faults = [*shapes.faults, *crossings, *wrong]
     overlaps: dict[str, float] = {}
-    notes = [*cut.notes, *split.notes]
+    notes = [*cut.notes, *shapes.notes, *split.notes]
     if not crossings:
         faults += find_overlaps(case, curves, loops, roles, shapes.tolerance)
         overlaps, pressed, wrong = check_contacts(case, curves, loops, roles, shapes.tolerance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,9 @@ from pbem.description.case import Case
 from pbem.description.schema import CurveTable
 from pbem.description.values import MOST_ELEMENTS
 from pbem.errors import Fault
+from pbem.geometry.arc_ends import MovedEnd, meet_arcs
 from pbem.geometry.curve import Curve
+from pbem.geometry.junction import format_point
 from pbem.geometry.shape import (
     Division,
     draw_circle,
@@ -26,16 +28,20 @@ from pbem.model.roles import Roles
 
 # Squares of lengths must not underflow.
 SMALLEST = 1e-100
+# Ends that are named in one note.
+MOST_NAMED = 8
 
 
 @dataclass(frozen=True)
 class Shapes:
-    """curves: in the order of the file, without those that have faults; tolerance: which points agree."""
+    """curves: in the order of the file, without those that have faults; tolerance: which points agree; notes: for the
+    user, of ends that were moved."""
 
     curves: Mapping[str, Curve]
     size: float
     tolerance: Tolerance
     faults: tuple[Fault, ...]
+    notes: tuple[str, ...] = ()
 
 
 def shape_curves(case: Case, roles: Roles) -> Shapes:
@@ -69,7 +75,17 @@ def shape_curves(case: Case, roles: Roles) -> Shapes:
             expected = f"at most {MOST_ELEMENTS} on one curve"
             faults.append(Fault.at(("curves", name, key), f"{total} elements", expected))
             del curves[name]
-    return Shapes(curves, size, tolerance, tuple(faults))
+    curves, moved = meet_arcs({name: table.boundary for name, table in case.regions.items()}, curves)
+    return Shapes(curves, size, tolerance, tuple(faults), tuple(_describe_moved(moved)))
+
+
+def _describe_moved(moved: Sequence[MovedEnd]) -> list[str]:
+    if not moved:
+        return []
+    said = [f"'{each.curve}' to {format_point(each.point)} by {each.distance:.2g}" for each in moved[:MOST_NAMED]]
+    more = len(moved) - len(said)
+    return [f"Ends written with few digits were moved to the ends of arcs: {', '.join(said)}"
+            f"{f', and {more} more' if more else ''}."]
 
 
 def _find_tolerance(curves: Mapping[str, Curve], roles: Roles, largest: float) -> Tolerance:

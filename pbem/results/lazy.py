@@ -84,7 +84,7 @@ class Contact:
         Uses the quadrature of the elements; next to crack tips slip and opening have the square-root shape. On a curved
         contact the component is integrated, which does not give a force. Raises ValueError for an unknown quantity.
         """
-        if quantity not in INTEGRABLE:
+        if not isinstance(quantity, str) or quantity not in INTEGRABLE:
             raise ValueError(f"found {quantity!r}{suggest(str(quantity), INTEGRABLE)}; expected one of: "
                              f"{', '.join(INTEGRABLE)}")
         plain, rooted = self._weights
@@ -238,6 +238,8 @@ class Interfaces(Mapping[str, Contact]):
         self._found: dict[str, Contact] = {}
 
     def __getitem__(self, name: str) -> Contact:
+        if not isinstance(name, str):
+            raise KeyError(f"{name!r}: expected the name of an interface, crack or contact")
         if name not in self._found:
             self._found[name] = self._look_up(name) if name in self._names else self._join(name)
         return self._found[name]

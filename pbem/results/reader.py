@@ -153,12 +153,15 @@ class Results:
     def choose_steps(self, steps: int | Sequence[int] | None = None) -> list[int]:
         """Indices from 0 of stored steps; given ones may be negative, from the end. None selects all.
 
-        Raises IndexError for a step that is not stored.
+        Raises IndexError for a step that is not stored, ValueError for what are no indices.
         """
         count = len(self.steps)
         if steps is None:
             return list(range(count))
-        chosen = np.atleast_1d(np.asarray(steps))
+        try:
+            chosen = np.atleast_1d(np.asarray(steps))
+        except ValueError:  # lists of different lengths
+            chosen = np.atleast_1d(np.nan)
         if chosen.ndim != 1 or (chosen.size and chosen.dtype.kind not in "iu"):
             raise ValueError(f"steps: found {steps!r}; expected indices of stored steps, such as [-1]")
         for each in chosen:
@@ -205,7 +208,10 @@ class Results:
         return json.loads(self.configuration) if self.configuration else {}
 
     def find_step(self, number: int) -> int:
-        """Index of the load step with this number. Raises ResultFileError if it is not stored."""
+        """Index of the load step with this number. Raises ResultFileError if it is not stored, ValueError if it
+        is no whole number."""
+        if not isinstance(number, int | np.integer):
+            raise ValueError(f"number: found {number!r}; expected the number of a load step")
         found = np.flatnonzero(self.steps.number == number)
         if not len(found):
             stored = ", ".join(map(str, self.steps.number[:20])) + (", ..." if len(self.steps) > 20 else "")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from pbem.case.build import Source, find_file, make_checked_model
 from pbem.case.case import Case
@@ -26,10 +26,11 @@ from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
 from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
+from pbem.solve.launch.arguments import check_arguments
 from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
-from pbem.solve.petsc.options import check_kind, check_options
+from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps.march import march
@@ -121,9 +122,7 @@ def sweep(
     after which the sweep can be continued.
     """
     comm = check_communicator(comm)
-    if operator is not None and operator not in get_args(Operator):
-        raise ValueError(f"operator = {operator!r}; expected one of {', '.join(get_args(Operator))}")
-    check_kind(petsc)
+    check_arguments(operator, petsc, {"force": force, "neighbours": neighbours}, listener)
     folder = None if keep is None else Path(keep)
     setting = Setting(case, {} if set is None else set, operator, petsc or {}, folder, neighbours, label)
     try:

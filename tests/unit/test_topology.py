@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
@@ -187,6 +188,47 @@ def test_a_point_with_few_digits_at_an_arc_is_told_with_all_of_them() -> None:
         assert find_area(model, "wedge") == pytest.approx(math.pi / 12, rel=1e-12)
     straight = find_faults(change(SQUARE, ("[2, 2], [0, 2]", "[2, 2], [0.001, 2]")))
     assert straight and not any("digits" in fault.expected for fault in straight)
+
+
+@pytest.mark.parametrize("shift", [0j, 1234.5 - 876j])
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e5])
+def test_a_point_with_six_digits_is_moved_to_the_end_of_its_arc(unit: float, shift: complex) -> None:
+    places = [unit * (z + shift) for z in (0, 0.866026 + 0.5j, 0.8659 + 0.5j, 1)]
+    here, corner, far, right = (f"[{each.real!r}, {each.imag!r}]" for each in places)
+    text = f"""
+    materials.rock = {{ young = 1000.0, poisson = 0.2 }}
+    curves.bottom = {{ points = [{here}, {right}], elements = 8 }}
+    curves.bow = {{ center = {here}, radius = {unit!r}, angles = [0, 30], elements = 8 }}
+    curves.back = {{ points = [{corner}, {here}], elements = 8 }}
+    regions.wedge = {{ material = "rock", boundary = ["bottom", "bow", "back"] }}
+    boundary.bottom = {{ ux = 0.0, uy = 0.0 }}
+    boundary.bow = {{ tn = -1.0 }}
+    """
+    model = build(text)
+    assert find_area(model, "wedge") == pytest.approx(unit**2 * math.pi / 12, rel=1e-9)
+    (said,) = (note for note in model.notes if "few digits" in note)
+    miss = abs(0.866026 + 0.5j - cmath.exp(1j * math.pi / 6))
+    assert "'back' to (" in said and float(said.split(" by ")[1].rstrip(".")) == pytest.approx(unit * miss, rel=0.05)
+    assert abs(model.curves["bow"].legs[0].sweep) == pytest.approx(math.pi / 6, rel=1e-14)
+    # What misses it by more is refused.
+    assert len(find_faults(change(text, (corner, far)))) == 2
+
+
+def test_two_arcs_that_all_but_meet_go_through_one_point() -> None:
+    lens = """
+    materials.rock = { young = 1000.0, poisson = 0.2 }
+    curves.left = { center = [0, 0], radius = 1, angles = [30, 150], elements = 12 }
+    curves.right = { center = [0, 1], radius = 1.000001, angles = [210, 330], elements = 12 }
+    regions.lens = { material = "rock", boundary = ["left", "right"] }
+    boundary.left = { ux = 0.0, uy = 0.0 }
+    boundary.right = { tn = -1.0 }
+    """
+    model = build(lens)
+    left, right = model.curves["left"], model.curves["right"]
+    assert (left.start, left.end) == (right.end, right.start)
+    assert left.legs[0].center == pytest.approx(model.curves["left"].legs[0].center)
+    assert find_area(model, "lens") == pytest.approx(2 * math.pi / 3 - math.sin(math.radians(120)), rel=1e-5)
+    assert any("'right' to (" in note and "'left' to" not in note for note in model.notes)
 
 
 def test_gap_in_a_loop_tells_both_ends() -> None:

@@ -1,0 +1,68 @@
+"""Arguments of the functions of `import pbem` that fit nowhere: the error names the argument and what is expected."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.results.reader import Results, open_results
+from pbem.results.writer import ResultWriter
+from tests.unit.results_sample import make_mesh, make_model, make_steps
+
+MODEL = make_model()
+MESH = make_mesh(MODEL)
+ODD = [np.array(["slip", "opening"]), np.zeros((0, 2)), ["slip"], slice(None), object()]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    path = tmp_path_factory.mktemp("odd") / "a.h5"
+    with ResultWriter(path, MODEL, MESH, 1, "") as writer:
+        for step in make_steps(MODEL, MESH)[:2]:
+            writer.append(step)
+    return open_results(path)
+
+
+@pytest.mark.parametrize("odd", ODD, ids=lambda each: type(each).__name__)
+def test_results_refuse_what_names_nothing(results: Results, odd: Any) -> None:
+    with pytest.raises(ValueError, match=r"found .*; expected one of: opening, slip, traction_n, traction_s"):
+        results.contact["joint"].integrate(odd)
+    with pytest.raises(ValueError, match=r"number: found .*; expected the number of a load step"):
+        results.find_step(odd)
+    with pytest.raises(KeyError, match="expected the name of an interface, crack or contact"):
+        results.contact[odd]
+    assert results.find_step(int(results.steps.number[1])) == results.find_step(results.steps.number[1]) == 1
+
+
+@pytest.mark.parametrize(("given", "kind", "said"), [
+    ({"operator": np.array(["dense", "auto"])}, ValueError, "operator: found .*; expected one of auto, dense, hier"),
+    ({"operator": "dens"}, ValueError, "operator: found 'dens'; expected one of auto, dense, hierarchical"),
+    ({"force": np.ones(2)}, TypeError, r"force: found array\(.*; expected True or False"),
+    ({"force": "yes"}, TypeError, "force: found 'yes'; expected True or False"),
+    ({"petsc": ["ksp_monitor"]}, TypeError, "petsc: found .*; expected a dictionary"),
+])  # fmt: skip
+def test_runs_and_sweeps_refuse_odd_options(given: dict[str, Any], kind: type, said: str, tmp_path: Path) -> None:
+    with pytest.raises(kind, match=said):
+        pbem.run(tmp_path / "none.toml", **given)
+    with pytest.raises(kind, match=said):
+        pbem.sweep(tmp_path / "none.toml", {"interfaces.a.friction": [0.1]}, **given)
+
+
+def test_steps_are_indices(results: Results) -> None:
+    for odd in ([[1.0, 2.0], [3.0]], "last", 0.5, [[0]]):
+        with pytest.raises(ValueError, match=r"steps: found .*; expected indices of stored steps"):
+            results.choose_steps(odd)  # type: ignore[arg-type]
+    assert results.choose_steps(-1) == [1] and results.choose_steps([0, 1]) == [0, 1]
+
+
+def test_other_odd_options(tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="resume: found 1; expected True or False"):
+        pbem.run(tmp_path / "none.toml", resume=1)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="neighbours: found None; expected True or False"):
+        pbem.sweep(tmp_path / "none.toml", {}, neighbours=None)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="listener: found 'print'; expected a function"):
+        pbem.sweep(tmp_path / "none.toml", {}, listener="print")  # type: ignore[arg-type]

@@ -50,12 +50,12 @@ def _find_pair(curves: Mapping[str, Curve]) -> tuple[complex, complex] | None:
             for point, leg in ((curve.start, curve.legs[0]), (curve.end, curve.legs[-1]))]
     count = Counter(point for point, _, _ in ends)
     loose = [each for each in ends if count[each[0]] % 2]
-    arcs = [each for each in loose if each[2].sweep]
+    arcs = [each for each in loose if each[2].turn]
     for point, name, _ in arcs:
         for other, second, leg in loose:
             reach = FEW_DIGITS * min(curves[name].length, curves[second].length)
             if second != name and 0.0 < abs(point - other) <= reach:
-                later = bool(leg.sweep) and list(curves).index(second) < list(curves).index(name)
+                later = bool(leg.turn) and list(curves).index(second) < list(curves).index(name)
                 return (point, other) if later else (other, point)
     return None
 

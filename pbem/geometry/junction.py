@@ -31,7 +31,8 @@ class SplitCurves:
 
 def format_point(point: complex) -> str:
     """A point for a message."""
-    return f"({point.real:.6g}, {point.imag:.6g})"
+    # Coordinates of maps have six digits before the point.
+    return f"({', '.join(f'{each:.{10 if 1e4 <= abs(each) < 1e10 else 6}g}' for each in (point.real, point.imag))})"
 
 
 def _pair(found: tuple[Integer, Integer]) -> Iterator[tuple[int, int]]:

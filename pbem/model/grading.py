@@ -18,6 +18,8 @@ from pbem.wording import list_names
 
 # A curve that turns by less than this goes on smoothly.
 SMOOTH = math.radians(1.0)
+# So many kinds of refinement are told each by itself, if it takes no more than so many characters.
+MOST_KINDS, MOST_TEXT = 8, 150
 
 
 @dataclass(frozen=True)
@@ -143,12 +145,19 @@ def _explicit(curve: Curve, grading: str, breaks: tuple[complex, ...], polyline:
 
 
 def _describe(case: Case, curves: Mapping[str, Curve]) -> tuple[str, ...]:
-    """One sentence for all curves with the same refinement."""
+    """One sentence for all curves with the same refinement; the rarest kinds, and those of many legs, share one."""
     groups: dict[str, list[str]] = defaultdict(list)
     for name, curve in curves.items():
         if case.curves[name].grading == "auto" and not case.curves[name].expression:
             groups[_describe_legs(curve)].append(f"'{name}'")
-    return tuple(f"Grading, chosen: {text}: {list_names(names, 12)}." for text, names in groups.items())
+    common = {text for text in sorted(groups, key=lambda text: len(groups[text]), reverse=True)[:MOST_KINDS]
+              if len(text) <= MOST_TEXT}
+    said = [f"Grading, chosen: {text}: {list_names(names, 12)}." for text, names in groups.items() if text in common]
+    others = [name for text, names in groups.items() if text not in common for name in names]
+    if others:
+        how = f"in {len(groups) - len(common)} other ways" if common else "leg by leg"
+        said.append(f"Grading, chosen: {how}: {list_names(others, 12)}.")
+    return tuple(said)
 
 
 def _describe_legs(curve: Curve) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pbem.geometry.junction import format_point
 from pbem.model.model import Model
 from tests.unit.case_sample import BLOCKS, SQUARE, add_curves, build, change, find_only_fault
 
@@ -20,6 +21,30 @@ def test_corners_are_refined() -> None:
     model = build(SQUARE)
     assert all(refined(model, name) == [BOTH] for name in model.curves)
     assert any("towards both ends: 'bottom', 'right', 'top', 'left'" in note for note in model.notes)
+
+
+def test_rough_traces_are_told_in_few_lines() -> None:
+    """Fifty cracks of up to fifty legs, of which any turn or go straight on: nearly each is refined in its own way."""
+    draw = np.random.default_rng(5)
+    cracks = {}
+    for number in range(50):
+        steps = np.where(draw.random(number + 1) < 0.5, 0.0, 0.05).cumsum()
+        points = [[float(x), float(y) + number] for x, y in zip(range(number + 2), [0.0, *steps], strict=True)]
+        cracks[f"rough{number}"] = points
+    model = build("\n".join([
+        "materials.rock = { young = 1.0, poisson = 0.2 }",
+        *(f"curves.{name} = {{ points = {points}, elements = {12 * len(points)} }}" for name, points in cracks.items()),
+        f'regions.plane = {{ material = "rock", infinite = true, cracks = {list(cracks)} }}', "remote = { sxx = -1.0 }",
+    ]).replace("'", '"'))
+    notes = [note for note in model.notes if note.startswith("Grading, chosen")]
+    assert 2 <= len(notes) <= 9 and sum(map(len, notes)) < 3000
+    assert "other ways: 'rough" in notes[-1] and notes[-1].endswith(" more.")
+
+
+def test_places_on_maps_have_digits_after_the_point() -> None:
+    assert format_point(466000.282 + 6691582.099j) == "(466000.282, 6691582.099)"
+    assert format_point(complex(1 / 3, -2e-5)) == "(0.333333, -2e-05)"
+    assert format_point(1e12 + 0j) == "(1e+12, 0)"
 
 
 def test_smooth_continuation_is_left_alone() -> None:

@@ -46,7 +46,7 @@ CASES = (
     *(f"scripts/fuzz_seeds/{name}" for name in ("cracked", "dilating", "fitted", "loose", "points", "pressed", "rigid",
                                                 "rough", "softening", "staged", "timed", "tool")),
     "cases/gallery/sawtooth_joint", "cases/gallery/hertz", "cases/gallery/press_fit_overlap",
-    "cases/gallery/punch_flat",
+    "cases/gallery/punch_flat", "cases/gallery/tunnel_excavated", "cases/gallery/k0_tunnel",
 )  # fmt: skip
 ROUNDINGS = 1e3
 # Clearances, as a part of the size: gaps of which the pressure is a function are known to less than the bodies.
@@ -120,7 +120,7 @@ def move_case(case: dict[str, Any], move: Move, size: float) -> dict[str, Any]:
             for name, table in tables.get(kind, {}).items():
                 _move_condition(table, reached.setdefault((kind, name), {}), move, size)
     for stress in result.get("initial_stress", {}).values():
-        stress |= _move_field(stress, "remote", move)
+        stress |= _move_stress(stress, move, size)
     result.pop("output", None)
     # What is compared is the models, not where Newton's method is content.
     result["solver"] = {**result.get("solver", {}), "newton_tolerance": 1e-10}
@@ -138,6 +138,8 @@ def _scale(value: Any, move: Move, size: float) -> Any:
         unit = _find_unit(key, move)
         if unit is not None and isinstance(each, int | float) and not isinstance(each, bool):
             result[key] = each * unit
+        elif unit is not None and isinstance(each, dict) and "table" in each:
+            result[key] = {"table": [[s * move.length, value * unit] for s, value in each["table"]]}
         elif unit is not None and isinstance(each, dict) and "expression" in each:
             result[key] = {"expression": f"{unit!r}*({_move_back(each['expression'], move, size)})"}
         else:
@@ -237,6 +239,20 @@ def _move_field(table: dict[str, float], key: str, move: Move) -> dict[str, floa
     mean, deviator = 0.5 * (sxx + syy), 0.5 * (sxx - syy) + 1j * sxy
     deviator = complex((np.conj(deviator) if move.mirror else deviator) * move.turn**2)
     return {"sxx": mean + deviator.real, "syy": mean - deviator.real, "sxy": deviator.imag}
+
+
+def _move_stress(table: dict[str, Any], move: Move, size: float) -> dict[str, Any]:
+    """In-situ stress, which may be linear in x and y: each component by what all of them are where it was."""
+    names = ("sxx", "syy", "sxy")
+    if not any(isinstance(table.get(name), dict) for name in names):
+        return dict(_move_field(table, "remote", move))
+    moved: dict[str, list[str]] = {name: [] for name in names}
+    for name in names:
+        value = table.get(name, 0.0)
+        text = _move_back(value["expression"], move, size) if isinstance(value, dict) else repr(value)
+        for other, part in _move_field({name: 1.0}, "remote", move).items():
+            moved[other].append(f"{part!r}*({text})")
+    return {name: {"expression": " + ".join(parts)} for name, parts in moved.items()}
 
 
 def _move_strain(table: dict[str, float], move: Move) -> dict[str, float]:

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """What the checks of a run cost: seconds of each, and their part of the whole run.
 
-usage: .venv/bin/python scripts/bench_checks.py [--count 2000] [CASE.toml]
+usage: [mpirun -n 2] .venv/bin/python scripts/bench_checks.py [--count 2000] [CASE.toml]
 
 Without a case: a field of so many random cracks, as scripts/bench_field.py makes it. Seconds are those of the processor
 in one process, so that a busy machine changes little. A check within another one counts for the outer one. Estimated
 errors, which take a second solution, are no checks: they are told apart, and the checks are compared with the run
-without them. Exit code 1 if the checks take more than MOST of it.
+without them. On several ranks those of the first are told; its waiting counts. Exit code 1 if the checks take more than
+MOST of it.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from bench_field import make_field
 
 from pbem import driver
 from pbem.model import build
+from pbem.parallel import world
 from pbem.solve.nonlinear import hold
 from pbem.solve.problem import problem
 from pbem.solve.steps import recovery, step_notes
@@ -95,9 +97,13 @@ def main() -> int:
     parser.add_argument("case", nargs="?", type=Path)
     parser.add_argument("--count", type=int, default=2000, help="cracks of the field")
     options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        case = options.case or make_field(Path(name), options.count)
-        clock, whole = measure(case, Path(name))
+    with tempfile.TemporaryDirectory() as own:
+        name = world.bcast(own)
+        case = options.case or (make_field(Path(name), options.count) if world.rank == 0 else None)
+        clock, whole = measure(world.bcast(case), Path(name))
+        world.Barrier()  # before the folder is removed
+    if world.rank:
+        return 0
     for piece in (*CHECKS, *ESTIMATE):
         seconds = clock.seconds.get(piece, 0.0)
         print(f"{piece:>18s}{seconds:10.3f} s{100 * seconds / whole:8.2f} %{clock.calls.get(piece, 0):7d} calls")

@@ -17,6 +17,7 @@ from pbem.solve.steps import march, softly
 from pbem.solve.steps.ends import find_reason
 from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
 from pbem.solve.system.assembly import assemble_problem
+from scripts.torture.kinds import draw_sample
 from tests.verification.proofs.proof import write_case
 from tests.verification.test_settling import BLOCKS, Listener, run
 
@@ -137,6 +138,15 @@ def test_advice_on_a_limit_load_is_a_clause_of_its_own() -> None:
         run(write_pushed_block(0.7, {"friction": 0.25}))
 
 
+class IterationCounter(Listener):
+    """Counts the iterations of all tries."""
+
+    iterations = 0
+
+    def iterate(self, iteration: object) -> None:
+        self.iterations += 1
+
+
 BONDED = {"friction": 0.25, "cohesion": 0.3, "tensile_strength": 0.5, "cohesion_lost": True}
 
 
@@ -144,18 +154,21 @@ def test_bonds_that_all_fail_in_turn_end_at_a_limit_load() -> None:
     # All bonds together bear 0.55, friction alone 0.25; they fail from an end on, where the stress is largest.
     text = write_pushed_block(0.5, BONDED)
     assert find(text) == 1.0
-
-    class Counter(Listener):
-        iterations = 0
-
-        def iterate(self, iteration: object) -> None:
-            self.iterations += 1
-
-    counter = Counter()
+    counter = IterationCounter()
     with pytest.raises(ConvergenceError, match=r"bonds fail one after the other.*translation along x") as caught:
         run(text, counter)
     assert caught.value.reason == "limit load"
     assert counter.tried <= 12 and counter.iterations <= 8 * counter.tried
+
+
+def test_a_try_ends_with_the_bonds_without_which_nothing_balances_the_loads() -> None:
+    """A block on a slope: left to itself it goes on to a mechanism, whose modes, and the steps tried next, are those of
+    rounding."""
+    counter = IterationCounter()
+    with pytest.raises(ConvergenceError, match="bonds fail one after the other") as caught:
+        run(draw_sample(10).text(), counter)  # a slope of torture.py
+    assert caught.value.reason == "limit load" and set(counter.rejected) == {"limit load"}
+    assert counter.iterations <= 2 * counter.tried
 
 
 @pytest.mark.parametrize(("shear", "intact", "lost"), [(0.2, True, True), (0.4, True, False), (0.6, False, False)])

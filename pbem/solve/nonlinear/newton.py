@@ -194,7 +194,7 @@ def _search_modes(
             return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations),
                             load.pressure)
         before, asked = asked, len(iterations) // PATIENCE  # iterations with smoothed laws come several at a time
-        # Bonds that have failed are lost: what is left of them is asked at once, before the search runs into mechanisms.
+        # Bonds that have failed are lost: what is left is asked at once, before the search runs into mechanisms.
         refused = refuse(memory) if asked > before or fails else None
         if refused:
             forcing.used = False  # no solution was asked for that

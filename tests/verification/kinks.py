@@ -19,6 +19,7 @@ from tests.verification.proofs.proof import line, solve_model, write_case
 
 # Pieces of a leg at most, and lengths of pieces as 1:100.
 MOST_PIECES, MOST_RATIO = 3, 100.0
+YOUNG = 1e3
 GRADINGS = ("start", "end", "both", "none")
 
 
@@ -79,11 +80,13 @@ def measure_kink(kink: Kink, given: bool = True) -> TipErrors:
     )
 
 
-def solve_tips(curves: list[dict[str, Any]], remote: tuple[float, float, float], order: int) -> np.ndarray:
+def solve_tips(
+    curves: list[dict[str, Any]], remote: tuple[float, float, float], order: int, young: float = YOUNG
+) -> np.ndarray:
     """KI, KII and J (3, tips) of open cracks that make one crack in an infinite plane."""
     names = [f"piece {k}" for k in range(len(curves))]
     text = write_case({
-        "materials": {"rock": {"young": 1e3, "poisson": 0.25}},
+        "materials": {"rock": {"young": young, "poisson": 0.25}},
         "curves": {f'"{name}"': curve for name, curve in zip(names, curves, strict=True)},
         "regions": {"plane": {"material": "rock", "infinite": True, "cracks": names}},
         "interfaces": {f'"{name}"': {"law": "open"} for name in names},

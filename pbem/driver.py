@@ -39,6 +39,7 @@ from pbem.results.overrides import choose_overrides
 from pbem.results.passes import KeptPass, keep_pass, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.tip_notes import compare_release
+from pbem.results.tips import TipRules
 from pbem.results.writer import ResultWriter
 from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
 from pbem.solve.estimate.second_solution import SecondSolution
@@ -174,7 +175,8 @@ def _refine_and_solve(
             decision = _solve(model, mesh, target, options, watch, signals, now, kept)
         except ConvergenceError as error:
             # What was gone on with, and what is kept for other runs, stays on its mesh.
-            finer = None if target.resume or kept else plan_finer(first, model, 2 * mesh.nodes, tries, error)
+            finer = None if target.resume or kept else plan_finer(
+                first, model, 2 * mesh.nodes, tries, error, watch.iterations)
             if finer is None:
                 raise blame_tries(error, tries, 2 * mesh.nodes) from error
             watch.note(finer.note)
@@ -269,7 +271,8 @@ def _fill(
             interior.prepare(problem.system)
     start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
     with clock.piece("estimate"):
-        estimator = make_estimator(model, mesh, last, comm, kept, signals)
+        rules = writer.tip_rules if writer else None
+        estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
     tangent = kept.take_tangent(problem) if kept else None
     try:
         steps = clock.each("steps", march(problem, watch, start, tangent, go_on(unfinished)))
@@ -341,9 +344,12 @@ def _append(writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | 
 
 def make_estimator(
     model: Model, mesh: Mesh, start: Step | None = None, comm: Comm = world, kept: KeptProblems | None = None,
-    signals: StopSignals | None = None,
+    signals: StopSignals | None = None, rules: TipRules | None = None,
 ) -> Estimator:
-    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together."""
+    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together.
+
+    rules: of the run's tips, if they are known on this rank.
+    """
     beside, second, missing = None, None, ""
     try:
         beside = put_beside(model, mesh)
@@ -353,7 +359,7 @@ def make_estimator(
         missing = NOTHING_COARSER if beside is None else ""
     except PbemError as error:
         missing = f"the second solution cannot be computed ({error})"
-    return Estimator(model, mesh, beside, second, missing, comm.rank == 0)
+    return Estimator(model, mesh, beside, second, missing, comm.rank == 0, rules)
 
 
 def store_steps(

@@ -19,6 +19,9 @@ from pbem.wording import count
 MOST_TRIES = 3
 MOST_GROWTH = 3.0
 MOST_UNKNOWNS = 5_000
+# A pass of so many iterations went on for long before it came to what failed: all of that would be done again, as often
+# as there are tries.
+MOST_ITERATIONS = 400
 # So many places are named.
 MOST_NAMED = 3
 
@@ -40,12 +43,14 @@ class Finer:
     note: str
 
 
-def plan_finer(first: Model, model: Model, unknowns: int, tries: int, error: ConvergenceError) -> Finer | None:
+def plan_finer(
+    first: Model, model: Model, unknowns: int, tries: int, error: ConvergenceError, iterations: int = 0
+) -> Finer | None:
     """What to solve in place of a model whose contacts did not settle; None if that is how the run ends.
 
-    first: the model before any such try; unknowns: of this one; tries: how many there were.
+    first: the model before any such try; unknowns, iterations: of this one; tries: how many there were.
     """
-    if not error.places or tries >= MOST_TRIES or unknowns > MOST_UNKNOWNS:
+    if not error.places or tries >= MOST_TRIES or unknowns > MOST_UNKNOWNS or iterations > MOST_ITERATIONS:
         return None
     marked = mark_near(model, error.places)
     finer = bisect_elements(model, marked)

@@ -14,6 +14,9 @@ from pbem.model.model import Model, Operator, SolverOptions
 WORTH_WHILE, LEAST_UNKNOWNS = 2.0, 4000
 # Of the hierarchical operator a difference of meshes asks for less than the solution itself.
 EASED_TOLERANCE, EASED_NEWTON_TOLERANCE = 1e-6, 1e-7
+# Its search begins with the statuses of the run: in so many iterations it settles, or (a map of a thousand traces) not
+# in twice as many either, and is solved with the run's.
+EASED_ITERATIONS = 5
 
 
 class DenseChoice:
@@ -42,6 +45,7 @@ class HierarchicalChoice:
         return replace(
             solver, operator="hierarchical", tolerance=max(solver.tolerance, EASED_TOLERANCE),
             newton_tolerance=max(solver.newton_tolerance, EASED_NEWTON_TOLERANCE),
+            newton_max_iterations=min(solver.newton_max_iterations, EASED_ITERATIONS),
         )
 
 

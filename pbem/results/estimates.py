@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from pbem.model.model import Model
 from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
 from pbem.results.rates import EndFinder, choose_jump_divisors
-from pbem.results.tips import collect_tip_rules
+from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
 
@@ -92,23 +93,34 @@ class Comparison:
     and slip over the largest jump in the model.
     """
 
-    def __init__(self, model: Model, mesh: Mesh, beside: Beside | None, as_they_are: bool = False) -> None:
-        """as_they_are: differences are not divided: with a run that is exact they are the errors of the other one."""
+    def __init__(
+        self, model: Model, mesh: Mesh, beside: Beside | None, as_they_are: bool = False, rules: TipRules | None = None
+    ) -> None:
+        """as_they_are: differences are not divided: with a run that is exact they are the errors of the other one.
+        rules: of the run's tips, if they are known."""
         self._model, self._mesh, self._beside = model, mesh, beside
         self._interfaces = list(sort_pairs(mesh).values())
-        self._rules = collect_tip_rules(model, mesh)
+        self._known = rules
         self._gap = collect_laws(model, mesh).gap
         self.energy, self.jumps = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
         self.scales = Scales()
         if beside is not None:
             self._others = list(sort_pairs(beside.mesh).items())
-            self._other_rules = collect_tip_rules(beside.model, beside.mesh)
             self._other_gap = collect_laws(beside.model, beside.mesh).gap
             smooth = MERGED[model.analysis.order] if beside.kind == "merged" else LOWERED
             self._divisor = 1.0 if as_they_are else smooth
             self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
             self._ends = EndFinder(mesh, beside)
             self._jump_divisor = choose_jump_divisors(beside, model.crack_tips, self._divisor)
+
+    @cached_property
+    def _rules(self) -> TipRules:
+        return self._known or collect_tip_rules(self._model, self._mesh)
+
+    @cached_property
+    def _other_rules(self) -> TipRules:
+        assert self._beside is not None
+        return collect_tip_rules(self._beside.model, self._beside.mesh)
 
     def measure_scales(self, step: Step) -> Scales:
         """The largest values of one step."""

@@ -13,6 +13,7 @@ from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import BetweenNodes
 from pbem.results.estimates import VIOLATIONS, Comparison, to_rows
+from pbem.results.tips import TipRules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import Step
 
@@ -44,15 +45,15 @@ class Estimator:
 
     def __init__(
         self, model: Model, mesh: Mesh, beside: Beside | None, second: Follower | None, missing: str = "",
-        first: bool = True,
+        first: bool = True, rules: TipRules | None = None,
     ) -> None:
         """second: the solution on the mesh beside, None where there is none, and `missing` says why. first: whether
-        this is the first rank, which alone compares."""
+        this is the first rank, which alone compares. rules: of the run's tips, if they are known there."""
         self.missing = missing
         self._first = first
         self._names = list(sort_pairs(mesh))
         self._worst = {kind: (0.0, "", 0) for kind in VIOLATIONS}
-        self.comparison = Comparison(model, mesh, beside)
+        self.comparison = Comparison(model, mesh, beside, rules=rules)
         self._between = BetweenNodes(model, mesh)
         self._second = second
 

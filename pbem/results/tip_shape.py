@@ -13,7 +13,7 @@ left and the right one for somebody who leaves the tip. Stresses are in units of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -34,28 +34,55 @@ MOST_DEGREE = 5
 STRAIGHT = 1e-6
 
 
-@dataclass(frozen=True)
 class TipForms:
-    """By the jumps x (2 m (p + 1),) of all nodes, or of the first ones: intensity (2, :), KI and KII; release (n, n),
+    """The forms of one arrangement of elements, in units of E' and its length (K: E' times its root), each derived when
+    it is first asked for.
+
+    By the jumps x (2 m (p + 1),) of all nodes, or of the first ones: intensity (2, :), KI and KII; release (n, n),
     J is x . release x; parallel (l,), the T-stress's part of them.
 
     of_mean (j,) complex: T has the real part of its sum with the mean displacement of both faces; of_normal (j,): and
     of its sum with the normal stress on the faces.
     """
 
-    intensity: Real
-    release: Real
-    parallel: Real
-    of_mean: Complex
-    of_normal: Real
+    def __init__(self, shape: TipShape) -> None:
+        self._shape = shape
 
+    @cached_property
+    def intensity(self) -> Real:
+        if _is_whole_and_straight(self._shape):
+            return _integrate_straight_crack(self._shape)
+        return _Near(self._shape, self._shape.elements.count).integrate_intensity()
 
-def derive_forms(shape: TipShape) -> TipForms:
-    """The forms of one arrangement of elements; in units of E' and its length (K: E' times its root)."""
-    whole = _Near(shape, shape.elements.count)
-    intensity = _integrate_straight_crack(shape) if _is_whole_and_straight(shape) else whole.integrate_intensity()
-    near = whole if shape.near == shape.elements.count else _Near(shape, shape.near)
-    return TipForms(intensity, near.integrate_release(), *whole.fit_parallel_stress())
+    @property
+    def release(self) -> Real:
+        return self._others[0]
+
+    @property
+    def parallel(self) -> Real:
+        return self._others[1]
+
+    @property
+    def of_mean(self) -> Complex:
+        return self._others[2]
+
+    @property
+    def of_normal(self) -> Real:
+        return self._others[3]
+
+    @cached_property
+    def _others(self) -> tuple[Real, Real, Complex, Real]:
+        shape = self._shape
+        whole = _Near(shape, shape.elements.count)
+        if "intensity" not in vars(self) and not _is_whole_and_straight(shape):
+            vars(self)["intensity"] = whole.integrate_intensity()  # from the same field
+        near = whole if shape.near == shape.elements.count else _Near(shape, shape.near)
+        return near.integrate_release(), *whole.fit_parallel_stress()
+
+    def derive(self) -> None:
+        """Derive all of them now, which takes less than one after the other."""
+        self._others  # noqa: B018
+        self.intensity  # noqa: B018
 
 
 def _is_whole_and_straight(shape: TipShape) -> bool:

@@ -18,7 +18,7 @@ from pbem.results.interface_release import InterfaceRelease, prepare_interface_r
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.tip_field import TipShape
 from pbem.results.tip_path import TipPaths, trace_paths, view_outward
-from pbem.results.tip_shape import STRAIGHT, TipForms, derive_forms
+from pbem.results.tip_shape import STRAIGHT, TipForms
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import ContactState, Step
 
@@ -63,6 +63,11 @@ class TipRules:
     mesh: Mesh
     groups: tuple[_Alike, ...]
     interfaces: InterfaceRelease
+
+    def derive(self) -> None:
+        """Derive the forms now, which else are derived when they are first asked for."""
+        for group in self.groups:
+            group.forms.derive()
 
     def evaluate(self, contact: ContactState) -> dict[str, tuple[Real, Real]]:
         """KI and KII (2,) of every crack at its start and its end, as in `evaluate_factors`."""
@@ -193,7 +198,7 @@ def _gather_alike(model: Model, mesh: Mesh, paths: TipPaths, number: Integer, pa
         )  # fmt: skip
         pair = pair_of[_list_outward(mesh, paths.elements[at], paths.outward[at])]
         sense = np.repeat(np.where(paths.outward[at], 1.0, -1.0), mesh.order + 1, axis=1)
-        groups.append(_Alike(derive_forms(shape), material, number[paths.tip[at]], region[at], place_of[at],
+        groups.append(_Alike(TipForms(shape), material, number[paths.tip[at]], region[at], place_of[at],
                              direction[at], length[at], pair, sense))
     return groups
 

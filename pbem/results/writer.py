@@ -70,7 +70,7 @@ class ResultWriter:
     if the model has such points.
 
     last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one. unfinished: the
-    step after it in which the run was stopped, or None.
+    step after it in which the run was stopped, or None. tip_rules: how the values at the tips follow from a step.
     """
 
     def __init__(
@@ -149,7 +149,8 @@ class ResultWriter:
         condition_of_curve = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)
         self._condition = condition_of_curve[faces.curve]
         self._pairs = join_pairs(sort_pairs(mesh))
-        self._tip_rules = collect_tip_rules(model, mesh)
+        self.tip_rules = collect_tip_rules(model, mesh)
+        self.tip_rules.derive()
         self._balance = EnergyBalance(model, mesh, last_step, reached)
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._absence = Absence(model, mesh, points)
@@ -207,11 +208,11 @@ class ResultWriter:
         self._pending = None
         file = self._file
         hoop_stress, reactions = self._evaluate_hoop_stress(step), self._sum_reactions(step.traction)
-        tips = self._tip_rules.evaluate_all(step) if self._tip_rules.cracks else {}
+        tips = self.tip_rules.evaluate_all(step) if self.tip_rules.cracks else {}
         gone = self._absence.list_faces(step.stage)
         if gone is not None:
             hoop_stress = np.where(gone, np.nan, hoop_stress)
-            tips = self._absence.blank_tips(step.stage, self._tip_rules.cracks, tips)
+            tips = self._absence.blank_tips(step.stage, self.tip_rules.cracks, tips)
             step = self._absence.blank(step)
         append_row(file["fields/hoop_stress"], hoop_stress)
         if "interior" in file:

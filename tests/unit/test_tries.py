@@ -16,7 +16,8 @@ from pbem import driver
 from pbem.errors import ConvergenceError, ResultFileError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.refinement import count_elements, mark_near
-from pbem.passes import MOST_TRIES, MOST_UNKNOWNS, blame_tries, plan_finer
+from pbem.passes import MOST_ITERATIONS, MOST_TRIES, MOST_UNKNOWNS, blame_tries, plan_finer
+from pbem.solve.problem.step import Iteration
 from tests.unit.case_sample import BLOCKS, SQUARE, build, change
 
 CYCLE = ConvergenceError("mode cycle", "pairs that still change", (0.03 + 1j,))
@@ -51,6 +52,8 @@ def test_elements_are_halved_within_limits() -> None:
     assert count_elements(finer.model.curves["top"]) == count_elements(model.curves["top"])
     assert plan_finer(model, model, unknowns, MOST_TRIES, CYCLE) is None
     assert plan_finer(model, model, MOST_UNKNOWNS + 1, 0, CYCLE) is None
+    assert plan_finer(model, model, unknowns, 0, CYCLE, MOST_ITERATIONS) is not None
+    assert plan_finer(model, model, unknowns, 0, CYCLE, MOST_ITERATIONS + 1) is None
     assert plan_finer(model, model, unknowns, 0, ConvergenceError("mode cycle", "anywhere")) is None
     coarse = replace(model, curves={name: replace(curve, legs=curve.legs[:0]) for name, curve in model.curves.items()})
     assert plan_finer(coarse, model, unknowns, 0, CYCLE) is None  # more than three times as many as at first
@@ -119,6 +122,28 @@ def test_a_run_that_never_settles_ends_with_its_reason_and_the_last_mesh(
     results = pbem.open_results(tmp_path / "blocks.h5")
     assert results.status == "failed" and "mode cycle" in repr(results)
     assert len(list(tmp_path.glob("*"))) == 2  # no part files
+
+
+@pytest.mark.parametrize("more, passes", [(0, 3), (1, 1)])
+def test_a_pass_of_many_iterations_is_the_last(
+    more: int, passes: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    seen: list[int] = []
+
+    def fail(problem: Any, reporter: Any, *rest: Any) -> Iterator[Any]:
+        seen.append(len(problem.mesh.start))
+        for number in range(MOST_ITERATIONS + more):
+            reporter.iterate(Iteration(number + 1, 0.0, 1, 0, 0, 1, 0.0))
+        yield from ()
+        raise CYCLE
+
+    monkeypatch.setattr(driver, "march", fail)
+    monkeypatch.setattr("pbem.passes.MOST_TRIES", 2)
+    case = tmp_path / "blocks.toml"
+    case.write_text(BLOCKS)
+    with pytest.raises(ConvergenceError, match="still change"):
+        pbem.run(case, tmp_path / "blocks.h5")
+    assert len(seen) == passes
 
 
 def test_what_was_stored_before_is_not_refined(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.model import Law, Model, Stage
 from pbem.results.tips import collect_tip_rules
+from tests.verification.cuts import draw_arc_cut, draw_straight_cut, measure_cut
 from tests.verification.kinks import draw_kink, measure_kink, solve_tips
 from tests.verification.planes import FREE, ROCK, make_arc, make_plane, make_straight, solve
 from tests.verification.proofs.cracks import KINK, PLANE_MODULUS, solve_plate
@@ -120,6 +121,16 @@ def test_kinked_crack_cut_and_graded_anyhow(seed: int) -> None:
     assert found.J < 1e-2, way.text
 
 
+@pytest.mark.parametrize("given", [True, False], ids=["as given", "left to the program"])
+@pytest.mark.parametrize("seed", range(12))
+def test_straight_and_arc_cracks_of_a_file_cut_and_graded_anyhow(seed: int, given: bool) -> None:
+    straight, arc = draw_straight_cut(seed), draw_arc_cut(seed)
+    found = measure_cut(straight, given)
+    assert found.K < 1e-6 and found.J < 1e-2, straight.text
+    found = measure_cut(arc, given)
+    assert found.K < 5e-3 and found.J < 1e-2, arc.text
+
+
 # Sharp corners (136 and 106 degrees), short wings, one that turns by less than the program's rule; short curves at the
 # corner, whose neighbours are longer than the distance from it (97, 82).
 @pytest.mark.parametrize("seed", [31, 27, 17, 16, 36, 97, 82])
@@ -146,6 +157,20 @@ def test_a_short_kink_has_the_factors_of_amestoy_and_leblond_on_any_mesh(
     exact = math.sqrt(math.pi) * np.array(series) @ np.array([1.0, sxy])
     assert np.hypot(KI - exact[0], KII - exact[1]) < 2.5e-3 * np.hypot(*exact)
     assert abs(J / ((KI**2 + KII**2) * (1 - 0.25**2) / 1e3) - 1) < 5e-3
+
+
+def test_forms_of_tips_are_the_same_one_by_one_and_at_once() -> None:
+    model = make_plane((0.3, 1.0, 0.2), {"crack": [make_arc(1 + 0j, 0.9, 12)]})
+    mesh, steps = solve(model)
+    once, single = collect_tip_rules(model, mesh), collect_tip_rules(model, mesh)
+    once.derive()
+    factors = single.evaluate_factors(steps[-1].contact)
+    found, alone = once.evaluate_all(steps[-1]), single.evaluate_all(steps[-1])
+    for k, name in enumerate(("KI", "KII")):
+        np.testing.assert_array_equal(found[name], factors[k])
+    for name, values in found.items():
+        assert np.abs(values).min() > 0
+        np.testing.assert_array_equal(values, alone[name])
 
 
 def test_a_crack_in_situ_is_as_under_remote_stress() -> None:

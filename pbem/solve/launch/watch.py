@@ -23,7 +23,8 @@ EQUAL = 1e-6
 class Watch:
     """A reporter that hands all on to another (of the first rank), and then looks after signals and laws.
 
-    Calls raise StopError or LawError, on all ranks alike.
+    Calls raise StopError or LawError, on all ranks alike. iterations: since the pass began, those of tries that failed
+    as well.
     """
 
     def __init__(self, comm: MPI.Intracomm, listener: Reporter, signals: StopSignals) -> None:
@@ -31,13 +32,15 @@ class Watch:
         self._listener: Reporter | None = listener
         self._signals = signals
         self._laws: tuple[CustomLaw, ...] = ()
+        self.iterations = 0
 
     def look_after(self, laws: PairLaws) -> None:
         """From now on, see whether these laws fail or answer differently on different ranks."""
         self._laws = tuple(each.law for each in laws.strengths if isinstance(each.law, CustomLaw))
 
     def begin(self, model: Model) -> None:
-        """Hand on."""
+        """Hand on, and count anew."""
+        self.iterations = 0
         self._tell("begin", model)
 
     def note(self, text: str) -> None:
@@ -54,7 +57,8 @@ class Watch:
         self.check()
 
     def iterate(self, iteration: Iteration) -> None:
-        """Hand on, and check."""
+        """Hand on, count, and check."""
+        self.iterations += 1
         self._tell("iterate", iteration)
         self.check()
 

@@ -23,7 +23,7 @@ from scipy.special import comb
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem import _expansions
-from pbem.bem.tree import Forest
+from pbem.bem.tree import Branches, Circles
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.shape_functions import interpolate_shapes, tip_shapes
 
@@ -56,7 +56,7 @@ def _pad_weights(terms: int) -> Real:
 class Densities:
     """Elements (m,) in the order of their clusters, with their integration points, all one after the other (q,).
 
-    number (m,): in the mesh; begin, points (m,): where those of each begin, and how many there are. place, slope (q,):
+    number (m,): of each in v; begin, points (m,): where those of each begin, and how many there are. place, slope (q,):
     complex, the slope times the weight. weight, shape: of the rules, each with its points, and of all nodes of an
     element, node after node; shapes (m,): where those of an element's rule begin. length (m,): per unit of s in the
     middle of the element; crowd (m, nodes): by which its tractions are divided (theory, 18).
@@ -77,7 +77,7 @@ class Densities:
     def sum_up(
         self, v: Real, first: Integer, center: Complex, radius: Real, kappa: Real, shear_modulus: Real, terms: int
     ) -> Complex:
-        """Coefficients (k, 2, p + 1) of clusters (k,) for v = (u, t) of all nodes; their elements are those from
+        """Coefficients (k, 2, p + 1) of clusters (k,) for v = (u, t) of the elements; theirs are those from
         first[j] to first[j + 1] (theory, 35, 37, 38)."""
         out = np.zeros((len(center), 2, terms + 1), dtype=complex)
         _expansions.sum_moments(
@@ -135,7 +135,7 @@ def place_densities(mesh: Mesh, elements: Integer, terms: int) -> Densities:
     starts = np.cumsum([0, *(len(weight) for _, weight, _ in rules)])
     nodes = np.tile(mesh.local, (len(elements), 1))
     return Densities(
-        number=np.ascontiguousarray(elements, dtype=np.int64), family=family.astype(np.int8), begin=begin,
+        number=np.arange(len(elements)), family=family.astype(np.int8), begin=begin,
         points=points, shapes=(order + 1) * starts[rule], place=_split(place), slope=_split(slope),
         weight=np.concatenate([weight for _, weight, _ in rules]),
         shape=np.concatenate([shape.T.ravel() for _, _, shape in rules]),
@@ -160,7 +160,7 @@ class FieldPoints:
     kappa: Real
     shear_modulus: Real
 
-    def evaluate(self, fields: Complex, forest: Forest) -> Complex:
+    def evaluate(self, fields: Complex, forest: Circles) -> Complex:
         """Displacements or tractions (n,) of the fields (clusters, 2, p + 1) of a forest (theory, 2, 4, 36)."""
         out = np.zeros(len(self.point), dtype=complex)
         _expansions.evaluate(
@@ -170,13 +170,14 @@ class FieldPoints:
         return out
 
 
-def lift(forest: Forest, moments: Complex) -> None:
+def lift(forest: Branches, moments: Complex) -> None:
     """Add coefficients (k, 2, p + 1) of clusters to those of their parents, all the way up (theory, 39)."""
     _expansions.lift(forest.parent, forest.center, forest.radius, moments, moments.shape[2] - 1)
 
 
 def carry(
-    targets: Forest, length: Real, target: Integer, sources: Forest, source: Integer, moments: Complex, fields: Complex
+    targets: Circles, length: Real, target: Integer, sources: Circles, source: Integer, moments: Complex,
+    fields: Complex,
 ) -> None:
     """Add to the fields of targets what the coefficients of sources that are far from them make there (theory, 40).
 
@@ -189,7 +190,7 @@ def carry(
     )  # fmt: skip
 
 
-def lower(forest: Forest, wanted: Bool, fields: Complex) -> None:
+def lower(forest: Branches, wanted: Bool, fields: Complex) -> None:
     """Add the fields of clusters to those of their children, as far as these are wanted, all the way down (theory, 41).
     """
     _expansions.lower(forest.parent, wanted, forest.center, forest.radius, fields, fields.shape[2] - 1)

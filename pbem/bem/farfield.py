@@ -1,70 +1,138 @@
-"""Up and down the cluster trees: coefficients of all clusters from the densities, fields of all leaves from these."""
+"""Up and down the cluster trees: coefficients of clusters from the densities, fields of leaves from these.
+
+Each rank has of the trees what its own elements need (a locally essential tree: M. S. Warren, J. K. Salmon, Proc.
+Supercomputing 1993): the clusters that its own leaves are in, and those that its targets see from far. What a cluster
+has on several ranks is added up by one of them; coefficients go only to the ranks that see the cluster.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.expansion import Densities, carry, lift, lower
-from pbem.bem.tree import Forest
+from pbem.bem.sharing import Arrival, Ghosts, Share
+from pbem.bem.tree import Circles, Clusters, Forest, Interactions
 
 
 @dataclass(frozen=True)
 class SourceTree:
-    """A forest of elements with those of this rank's share of its leaves.
+    """The clusters of elements with leaves of this rank's, and the densities of these leaves.
 
-    leaves (k,): of this rank; first (k + 1,): where their elements begin; kappa, shear_modulus (k,): of their regions.
-    needed (4 nodes,): entries of v that count, None if all do. add_up: the sum of an array over all ranks.
+    leaves (k,): places of the leaves among the clusters; first (k + 1,): where their elements begin; kappa,
+    shear_modulus (k,): of their regions. elements: of the densities, with so many components of displacements each
+    (width); needed: which entries of v = (u, t) of these elements count, None if all do. owner (all clusters of the
+    forest,): the rank that has a cluster's coefficients in the end. partial: places of the clusters of which this rank
+    has a part only; shared: the same clusters as ghosts.
     """
 
     forest: Forest
+    share: Share
     terms: int
+    clusters: Clusters
     leaves: Integer
     densities: Densities
     first: Integer
     kappa: Real
     shear_modulus: Real
+    elements: Integer
+    width: int
     needed: Bool | None
-    add_up: Callable[[Real], Real]
+    owner: Integer
+    partial: Integer
+    shared: Ghosts
 
     def collect(self, v: Real) -> Complex:
-        """Coefficients (k, 2, p + 1) of all clusters for v = (u, t), on every rank; all ranks call this together."""
-        forest, own = self.forest, self.forest.leaves
-        flat = np.zeros((forest.clusters, 4 * (self.terms + 1)))
-        moments = flat.view(complex).reshape(forest.clusters, 2, self.terms + 1)
-        moments[self.leaves] = self.densities.sum_up(
-            v if self.needed is None else np.where(self.needed, v, 0.0), self.first, forest.center[self.leaves],
-            forest.radius[self.leaves], self.kappa, self.shear_modulus, self.terms,
+        """Coefficients (clusters, 2, p + 1) for v = (u, t) of the elements; complete for clusters that this rank owns.
+
+        All ranks call this together.
+        """
+        clusters, own = self.clusters, self.leaves
+        moments = np.zeros((clusters.count, 2, self.terms + 1), dtype=complex)
+        moments[own] = self.densities.sum_up(
+            v if self.needed is None else np.where(self.needed, v, 0.0), self.first, clusters.center[own],
+            clusters.radius[own], self.kappa, self.shear_modulus, self.terms,
         )  # fmt: skip
-        flat[own] = self.add_up(flat[own])
-        lift(forest, moments)
+        lift(clusters, moments)
+        flat = as_rows(moments)
+        self.shared.add_to_owners(flat[self.partial], flat)
         return moments
+
+
+def as_rows(moments: Complex) -> Real:
+    """The same numbers (k, 4 (p + 1)), a row for each cluster."""
+    return moments.view(float).reshape(len(moments), -1)
+
+
+def share_leaves(forest: Forest, owner: Integer) -> tuple[Integer, Bool]:
+    """The rank that owns each cluster (clusters,), and whether others have leaves in it; owner: of the leaves.
+
+    It is the one that owns the leaf in the middle: so the largest clusters are not all of one rank.
+    """
+    low, high = np.full(forest.clusters, np.iinfo(np.int32).max), np.full(forest.clusters, -1)
+    low[forest.leaves] = high[forest.leaves] = owner
+    for clusters in reversed(forest.levels):
+        np.minimum.at(low, forest.parent[clusters], low[clusters])
+        np.maximum.at(high, forest.parent[clusters], high[clusters])
+    middle = (forest.first + forest.last) // 2
+    at = np.searchsorted(forest.first[forest.leaves], middle, side="right") - 1
+    return np.asarray(owner[at]), low < high
 
 
 @dataclass(frozen=True)
 class TargetTree:
-    """A forest of targets, the clusters that some of this rank's targets are in, and what they see from far.
+    """The clusters that some of this rank's targets are in, and what they see from far.
 
-    length (k,): unit of the logarithm in each cluster's region. target, source: pairs, sorted by target.
+    length (k,): unit of the logarithm in each cluster's region. target, source: pairs, sorted by target; sources are
+    places in `seen`: the clusters of the source tree, and ghosts of others after them.
     """
 
-    forest: Forest
+    clusters: Clusters
     terms: int
-    wanted: Bool
     length: Real
     target: Integer
     source: Integer
+    seen: Circles
+    ghosts: Ghosts
 
-    def spread(self, moments: Complex, sources: Forest) -> Complex:
-        """Fields (k, 2, p + 1) about the centres of the wanted clusters, complete in the leaves."""
-        forest = self.forest
-        fields = np.zeros((forest.clusters, 2, self.terms + 1), dtype=complex)
-        carry(forest, self.length, self.target, sources, self.source, moments, fields)
-        lower(forest, self.wanted, fields)
+    def start(self, moments: Complex) -> Arrival:
+        """Send the coefficients of SourceTree.collect to those who see them; all ranks call this together."""
+        return self.ghosts.start(as_rows(moments))
+
+    def spread(self, moments: Complex, arrival: Arrival) -> Complex:
+        """Fields (k, 2, p + 1) about the centres of the clusters, complete in the leaves; arrival: what `start` gave.
+        """
+        fields = np.zeros((self.clusters.count, 2, self.terms + 1), dtype=complex)
+        others = arrival.finish()
+        if len(others):
+            moments = np.concatenate([moments, others.view(complex).reshape(-1, 2, self.terms + 1)])
+        carry(self.clusters, self.length, self.target, self.seen, self.source, moments, fields)
+        lower(self.clusters, np.ones(self.clusters.count, dtype=bool), fields)
         return fields
+
+
+def see_sources(
+    sources: SourceTree, forest: Forest, wanted: Bool, length: Real, met: Interactions
+) -> TargetTree:
+    """The wanted clusters (clusters,) of a forest of targets as they see sources; length: of all clusters.
+
+    All ranks call this together.
+    """
+    own = sources.clusters.number
+    needed, ranks = np.unique(met.far_source), sources.share.ranks
+    others = needed[sources.owner[needed] != ranks.rank]
+    place = np.full(sources.forest.clusters, -1)
+    place[own] = np.arange(len(own))
+    place[others] = len(own) + np.arange(len(others))
+    chosen = forest.take(np.flatnonzero(wanted))
+    seen = sources.clusters if not len(others) else sources.forest.take(np.concatenate([own, others]))
+    return TargetTree(
+        chosen, sources.terms, length[chosen.number], np.searchsorted(chosen.number, met.far_target),
+        place[met.far_source], seen, ranks.find_ghosts(others, sources.owner[others], own),
+    )  # fmt: skip
 
 
 def mark_ancestors(forest: Forest, leaves: Sequence[int] | Integer) -> Bool:

@@ -6,7 +6,7 @@ pbem.bem.operator; all regions share one forest of cluster trees.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,12 +15,21 @@ from scipy import sparse
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.expansion import FieldPoints, place_densities
-from pbem.bem.farfield import SourceTree, TargetTree, mark_ancestors
+from pbem.bem.farfield import SourceTree, TargetTree, mark_ancestors, see_sources, share_leaves
 from pbem.bem.near import LeafRows, pack_rows
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
-from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions, take_off_rigid_motions
+from pbem.bem.region_sums import (
+    Functional,
+    RegionSums,
+    list_motions,
+    share_functionals,
+    spread_motions,
+)
+from pbem.bem.rigid_motions import RigidMotions, find_rigid_motions
 from pbem.bem.rigid_region import form_rigid_rows
 from pbem.bem.rows import Sources, evaluate_rows
+from pbem.bem.seen_entries import SeenEntries, take_elements
+from pbem.bem.sharing import Share
 from pbem.bem.tree import Forest, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components, split_components
@@ -45,12 +54,12 @@ class FarRows:
 
 @dataclass(frozen=True)
 class Anchoring:
-    """rows get pattern times functional . v[columns]: see add_anchor of pbem.bem.operator."""
+    """Equations of a region's nodes (k,) get pattern times functional . u: see add_anchor of pbem.bem.operator."""
 
-    rows: Integer
-    pattern: Real
-    columns: Integer
-    functional: Real
+    region: int
+    nodes: Integer
+    pattern: Complex
+    functional: Complex
 
 
 @dataclass(frozen=True)
@@ -99,19 +108,42 @@ def log_lengths(parts: Sorted, forest: Forest) -> Real:
     return np.array([sources.length for sources in parts.sources])[forest.region]
 
 
-def prepare_sources(
-    parts: Sorted, needed: Bool, leaves: Integer, add_up: Callable[[Real], Real]
-) -> SourceTree:
-    """The coefficients' matrices of the given leaves, this rank's share."""
-    forest, mesh = parts.forest, parts.mesh
+def prepare_sources(parts: Sorted, needed: Bool, share: Share) -> SourceTree:
+    """This rank's leaves: those of whose elements it owns the most; needed (4 nodes,): see assemble_hierarchical.
+
+    All ranks call this together.
+    """
+    forest, mesh, rank = parts.forest, parts.mesh, share.ranks.rank
+    of_leaf = _find_owners(forest, share.of_element)
+    owner, divided = share_leaves(forest, of_leaf)
+    leaves = forest.leaves[of_leaf == rank]
+    clusters = forest.take(np.flatnonzero(mark_ancestors(forest, leaves)))
+    partial = np.flatnonzero(divided[clusters.number] & (owner[clusters.number] != rank))
     own = [forest.items(leaf) for leaf in leaves]
     elements = np.concatenate([np.zeros(0, dtype=np.int64), *own])
     first = np.cumsum([0, *(len(each) for each in own)])
     kappa, modulus = name_media(parts, forest.region[leaves])
+    width = 2 * (mesh.order + 1)
+    kept = take_elements(needed, elements, width)
+    number = clusters.number[partial]
     return SourceTree(
-        forest, parts.terms, np.asarray(leaves), place_densities(mesh, elements, parts.terms), first, kappa, modulus,
-        None if needed.all() else needed, add_up,
+        forest, share, parts.terms, clusters, np.searchsorted(clusters.number, leaves),
+        place_densities(mesh, elements, parts.terms), first, kappa, modulus, elements, width,
+        None if kept.all() else kept, owner, partial,
+        share.ranks.find_ghosts(number, owner[number], clusters.number),
     )  # fmt: skip
+
+
+def _find_owners(forest: Forest, of_element: Integer) -> Integer:
+    """The rank that owns most elements of each leaf, the first of these."""
+    leaves = forest.leaves
+    leaf = np.repeat(np.arange(len(leaves)), forest.last[leaves] - forest.first[leaves])
+    item = of_element[forest.order]
+    ranks = int(of_element.max(initial=0)) + 1
+    pair, count = np.unique(leaf * ranks + item, return_counts=True)
+    order = np.lexsort((pair, -count, pair // ranks))
+    begin = np.searchsorted(pair[order] // ranks, np.arange(len(leaves)))
+    return np.asarray(pair[order][begin] % ranks)
 
 
 def name_media(parts: Sorted, region: Integer) -> tuple[Real, Real]:
@@ -131,7 +163,9 @@ def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
 class HierarchicalOperator:
     """The rows of B of some nodes (k,), in their order; sources and targets are the same trees.
 
-    leaves: emptied where no product is asked for any more, as they are most of the storage.
+    leaves: emptied where no product is asked for any more, as they are most of the storage. seen: entries of v that
+    this rank needs; of_sources: places among its elements of those of the source tree. motions (seen, f), held (rows,
+    f): what the functionals in `sums` take off before the product, and add to it. anchorings: of all ranks.
     """
 
     parts: Sorted
@@ -142,8 +176,13 @@ class HierarchicalOperator:
     far: FarRows
     free: sparse.csr_matrix
     needed: Bool
+    seen: SeenEntries
+    of_sources: Integer
+    sums: RegionSums
+    motions: sparse.csr_matrix
+    held: sparse.csr_matrix
+    rigid: tuple[RigidMotions, ...]
     anchorings: tuple[Anchoring, ...] = ()
-    rigid: tuple[RigidMotions, ...] = ()
 
     def keep_needed(self, v: Real) -> Real:
         """v with zeros in the entries that the operator was told to leave out."""
@@ -155,30 +194,44 @@ class HierarchicalOperator:
 
     def apply(self, v: Real) -> Real:
         """This rank's rows of B v, lengths, for v of shape (4 nodes,); all ranks call this together."""
-        strained = take_off_rigid_motions(v, self.rigid)
-        fields = self.targets.spread(self.sources.collect(strained), self.sources.forest)
+        return self.apply_seen(self.seen.take(v))
+
+    def apply_seen(self, v: Real) -> Real:
+        """The same for the entries of v that are seen; near rows are done while coefficients are on their way."""
+        sums = self.sums.evaluate(v)
+        strained = v - self.motions @ sums if self.motions.nnz else v
+        moments = self.sources.collect(take_elements(strained, self.of_sources, self.seen.width))
+        arriving = self.targets.start(moments)
         result: Real = self.free @ strained
-        values = self.far.factor * self.far.points.evaluate(fields, self.targets.forest)
-        result[self.far.rows] += np.stack([values.real, values.imag], axis=1)
         for each in self.leaves:
             result[each.rows] += each.apply(strained)
-        for anchoring in self.anchorings:
-            result[anchoring.rows] += anchoring.pattern * (anchoring.functional @ v[anchoring.columns])
-        return result
+        fields = self.targets.spread(moments, arriving)
+        values = self.far.factor * self.far.points.evaluate(fields, self.targets.clusters)
+        result[self.far.rows] += np.stack([values.real, values.imag], axis=1)
+        return result + self.held @ sums if self.held.nnz else result
 
 
-def anchor_rows(
-    operator: HierarchicalOperator, nodes: Integer, pattern: Complex, functional: Complex
-) -> HierarchicalOperator:
-    """The operator with pattern (functional . u) added to the equations of a region's nodes (k,): see add_anchor."""
-    _, row, own = np.intersect1d(operator.nodes, nodes, assume_unique=True, return_indices=True)
-    added = Anchoring(
-        rows=number_components(row),
-        pattern=split_components(pattern[own]),
-        columns=number_components(nodes),
-        functional=split_components(functional),
+def anchor_rows(operator: HierarchicalOperator, anchorings: Sequence[Anchoring]) -> HierarchicalOperator:
+    """The operator with pattern (functional . u) added to the equations of regions' nodes: see add_anchor.
+
+    All ranks call this together, once.
+    """
+    functionals = [
+        Functional(each.region, number_components(each.nodes), split_components(each.functional)) for each in anchorings
+    ]
+    motions = list_motions(operator.rigid)
+    sums = share_functionals(
+        operator.parts.mesh.region, operator.seen, operator.sources.share, [*motions, *functionals]
     )
-    return replace(operator, anchorings=(*operator.anchorings, added))
+    held = sparse.lil_matrix((operator.rows, len(sums.number)))
+    for at in np.flatnonzero(sums.number >= len(motions)):
+        each = anchorings[sums.number[at] - len(motions)]
+        _, row, own = np.intersect1d(operator.nodes, each.nodes, assume_unique=True, return_indices=True)
+        held[number_components(row), at] = split_components(each.pattern[own])[:, None]
+    return replace(
+        operator, anchorings=tuple(anchorings), sums=sums, held=held.tocsr(),
+        motions=spread_motions(operator.seen, operator.rigid, sums),
+    )  # fmt: skip
 
 
 def assemble_hierarchical(
@@ -187,32 +240,34 @@ def assemble_hierarchical(
 ) -> HierarchicalOperator:
     """Rows of B of the given nodes (k,); needed (4 nodes,), length: as of pbem.bem.operator.assemble_rows.
 
-    finite: numbers of regions that have an outer boundary. weak: see pbem.bem.near.choose_weak.
+    finite: numbers of regions that have an outer boundary. weak: see pbem.bem.near.choose_weak. All ranks call this
+    together.
     """
-    mesh, forest, terms = parts.mesh, parts.forest, parts.terms
+    mesh, forest, share = parts.mesh, parts.forest, sources.share
     row_of_node = np.full(mesh.nodes, -1)
     row_of_node[nodes] = np.arange(len(nodes))
     owned = [leaf for leaf in forest.leaves if (row_of_node[list_nodes(mesh, forest.items(leaf))] >= 0).any()]
     wanted = mark_ancestors(forest, owned)
     met = find_interactions(forest, forest, RATIO, wanted)
-    targets = TargetTree(
-        forest, terms, wanted, log_lengths(parts, forest), met.far_target, met.far_source
-    )
+    targets = see_sources(sources, forest, wanted, log_lengths(parts, forest), met)
     scale = scale_equations(mesh, parts.materials, length)
     begin, end = np.searchsorted(met.near_target, owned), np.searchsorted(met.near_target, owned, side="right")
+    near_clusters = [met.near_source[low:high] for low, high in zip(begin, end, strict=True)]
+    seen = _see_elements(parts, sources, np.unique(met.near_source))
     leaves: list[LeafRows] = []
-    seen: list[tuple[int, Integer]] = []
-    for leaf, low, high in zip(owned, begin, end, strict=True):
+    far: list[tuple[int, Integer]] = []
+    for leaf, clusters in zip(owned, near_clusters, strict=True):
         at = list_nodes(mesh, forest.items(leaf))
         at = at[row_of_node[at] >= 0]
-        elements = np.sort(np.concatenate([forest.items(source) for source in met.near_source[low:high]]))
+        elements = np.sort(np.concatenate([forest.items(source) for source in clusters]))
         columns, near = _evaluate_leaf(parts, int(leaf), at, elements, needed)
         near *= -np.repeat(scale[at], 2)[:, None]
         elastic = parts.materials[int(forest.region[leaf])].rigid is None
         rows, width = number_components(row_of_node[at]), 2 * (mesh.order + 1)
-        leaves.append(pack_rows(rows, columns, near, width, 2 * mesh.nodes, weak if elastic else 0.0))
+        strong = pack_rows(rows, columns, near, width, 2 * mesh.nodes, weak if elastic else 0.0)
+        leaves.append(strong if seen.whole else strong.place(seen.find))
         if elastic:
-            seen.append((int(leaf), at))
+            far.append((int(leaf), at))
     free = collect_free_terms(mesh, nodes, scale)
     # Expansions of the parts of a rigid motion cancel only up to their error, which would be felt where a body moves by
     # much more than it is strained: what fits best is taken off before. Small regions have no expansions.
@@ -220,19 +275,34 @@ def assemble_hierarchical(
         motions for motions in find_rigid_motions(mesh, finite, needed)
         if motions.interpolated or len(motions.columns) > 2 * SMALL_REGION * (mesh.order + 1)
     )
-    far = _place_far_rows(parts, seen, row_of_node, scale)
-    return HierarchicalOperator(parts, nodes, sources, targets, leaves, far, free, needed, rigid=rigid)
+    sums = share_functionals(mesh.region, seen, share, list_motions(rigid))
+    return HierarchicalOperator(
+        parts, nodes, sources, targets, leaves, _place_far_rows(parts, far, targets, row_of_node, scale),
+        seen.place_columns(free), needed, seen, np.searchsorted(seen.elements, sources.elements), sums,
+        spread_motions(seen, rigid, sums), sparse.csr_matrix((2 * len(nodes), len(sums.number))), rigid,
+    )  # fmt: skip
 
 
-def _place_far_rows(parts: Sorted, seen: list[tuple[int, Integer]], row_of_node: Integer, scale: Real) -> FarRows:
+def _see_elements(parts: Sorted, sources: SourceTree, near: Integer) -> SeenEntries:
+    """The entries of this rank's own elements, those of its leaves, and those of near clusters."""
+    seen = sources.share.own
+    seen[sources.elements] = True
+    for leaf in near:
+        seen[parts.forest.items(leaf)] = True
+    return SeenEntries(np.flatnonzero(seen), parts.mesh.elements, sources.width)
+
+
+def _place_far_rows(
+    parts: Sorted, seen: list[tuple[int, Integer]], targets: TargetTree, row_of_node: Integer, scale: Real
+) -> FarRows:
     """The rows of nodes in leaves, pairs (leaf, nodes), on the fields there."""
     mesh = parts.mesh
     leaves = np.array([leaf for leaf, _ in seen], dtype=np.int64)
     nodes = np.concatenate([np.zeros(0, dtype=np.int64), *(at for _, at in seen)])
     kappa, modulus = name_media(parts, parts.forest.region[leaves])
     points = FieldPoints(
-        leaves, np.cumsum([0, *(len(at) for _, at in seen)]), mesh.position[nodes],
-        np.where(mesh.traction_equation[nodes], mesh.normal[nodes], 0.0), kappa, modulus,
+        np.searchsorted(targets.clusters.number, leaves), np.cumsum([0, *(len(at) for _, at in seen)]),
+        mesh.position[nodes], np.where(mesh.traction_equation[nodes], mesh.normal[nodes], 0.0), kappa, modulus,
     )  # fmt: skip
     return FarRows(points, number_components(row_of_node[nodes]).reshape(-1, 2), -scale[nodes])
 

@@ -8,7 +8,8 @@ lose a hundred times more, which smooth jumps would show, of which the entries o
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,11 @@ class LeafRows:
     columns: Integer
     near: Real
     weak: tuple[WeakRows, ...] = ()
+
+    def place(self, find: Callable[[Integer], Integer]) -> LeafRows:
+        """The same rows, on other places in v of the same columns."""
+        weak = tuple(replace(each, columns=find(each.columns)) for each in self.weak)
+        return replace(self, columns=find(self.columns), weak=weak)
 
     @property
     def nbytes(self) -> int:

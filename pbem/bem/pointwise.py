@@ -9,7 +9,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.expansion import FieldPoints
-from pbem.bem.farfield import SourceTree, TargetTree
+from pbem.bem.farfield import SourceTree, TargetTree, see_sources
 from pbem.bem.hierarchical import (
     RATIO,
     HierarchicalOperator,
@@ -24,7 +24,9 @@ from pbem.bem.interior import Values
 from pbem.bem.location import Location
 from pbem.bem.rigid_motions import take_off_rigid_motions
 from pbem.bem.rows import evaluate_rows
-from pbem.bem.tree import Interactions, build_forest, find_interactions
+from pbem.bem.seen_entries import take_elements
+from pbem.bem.sharing import keep_whole
+from pbem.bem.tree import Forest, Interactions, build_forest, find_interactions
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
 from pbem.model.material import Material
@@ -43,6 +45,7 @@ class PointRows:
 
     parts: Sorted
     sources: SourceTree
+    forest: Forest
     targets: TargetTree
     met: Interactions
     point: Complex
@@ -70,7 +73,7 @@ class PointRows:
         for k, normal in enumerate((None, 1.0, 1j)):
             fields = far if normal is None else far_strained
             values[k] = np.stack([self._evaluate_far(each, normal) for each in fields], axis=1)
-        forest = self.targets.forest
+        forest = self.forest
         leaves = forest.leaves
         begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
         for leaf, low, high in zip(leaves, begin, end, strict=True):
@@ -84,11 +87,13 @@ class PointRows:
 
     def _carry(self, v: Real) -> Complex:
         """Coefficients of the far field in all clusters of points (k, 2, p + 1)."""
-        return self.targets.spread(self.sources.collect(v), self.sources.forest)
+        sources = self.sources
+        moments = sources.collect(take_elements(v, sources.elements, sources.width))
+        return self.targets.spread(moments, self.targets.start(moments))
 
     def _evaluate_far(self, fields: Complex, normal: complex | None) -> Complex:
         """The far field at all points: displacement, or traction on the normal."""
-        forest = self.targets.forest
+        forest = self.forest
         leaves = forest.leaves
         kappa, modulus = name_media(self.parts, forest.region[leaves])
         at = FieldPoints(
@@ -101,7 +106,7 @@ class PointRows:
 
     def _evaluate(self, v: Real, normals: tuple[complex | None, ...]) -> Complex:
         far = self._carry(v)
-        forest = self.targets.forest
+        forest = self.forest
         leaves = forest.leaves
         begin, end = (np.searchsorted(self.met.near_target, leaves, side=side) for side in ("left", "right"))
         result = np.stack([self._evaluate_far(far, normal) for normal in normals], axis=1)
@@ -118,7 +123,7 @@ class PointRows:
         if len(near) == 0:
             return np.zeros((2 * len(chosen), *v.shape[1:]))
         elements = np.sort(np.concatenate([parts.forest.items(source) for source in near]))
-        region = int(self.targets.forest.region[leaf])
+        region = int(self.forest.region[leaf])
         sources = parts.sources[region].select(elements - parts.first_element[region])
         bounded = bool((sources.family == 0).any())
         on = np.where(self.on[chosen] >= 0, np.searchsorted(elements, self.on[chosen]), -1)
@@ -134,17 +139,14 @@ class PointRows:
 def place_points(
     parts: Sorted, sources: SourceTree, point: Complex, region: Integer, on: Integer, local: Real
 ) -> PointRows:
-    """Sort points (k,) of regions into trees; on, local: see PointRows."""
+    """Sort points (k,) of regions into trees; on, local: see PointRows. All ranks call this together."""
     forest = build_forest(point, point, np.zeros(len(point)), region, np.full(len(parts.materials), LEAF_POINTS))
     # A leaf of one point has no radius to measure its powers in.
     least = 1e-9 * np.abs(parts.mesh.end - parts.mesh.start).max()
     forest = forest.widen(least)
     met = find_interactions(forest, parts.forest, RATIO)
-    targets = TargetTree(
-        forest, parts.terms, np.ones(forest.clusters, dtype=bool), log_lengths(parts, forest), met.far_target,
-        met.far_source,
-    )  # fmt: skip
-    return PointRows(parts, sources, targets, met, point, on, local)
+    targets = see_sources(sources, forest, np.ones(forest.clusters, dtype=bool), log_lengths(parts, forest), met)
+    return PointRows(parts, sources, forest, targets, met, point, on, local)
 
 
 def spread_points(
@@ -153,7 +155,7 @@ def spread_points(
     """Trees of points (k,) in regions, off all elements, and of all elements; by one process, without operator."""
     parts = sort_elements(mesh, materials, terms)
     everything = np.ones(4 * mesh.nodes, dtype=bool)
-    sources = prepare_sources(parts, everything, parts.forest.leaves, lambda own: own)
+    sources = prepare_sources(parts, everything, keep_whole(mesh.elements))
     return place_points(parts, sources, point, region, np.full(len(point), -1), np.zeros(len(point)))
 
 

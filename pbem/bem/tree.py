@@ -5,10 +5,43 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
+
+
+class Circles(Protocol):
+    """Circles around clusters: center (k,) complex, radius (k,)."""
+
+    @property
+    def center(self) -> Complex: ...
+
+    @property
+    def radius(self) -> Real: ...
+
+
+class Branches(Circles, Protocol):
+    """Circles with the places (k,) of the clusters' parents, which come before them; -1: none."""
+
+    @property
+    def parent(self) -> Integer: ...
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """Some of the clusters of a forest: their numbers there (k,); parent (k,): place among them, -1 if it is not there.
+    """
+
+    number: Integer
+    parent: Integer
+    center: Complex
+    radius: Real
+
+    @property
+    def count(self) -> int:
+        return len(self.number)
 
 
 @dataclass(frozen=True)
@@ -46,6 +79,14 @@ class Forest:
         """Numbers of the clusters without children, in the order of their items."""
         leaves = np.flatnonzero(self.children == 0)
         return leaves[np.argsort(self.first[leaves], kind="stable")]
+
+    def take(self, number: Integer) -> Clusters:
+        """Some clusters (k,), in that order; parents that come after their children are left out."""
+        place = np.full(self.clusters + 1, -1)
+        place[number] = np.arange(len(number))
+        parent = place[self.parent[number]]
+        parent[parent >= np.arange(len(number))] = -1
+        return Clusters(number, parent, self.center[number], self.radius[number])
 
     def widen(self, least: float) -> Forest:
         """The same with no circle smaller than a least radius."""

@@ -14,6 +14,7 @@ from pbem.bem import hierarchical
 from pbem.bem.farfield import SourceTree
 from pbem.bem.hierarchical import Sorted, choose_terms, prepare_sources, sort_elements
 from pbem.bem.operator import RowOperator, assemble_rows
+from pbem.bem.sharing import keep_whole
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -174,7 +175,7 @@ class Sample:
     def sort(self, tolerance: float) -> tuple[Sorted, SourceTree]:
         """The cluster trees and the coefficients' matrices of one rank."""
         parts = sort_elements(self.mesh, self.materials, choose_terms(tolerance))
-        return parts, prepare_sources(parts, self.needed, parts.forest.leaves, lambda part: part)
+        return parts, prepare_sources(parts, self.needed, keep_whole(self.mesh.elements))
 
 
 def read_sample(name: str, operator: str = "auto") -> Model:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pbem.bem.hierarchical import (
+    Anchoring,
     HierarchicalOperator,
     anchor_rows,
     assemble_hierarchical,
@@ -18,6 +19,8 @@ from pbem.bem.hierarchical import (
 from pbem.bem.operator import add_anchor, assemble_displacement_rows, assemble_rows
 from pbem.bem.pointwise import place_points
 from pbem.bem.rows import evaluate_rows
+from pbem.bem.seen_entries import take_elements
+from pbem.bem.sharing import Ghosts, OneRank, Share, keep_whole
 from pbem.contact.anchor import anchor_motions
 from pbem.contact.loads import collect_outer_nodes, find_needed_columns
 from pbem.model.rigid_body_modes import find_rigid_body_modes
@@ -113,7 +116,7 @@ def test_columns_that_are_not_needed_are_left_out(name: str) -> None:
     needed = find_needed_columns(model, mesh, collect_outer_nodes(model, mesh))
     assert not needed.all() or name == "infinite"
     parts, _ = sample.sort(1e-8)
-    sources = prepare_sources(parts, needed, parts.forest.leaves, lambda part: part)
+    sources = prepare_sources(parts, needed, keep_whole(mesh.elements))
     operator = assemble_hierarchical(parts, sources, np.arange(mesh.nodes), needed, model.size)
     v = np.where(needed, list_vectors(sample)["random displacements"], 0.0)
     exact = assemble_rows(mesh, sample.materials, 0, mesh.nodes, needed, model.size).apply(v)
@@ -123,14 +126,32 @@ def test_columns_that_are_not_needed_are_left_out(name: str) -> None:
     assert sizes[0] < sizes[1] or needed.all()
 
 
+class OneOfThree(OneRank):
+    """A rank whose others are not there: nothing is sent, and nothing comes."""
+
+    def __init__(self, rank: int) -> None:
+        self.rank = rank
+
+    def find_ghosts(self, numbers: np.ndarray, owner: np.ndarray, own: np.ndarray) -> Ghosts:
+        assert (owner != self.rank).all()
+        return super().find_ghosts(numbers[:0], owner[:0], own)
+
+
 def test_leaves_shared_by_ranks_add_up() -> None:
     sample = make_sample("inclusions")
     parts, sources = sample.sort(1e-8)
-    leaves = parts.forest.leaves
     v = list_vectors(sample)["random tractions"]
-    shares = [prepare_sources(parts, sample.needed, leaves[k::3], lambda part: part) for k in range(3)]
-    together = sum(share.collect(v) for share in shares)
-    whole = sources.collect(v)
+    of_element = np.random.default_rng(5).integers(0, 3, sample.mesh.elements)
+    together = np.zeros((parts.forest.clusters, 2, parts.terms + 1), dtype=complex)
+    owners = np.zeros(parts.forest.clusters)
+    for rank in range(3):
+        share = prepare_sources(parts, sample.needed, Share(OneOfThree(rank), of_element))
+        together[share.clusters.number] += share.collect(take_elements(v, share.elements, share.width))
+        mine = share.owner[share.clusters.number] == rank
+        owners[share.clusters.number[mine]] += 1
+        np.testing.assert_array_equal(np.flatnonzero(~mine), share.partial)
+    assert (owners == 1).all()
+    whole = sources.collect(take_elements(v, sources.elements, sources.width))
     np.testing.assert_allclose(together, whole, rtol=0, atol=1e-13 * np.abs(whole).max())
 
 
@@ -144,9 +165,8 @@ def test_anchors_are_those_of_the_dense_rows() -> None:
     whole, part = assemble(sample, 1e-10), assemble(sample, 1e-10, nodes)
     for anchor in anchors:
         add_anchor(dense, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)
-        whole, part = (
-            anchor_rows(each, anchor.nodes, anchor.pattern, anchor.functional) for each in (whole, part)
-        )
+    added = [Anchoring(each.region, each.nodes, each.pattern, each.functional) for each in anchors]
+    whole, part = (anchor_rows(each, added) for each in (whole, part))
     rows = (2 * nodes[:, None] + np.arange(2)).ravel()
     for kind, v in list_vectors(sample).items():
         exact = dense.apply(v)

@@ -11,6 +11,8 @@ from pbem.bem.expansion import FieldPoints, carry, lift, lower, place_densities
 from pbem.bem.hierarchical import assemble_hierarchical, choose_terms, name_media, prepare_sources, sort_elements
 from pbem.bem.near import LeafRows, choose_weak, pack_rows
 from pbem.bem.operator import assemble_rows
+from pbem.bem.seen_entries import take_elements
+from pbem.bem.sharing import keep_whole
 from pbem.bem.tree import build_forest, find_interactions
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
@@ -47,7 +49,8 @@ def test_coefficients_are_those_of_the_formulas(name: str, order: int) -> None:
     parts = sort_elements(mesh, materials, 27)
     v, forest, leaves = make_values(mesh), parts.forest, parts.forest.leaves
     everything = np.ones(4 * mesh.nodes, dtype=bool)
-    found = prepare_sources(parts, everything, leaves, lambda part: part).collect(v)
+    sources = prepare_sources(parts, everything, keep_whole(mesh.elements))
+    found = sources.collect(take_elements(v, sources.elements, sources.width))
     for leaf in leaves:
         elements, region = forest.items(leaf), int(forest.region[leaf])
         chosen = parts.sources[region].select(elements - parts.first_element[region])
@@ -135,7 +138,7 @@ def test_products_are_those_of_the_rows_wherever_the_model_lies(name: str, order
     mesh = replace(mesh, **{key: getattr(mesh, key) + shift for key in ("start", "end", "center", "position")})
     everything = np.ones(4 * mesh.nodes, dtype=bool)
     parts = sort_elements(mesh, materials, choose_terms(1e-8))
-    sources = prepare_sources(parts, everything, parts.forest.leaves, lambda part: part)
+    sources = prepare_sources(parts, everything, keep_whole(mesh.elements))
     operator = assemble_hierarchical(parts, sources, np.arange(mesh.nodes), everything, size)
     assert len(operator.targets.target) > mesh.elements
     v = make_values(mesh)

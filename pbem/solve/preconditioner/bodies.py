@@ -171,8 +171,9 @@ class BodiesPreconditioner(SchwarzPreconditioner):
             super().apply(residual, result)
             return
         # MUMPS scales its matrix, but not a right-hand side of lengths in small units.
-        size = float(np.abs(residual).max(initial=0.0)) or 1.0
-        result[:] = size * self._factors.solve(residual[self._rows] / size)
+        own = residual[: len(self._rows)]
+        size = float(np.abs(own).max(initial=0.0)) or 1.0
+        result[:] = size * self._factors.solve(own / size)
 
 
 def _make_block(mesh: Mesh, local: LocalOperator, nodes: Integer, region: int) -> BodyRows:

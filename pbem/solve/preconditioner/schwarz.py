@@ -27,6 +27,7 @@ from pbem.solve.preconditioner.elimination import Elimination, eliminate_tractio
 from pbem.solve.preconditioner.inversion import invert_rows
 from pbem.solve.preconditioner.local_operator import LocalOperator
 from pbem.solve.preconditioner.subdomains import MOST_AROUND, Subdomain
+from pbem.solve.system.halo import place_unknowns
 
 Single = NDArray[np.float32]
 
@@ -40,7 +41,8 @@ SINGLE = 20_000
 class LocalInverse:
     """own: rows of the group's unknowns in this rank's vector; around: unknowns (of the model) of group and neighbours.
 
-    inside: places of the group's own unknowns in around. matrix (solved, seen): rows of the local inverse, less what is
+    inside: places of the group's own unknowns in around; seen: places of the unknowns around it, less those eliminated,
+    in the residual that `apply` is given. matrix (solved, seen): rows of the local inverse, less what is
     eliminated within a node, of some of the own unknowns, on turned equations; None where there is none.
     formed: whether it has been tried; drift: by how much the constraint map has changed in what it sees since then.
     """
@@ -72,7 +74,7 @@ class SchwarzPreconditioner:
         self._less: Elimination | None = None
         self.singular = 0  # groups whose matrix was singular, of those formed last
         self.most_drift = 0.0  # inverses serve until the constraint map has changed by more than this part
-        self.inverses = [self._place(group) for group in groups]
+        self._take_groups(groups)
 
     @property
     def whole(self) -> bool:
@@ -91,7 +93,14 @@ class SchwarzPreconditioner:
     def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
         """Take other surroundings of the same groups, so many times as many; `update` then forms all inverses."""
         self._formed, self._widening = None, widening
+        self._take_groups(groups)
+
+    def _take_groups(self, groups: Sequence[Subdomain]) -> None:
+        """beyond: nodes, rising, that the groups see and that are not this rank's."""
         self.inverses = [self._place(group) for group in groups]
+        elements = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(group.around for group in groups)]))
+        self.beyond = np.setdiff1d(list_nodes(self._mesh, elements), self._nodes)
+        self._turn = np.zeros((0, 2, 2))  # of the own nodes' equations, and of those beyond
 
     def _place(self, group: Subdomain) -> LocalInverse:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
@@ -122,19 +131,26 @@ class SchwarzPreconditioner:
         change[self._local.find_anchored(constraints)] = np.inf
         self._free = (self.free @ matrix).tocsr()
         less = self._less = eliminate_tractions(matrix, self._free, self._node_crack)
+        seen = np.concatenate([self._nodes, self.beyond])
+        self._turn = less.turn if len(self._nodes) == self._mesh.nodes else less.turn[seen]
         if former is not None:
             change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
         return change
 
     def apply(self, residual: Real, result: Real) -> None:
-        """Put this rank's part of the preconditioned residual (unknowns,) into result (own unknowns,) (theory, 63)."""
+        """Put this rank's part of the preconditioned residual into result (own unknowns,) (theory, 63).
+
+        residual: of the own unknowns, and of those of the nodes `beyond` after them.
+        """
         less, nodes = self._less, self._nodes
         assert less is not None
-        turned = less.apply(residual)
-        # Single precision has few powers of ten, which lengths in small units would fall out of.
-        size = float(np.abs(turned).max(initial=0.0)) or 1.0
+        turned = np.einsum("nij,nj->ni", self._turn, residual.reshape(-1, 2)).ravel()
+        # Single precision has few powers of ten, which lengths in small units would fall out of. By a power of two, so
+        # that its rounding is the same however many ranks there are.
+        size = float(np.ldexp(0.5, np.frexp(np.abs(turned).max(initial=0.0))[1])) or 1.0
         single = (turned / size).astype(np.float32)
-        eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], turned.reshape(-1, 2)[nodes]).ravel()
+        own = turned[: 2 * len(nodes)].reshape(-1, 2)
+        eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], own).ravel()
         for inverse in self.inverses:
             if inverse.matrix is not None:
                 result[inverse.own] = eliminated[inverse.own]
@@ -142,7 +158,7 @@ class SchwarzPreconditioner:
                 result[inverse.own[inverse.solved]] += size * (inverse.matrix @ seen)
             else:
                 # A group without an inverse, as of a matrix that overflows: its residual serves as it is.
-                result[inverse.own] = residual[inverse.around[inverse.inside]]
+                result[inverse.own] = residual[inverse.own]
 
     def turn(self, residual: Real) -> Real:
         """This rank's equations (own unknowns,), turned so that those which determine eliminated unknowns stand alone.
@@ -179,7 +195,8 @@ class SchwarzPreconditioner:
         """Form the rows of a group's inverse; what is eliminated is not in the factors, but follows from the rest."""
         elements, around, inside = self._narrow(inverse, less)
         local, first = less.local.ravel()[around], less.first.ravel()[around]
-        inverse.seen, inverse.matrix, inverse.formed = around[~first], None, True
+        inverse.seen = place_unknowns(self._nodes, self.beyond, around[~first])
+        inverse.matrix, inverse.formed = None, True
         if local.all():
             inverse.matrix, inverse.solved = np.zeros((0, 0), dtype=np.float32), np.zeros(0, dtype=np.int64)
             return

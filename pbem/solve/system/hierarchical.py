@@ -11,6 +11,7 @@ from mpi4py import MPI
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.body_factors import FactorCount, choose_body_factors
 from pbem.bem.hierarchical import (
+    Anchoring,
     HierarchicalOperator,
     anchor_rows,
     assemble_hierarchical,
@@ -21,6 +22,8 @@ from pbem.bem.hierarchical import (
 from pbem.bem.location import Location
 from pbem.bem.near import choose_weak
 from pbem.bem.pointwise import PointRows, TreeRows, place_points
+from pbem.bem.seen_entries import SeenEntries
+from pbem.bem.sharing import Share
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
 from pbem.contact.laws import PairLaws
@@ -30,7 +33,6 @@ from pbem.heap import give_back
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, split_components
 from pbem.model.model import Model
-from pbem.parallel import add_up
 from pbem.solve.petsc.session import find_number
 from pbem.solve.petsc.shares import cut_equally
 from pbem.solve.preconditioner.bodies import BodiesPreconditioner
@@ -38,6 +40,7 @@ from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain, divide_model, share_groups, surround_groups
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
+from pbem.solve.system.halo import share_elements
 from pbem.solve.system.product_error import measure_product_error
 from pbem.solve.tangent.krylov import KrylovTangent
 
@@ -84,11 +87,12 @@ class HierarchicalSystem:
         """
         needed = find_needed_columns(model, mesh, outer)
         groups = divide_model(mesh)
-        first, last = share_groups(mesh, groups, comm.rank, comm.size)
-        elements = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups[first:last]]))
-        operator, error = _reach_tolerance(comm, model, mesh, needed, list_nodes(mesh, elements))
-        for anchor in anchors:
-            operator = anchor_rows(operator, anchor.nodes, anchor.pattern, anchor.functional)
+        bounds = [share_groups(mesh, groups, rank, comm.size) for rank in range(comm.size)]
+        first, last = bounds[comm.rank]
+        operator, error = _reach_tolerance(comm, model, mesh, needed, share_elements(comm, groups, bounds))
+        operator = anchor_rows(
+            operator, [Anchoring(each.region, each.nodes, each.pattern, each.functional) for each in anchors]
+        )
         own_cracks = cut_equally(np.flatnonzero(mesh.node_crack), comm)
         by_bodies = choose_body_factors(mesh) if find_number("newton_bodies", 1) else None
         return HierarchicalSystem(
@@ -113,14 +117,28 @@ class HierarchicalSystem:
 
     def apply(self, v: Real) -> Real:
         """See System."""
-        self._count.products += 1
-        with clock.piece("product", self.stored):
-            return self.operator.apply(v)
+        return self.apply_seen(self.seen.take(v))
 
     @property
     def products(self) -> int:
         """See System."""
         return self._count.products
+
+    @property
+    def seen(self) -> SeenEntries:
+        """The entries of v that this rank's rows depend on."""
+        return self.operator.seen
+
+    @property
+    def share(self) -> Share:
+        """Which rank owns each element."""
+        return self.operator.sources.share
+
+    def apply_seen(self, v: Real) -> Real:
+        """This rank's rows of B v for the entries of v that are seen; all ranks call this together."""
+        self._count.products += 1
+        with clock.piece("product", self.stored):
+            return self.operator.apply_seen(v)
 
     def free_products(self) -> None:
         """See System: the rows; what interior points and cracks need of the operator stays."""
@@ -140,7 +158,7 @@ class HierarchicalSystem:
         preconditioner = (
             BodiesPreconditioner(problem.comm, *given) if self.by_bodies else SchwarzPreconditioner(*given)
         )
-        return KrylovTangent(problem, preconditioner, self.groups, self.widen_groups)
+        return KrylovTangent(problem, self, preconditioner, self.groups, self.widen_groups)
 
     def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> TreeRows:
         """See System; by the operator's trees."""
@@ -157,9 +175,9 @@ def place_nodes_on_cracks(operator: HierarchicalOperator, nodes: Integer) -> Poi
 
 
 def _reach_tolerance(
-    comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: Bool, nodes: Integer
+    comm: MPI.Intracomm, model: Model, mesh: Mesh, needed: Bool, share: Share
 ) -> tuple[HierarchicalOperator, float]:
-    """The operator of the given nodes with enough terms for the tolerance, and its measured relative error.
+    """The operator of the own elements' nodes with enough terms for the tolerance, and its measured relative error.
 
     Raises ConvergenceError if no number of terms is enough: "linear solver".
     """
@@ -169,11 +187,11 @@ def _reach_tolerance(
     # Rigid motions are taken off from all displacements, also from those that are zero.
     needed = needed.copy()
     needed[: 2 * mesh.nodes] |= np.repeat(np.isin(mesh.node_region, finite), 2)
+    nodes = list_nodes(mesh, np.flatnonzero(share.own))
     terms, weak = choose_terms(tolerance), choose_weak(tolerance, 2 * mesh.nodes)
     while True:
         parts = sort_elements(mesh, materials, terms)
-        own = cut_equally(parts.forest.leaves, comm)
-        sources = prepare_sources(parts, needed, own, lambda part: add_up(comm, part))
+        sources = prepare_sources(parts, needed, share)
         operator = assemble_hierarchical(parts, sources, nodes, needed, model.size, finite, weak)
         error = measure_product_error(comm, operator, model.size)
         if error <= tolerance:

@@ -46,9 +46,11 @@ def measure_equations(
     rows = number_components(own)
     exact += operator.free[rows] @ strained
     for anchoring in operator.anchorings:
-        added = np.zeros(operator.rows)
-        added[anchoring.rows] = anchoring.pattern * (anchoring.functional @ v[anchoring.columns])
-        exact += added[rows]
+        added = np.zeros((len(operator.nodes), 2))
+        _, row, at = np.intersect1d(operator.nodes, anchoring.nodes, assume_unique=True, return_indices=True)
+        moved = split_components(anchoring.functional) @ v[number_components(anchoring.nodes)]
+        added[row] = split_components(anchoring.pattern[at]).reshape(-1, 2) * moved
+        exact += added.ravel()[rows]
     sums = np.array([np.sum((exact - product[rows]) ** 2), np.sum(exact**2)])
     sums = add_up(comm, sums)
     return float(sums[0]), float(sums[1])

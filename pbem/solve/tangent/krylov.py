@@ -26,6 +26,7 @@ from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
 from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
+from pbem.solve.tangent.shared_product import SharedProduct, SharedRows
 from pbem.solve.tangent.sweeps import Sweeps
 
 # Most iterations of GMRES for one linear system, without restart.
@@ -65,12 +66,14 @@ class KrylovTangent(TangentOperator):
     """The tangent operator K = B M as a PETSc shell; its preconditioner follows the modes."""
 
     def __init__(
-        self, problem: Problem, preconditioner: SchwarzPreconditioner, groups: Sequence[Subdomain],
-        widen: Callable[[int], Sequence[Subdomain]],
+        self, problem: Problem, shared: SharedRows, preconditioner: SchwarzPreconditioner,
+        groups: Sequence[Subdomain], widen: Callable[[int], Sequence[Subdomain]],
     ) -> None:
-        """groups: of the preconditioner; widen: makes them with so many times as many elements around them."""
+        """shared: the problem's system of equations. groups: of the preconditioner; widen: makes them with so many
+        times as many elements around them."""
         self.problem = problem
         self.preconditioner = preconditioner
+        self._product = SharedProduct(problem, shared)
         self._groups, self._widen_groups = groups, widen
         self.constraints: ConstraintMap | None = None
         # That of which GMRES has its directions.
@@ -146,6 +149,7 @@ class KrylovTangent(TangentOperator):
             self._forget()
             give_back()
             self._known = constraints
+        self._product.take_map(constraints)
         self.preconditioner.update(constraints)
 
     def _forget(self) -> None:
@@ -279,6 +283,7 @@ class KrylovTangent(TangentOperator):
         Of cracks that meet, where the pairs are many, with the elements near to them alone.
         """
         self.constraints = constraints
+        self._product.take_map(constraints)
         if self.settling.nearby and len(pairs) > MOST_ASKED:
             return respond_nearby(self.problem, self.preconditioner, constraints, load, law, pairs, directions)
         states, unknowns = select_states(self.problem, load, law, pairs, directions)
@@ -319,10 +324,15 @@ class KrylovTangent(TangentOperator):
         whole[self._order] = gather_parts(self.problem.comm, part)
         return whole
 
-    def multiply(self, unknowns: Real) -> Real:
-        """This rank's rows of B M x."""
-        assert self.constraints is not None
-        return self._apply(self.constraints.matrix @ unknowns)
+    def multiply(self, part: Real) -> Real:
+        """This rank's rows of B M x for its part of x."""
+        return self._product.multiply(part)
+
+    def precondition(self, part: Real) -> Real:
+        """This rank's part of the preconditioned residual, for its part of the residual."""
+        result, inner = np.zeros(len(part)), self.preconditioner
+        inner.apply(part if inner.whole else self._product.surround(part, inner.beyond), result)
+        return result
 
     def _apply(self, v: Real) -> Real:
         """This rank's rows of B v, without the anchors that do not act."""
@@ -332,6 +342,7 @@ class KrylovTangent(TangentOperator):
     def solve_forces(self, constraints: ConstraintMap, load: Load, law: Linearisation, forces: Real) -> Real:
         """See TangentOperator; without the anchors that the constraint map releases."""
         self.constraints = constraints
+        self._product.take_map(constraints)
         return self._find_unknowns(forces)
 
     def _find_unknowns(self, forces: Real) -> Real:
@@ -348,6 +359,7 @@ class KrylovTangent(TangentOperator):
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
         self.problem, self.expected, self._sweeps = problem, None, None
+        self._product.take_over(problem)
         self.preconditioner.most_drift = MOST_DRIFT
         self._forget()
 

@@ -12,13 +12,13 @@ from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 
 
 class Called(Protocol):
-    """What is asked of the tangent operator: its parts, products, and vectors on every rank."""
+    """What is asked of the tangent operator, on this rank's parts of vectors; all ranks call all methods together."""
 
     preconditioner: SchwarzPreconditioner
 
-    def multiply(self, unknowns: Real) -> Real: ...
+    def multiply(self, part: Real) -> Real: ...
 
-    def gather(self, part: Real) -> Real: ...
+    def precondition(self, part: Real) -> Real: ...
 
 
 class Product:
@@ -28,7 +28,7 @@ class Product:
         self._tangent = tangent
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.setArray(self._tangent.multiply(self._tangent.gather(np.array(x.getArray(readonly=True)))))
+        y.setArray(self._tangent.multiply(np.array(x.getArray(readonly=True))))
 
 
 class Rows:
@@ -38,12 +38,10 @@ class Rows:
         self._tangent = tangent
 
     def multiply(self, part: Real) -> Real:
-        return self._tangent.multiply(self._tangent.gather(part))
+        return self._tangent.multiply(part)
 
     def precondition(self, part: Real) -> Real:
-        result = np.zeros(len(part))
-        self._tangent.preconditioner.apply(self._tangent.gather(part), result)
-        return result
+        return self._tangent.precondition(part)
 
     def turn(self, part: Real) -> Real:
         return self._tangent.preconditioner.turn(part)
@@ -63,6 +61,4 @@ class Preconditioning:
         self._tangent = tangent
 
     def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        result = np.zeros(x.getLocalSize())
-        self._tangent.preconditioner.apply(self._tangent.gather(np.array(x.getArray(readonly=True))), result)
-        y.setArray(result)
+        y.setArray(self._tangent.precondition(np.array(x.getArray(readonly=True))))

@@ -44,7 +44,7 @@ def measure_equations(
     for k, number in enumerate(own):
         exact[2 * k : 2 * k + 2] = _evaluate_exactly(operator, int(operator.nodes[number]), strained, length)
     rows = number_components(own)
-    exact += operator.free[rows] @ strained
+    exact += operator.free[rows] @ operator.seen.take(strained)
     for anchoring in operator.anchorings:
         added = np.zeros((len(operator.nodes), 2))
         _, row, at = np.intersect1d(operator.nodes, anchoring.nodes, assume_unique=True, return_indices=True)

@@ -237,6 +237,11 @@ def norm_of_parts(comm: MPI.Intracomm, part: Real) -> float:
     return float(np.sqrt(comm.allreduce(float(part @ part))))
 
 
+def largest_of_parts(comm: MPI.Intracomm, part: Real) -> float:
+    """Largest size of an entry of a vector whose parts lie on the ranks; the same number on all."""
+    return float(comm.allreduce(float(np.abs(part).max(initial=0.0)), op=MPI.MAX))
+
+
 def broadcast(comm: MPI.Intracomm, value: Any) -> Any:
     """The first rank's value, on every rank."""
     return comm.bcast(value, root=0)

@@ -64,7 +64,7 @@ class SourceTree:
 
 def as_rows(moments: Complex) -> Real:
     """The same numbers (k, 4 (p + 1)), a row for each cluster."""
-    return moments.view(float).reshape(len(moments), -1)
+    return moments.view(float).reshape(len(moments), 4 * moments.shape[2])
 
 
 def share_leaves(forest: Forest, owner: Integer) -> tuple[Integer, Bool]:

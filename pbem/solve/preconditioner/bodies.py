@@ -24,7 +24,7 @@ from pbem.errors import ConvergenceError
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import list_nodes, number_components
 from pbem.model.material import Material
-from pbem.parallel import gather_parts
+from pbem.parallel import gather_parts, largest_of_parts
 from pbem.solve.petsc.linear import LinearSolver
 from pbem.solve.petsc.session import PREFIX
 from pbem.solve.preconditioner.local_operator import LocalOperator, take_entries
@@ -123,7 +123,7 @@ class BodiesPreconditioner(SchwarzPreconditioner):
         groups: Sequence[Subdomain], nodes: Integer, rigid: Sequence[RigidMotions] = (),
     ) -> None:
         super().__init__(mesh, materials, length, anchors, groups, nodes, rigid)
-        self._rows = number_components(nodes)
+        self._comm = comm
         self._factors: BodyFactors | None = BodyFactors(comm, mesh, self._local, nodes)
         self._drift: Real | None = None
 
@@ -171,8 +171,8 @@ class BodiesPreconditioner(SchwarzPreconditioner):
             super().apply(residual, result)
             return
         # MUMPS scales its matrix, but not a right-hand side of lengths in small units.
-        own = residual[: len(self._rows)]
-        size = float(np.abs(own).max(initial=0.0)) or 1.0
+        own = residual[: 2 * len(self._nodes)]
+        size = largest_of_parts(self._comm, own) or 1.0
         result[:] = size * self._factors.solve(own / size)
 
 

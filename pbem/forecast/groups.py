@@ -15,12 +15,17 @@ from pbem.bem.group_sizes import (
     MOST_TIMES,
     NEIGHBOUR_SHARE,
     NEIGHBOUR_UNKNOWNS,
+    PART_ELEMENTS,
+    PART_SHARE,
+    do_cracks_meet,
     join_elements,
 )
 from pbem.mesh.mesh import Mesh
 
 # Unknowns that are left of a node of a body, and as a rule of one of a crack: its traction is eliminated.
 LEFT, LEFT_OF_CRACK = 2.0, 1.2
+# Elements of a part of a network that settles by itself, as a part of the most: groups are halved to that.
+USUAL_PART = 0.7
 
 
 @dataclass(frozen=True)
@@ -69,3 +74,11 @@ def _list_sizes(mesh: Mesh) -> Integer:
     """Elements (s,) of each set of bodies' elements that have ends in common or face each other."""
     own = np.flatnonzero(~mesh.crack)
     return np.unique(join_elements(mesh, own)[own], return_counts=True)[1]
+
+
+def count_settling(mesh: Mesh) -> float:
+    """Numbers of four bytes that the parts of a network of cracks keep of their stiffness; none of another model."""
+    if not (mesh.crack.all() and do_cracks_meet(mesh)):
+        return 0.0
+    elements = USUAL_PART * PART_ELEMENTS
+    return mesh.elements / elements * (2 * (mesh.order + 1) * (1 + PART_SHARE) * elements) ** 2

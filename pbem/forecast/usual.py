@@ -24,6 +24,8 @@ from pbem.model.model import Model
 STARTED, EVERYWHERE, EVERYWHERE_FAR, EVERYWHERE_FAR_STEPS = 142e6, 2300.0, 850.0, 1280.0
 # With the hierarchical operator, of which all else is small: what the first rank has beside, and for each unknown.
 FIRST, FIRST_UNKNOWN, BESIDE = 17e6, 1900.0, "case, file, or groups while they are formed"
+# What a network's parts keep to settle by themselves (see pbem.solve.tangent.sweeps).
+SETTLING = "groups of cracks that settle"
 # Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no
 # pair changes, and where some do; and how their number grows with that of the ranks.
 AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.4
@@ -137,7 +139,8 @@ def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, fl
         near = PACKED_MEMORY if work.unknowns >= LARGE else NEAR_MEMORY
         everywhere = EVERYWHERE_FAR if steps == 1 else EVERYWHERE_FAR_STEPS
         at_once = min(ranks, work.groups.count) * 8 * work.groups.largest
-        return {"operator": 8 * near * work.entries, "preconditioner": 8 * (inverses + work.groups.kept),
+        settling = {SETTLING: 4 * work.settling} if work.settling else {}
+        return {"operator": 8 * near * work.entries, "preconditioner": 8 * (inverses + work.groups.kept), **settling,
                 "mesh and vectors": everywhere * ranks * work.unknowns,
                 BESIDE: max(FIRST + FIRST_UNKNOWN * work.unknowns, at_once)}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs

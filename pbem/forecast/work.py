@@ -15,7 +15,7 @@ from pbem.bem.tree import find_interactions
 from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import PairLaws, collect_laws
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
-from pbem.forecast.groups import NO_GROUPS, Groups, count_groups
+from pbem.forecast.groups import NO_GROUPS, Groups, count_groups, count_settling
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 
@@ -32,7 +32,7 @@ class Work:
     filled, in numbers of 8 bytes; factored: of its factors; operations: to factorise it, multiplications and additions.
     columns: of pairs, computed once for all. hierarchical, sparse: kind of the operator and of its factors; of the
     hierarchical one these are of all bodies together, and `besides` is of the rows that they are made of. groups: of
-    bodies, in the preconditioner of the hierarchical one.
+    bodies, in the preconditioner of the hierarchical one. settling: numbers of four bytes of networks' parts.
     """
 
     unknowns: int
@@ -46,6 +46,7 @@ class Work:
     hierarchical: bool
     sparse: bool
     groups: Groups = NO_GROUPS
+    settling: float = 0.0
 
 
 def count_work(model: Model, mesh: Mesh) -> Work:
@@ -58,7 +59,7 @@ def count_work(model: Model, mesh: Mesh) -> Work:
         bodies = choose_body_factors(mesh)
         if bodies is None:
             return Work(unknowns, varying, entries, 0.0, inner, inner, 0.0, 0.0, True, False,
-                        count_groups(mesh))
+                        count_groups(mesh), count_settling(mesh))
         return Work(unknowns, varying, entries, bodies.rows, bodies.formed, bodies.factored, bodies.operations, 0.0,
                     True, True)
     entries, besides = _count_dense(model, mesh, find_needed_columns(model, mesh, outer))

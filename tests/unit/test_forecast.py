@@ -16,8 +16,16 @@ from pbem.contact.laws import OPEN, SLIP, ModeState, collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.forecast.disk import count_disk, count_stored_steps
 from pbem.forecast.forecast import make_forecast
-from pbem.forecast.groups import count_groups
-from pbem.forecast.usual import BESIDE, FIRST, FIRST_UNKNOWN, expect_changes, list_memory, measure_beside
+from pbem.forecast.groups import count_groups, count_settling
+from pbem.forecast.usual import (
+    BESIDE,
+    FIRST,
+    FIRST_UNKNOWN,
+    SETTLING,
+    expect_changes,
+    list_memory,
+    measure_beside,
+)
 from pbem.forecast.work import _eliminate, _make_blocks, count_work
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
@@ -25,11 +33,14 @@ from pbem.model.model import Model
 from pbem.parallel import world
 from pbem.results.model_text import describe_forecast
 from pbem.solve.estimate.coarser_mesh import put_beside
+from pbem.solve.preconditioner.subdomains import divide_model, surround_groups
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.tangent.krylov import KrylovTangent
+from pbem.solve.tangent.sweeps import _divide
 from scripts.bench_connected import write_layers
 from tests.identities.solving import linearise_pairs
 from tests.unit.case_sample import BLOCKS
+from tests.unit.test_sweeps import write_network
 
 TILTED = """
 [materials.rock]
@@ -214,6 +225,20 @@ def test_memory_of_groups_of_bodies_is_that_while_they_are_formed() -> None:
     several = replace(work, groups=replace(groups, count=3, largest=1e9))
     assert measure_beside(several) == 8e9
     assert [list_memory(several, ranks, 0.0, 1)[BESIDE] for ranks in (1, 2, 4)] == [8e9, 16e9, 24e9]
+
+
+def test_memory_of_networks_has_that_of_parts_that_settle_by_themselves() -> None:
+    """The parts as they are made; of cracks that do not meet there are none."""
+    model, mesh = read(write_network(teeth=150, elements=8))
+    groups = divide_model(mesh)
+    parts = _divide(mesh, surround_groups(mesh, groups, 0, len(groups)))
+    kept = sum((2 * (mesh.order + 1) * len(around)) ** 2 for _, around in parts)
+    assert count_settling(mesh) == pytest.approx(kept, rel=0.3)
+    model = replace(model, solver=replace(model.solver, operator="hierarchical"))
+    memory = make_forecast(model, mesh, 2, timed=False).memory
+    assert memory[SETTLING] == 4 * count_settling(mesh)
+    alone = replace(mesh, start=mesh.start + 1e-3 * mesh.curve, end=mesh.end + 1e-3 * mesh.curve)
+    assert count_settling(alone) == 0.0
 
 
 def test_ranks_without_cores_take_turns() -> None:

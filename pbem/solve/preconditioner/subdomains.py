@@ -83,14 +83,6 @@ def connect_elements(mesh: Mesh) -> tuple[Integer, Bool]:
     return sets, np.bincount(sets, minlength=mesh.elements) > GROUP_ELEMENTS
 
 
-def do_cracks_meet(mesh: Mesh) -> bool:
-    """Whether any cracks have an end in common."""
-    own = np.flatnonzero(mesh.crack)
-    sets = join_elements(mesh, own)[own]
-    curve_of_set = np.unique(np.stack([sets, mesh.curve[own]]), axis=1)
-    return bool(len(curve_of_set[0]) > len(np.unique(sets)))
-
-
 def share_groups(mesh: Mesh, groups: list[Integer], rank: int, ranks: int) -> tuple[int, int]:
     """This rank's groups: from the first number up to the second."""
     if len(groups) < ranks:

@@ -16,6 +16,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Complex, Integer, Real
+from pbem.bem.group_sizes import do_cracks_meet
 from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import ModeState, PairState
@@ -26,7 +27,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
-from pbem.solve.preconditioner.subdomains import do_cracks_meet, find_nearest
+from pbem.solve.preconditioner.subdomains import find_nearest
 from pbem.solve.problem.problem import Problem
 
 # So few pairs are answered for by the whole model: what is left at the end can hang on what is far away.

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.bem.group_sizes import PART_ELEMENTS, PART_SHARE
 from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
@@ -33,15 +34,9 @@ from pbem.solve.preconditioner.subdomains import Subdomain, find_nearest
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Judge, Solved
 
-# The groups of a network are divided into parts of so many elements at most, which settle with the elements nearest to
-# them, so many times as many: what they take grows with the square of these numbers.
-PART_ELEMENTS = 48
-AROUND = 1.0
 # All groups settle so often in turn between two solutions of the whole, each by so many of Newton's steps at most.
 MOST_SWEEPS = 3
 MOST_STEPS = 8
-
-
 # A group whose tractions the others have moved off its laws by less than this part of the largest is left as it is.
 SMALL = 1e-3
 
@@ -171,7 +166,7 @@ def _divide(mesh: Mesh, groups: Iterable[Subdomain]) -> Iterator[tuple[Integer, 
             yield group.elements, group.around
             continue
         for part in _halve(middle, group.elements):
-            yield part, np.union1d(part, find_nearest(mesh, part, tree, int(AROUND * len(part))))
+            yield part, np.union1d(part, find_nearest(mesh, part, tree, int(PART_SHARE * len(part))))
 
 
 def _halve(middle: Complex, elements: Integer) -> Iterator[Integer]:

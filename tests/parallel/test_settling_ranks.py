@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from pbem.results.reader import open_results
+from pbem.solve.nonlinear.newton import PATIENCE
 from pbem.solve.nonlinear.search import Search
+from tests.unit.test_sweeps import grow_branches
 from tests.verification.test_settling import make_junction, run, write_plane
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]
@@ -45,3 +47,47 @@ def test_modes_and_iterations_are_the_same_on_all_ranks(
         assert results.steps.iterations.tolist() == [len(alone.iterations)]
         modes = np.concatenate([results.contact[name].mode[-1] for name in ("b0", "b1", "b2")])
         np.testing.assert_array_equal(modes, alone.contact.mode)
+
+
+# A network whose laws are smoothed after the first iteration, with groups that several ranks share.
+SMOOTHED = """
+import sys
+import pbem
+from pbem.parallel import world
+from pbem.solve.nonlinear.smooth_search import SmoothSearch
+from pbem.solve.preconditioner import subdomains
+
+subdomains.ONE_GROUP, subdomains.CONNECTED_ELEMENTS = 0, 16
+begun = []
+
+def begins(search, counts, state):
+    search._first = state
+    search._allowed, allowed = False, search._allowed
+    begun.append(allowed)
+    return allowed
+
+SmoothSearch.begins = begins
+pbem.run("network.toml", sys.argv[1])
+counts = world.gather(sum(begun))
+if world.rank == 0:
+    print(*counts)
+"""
+
+
+def test_smoothed_laws_lead_to_the_same_on_all_ranks(tmp_path: Path, mpirun_snippet: Launch) -> None:
+    (tmp_path / "network.toml").write_text(grow_branches(3, 5))
+    found = []
+    for ranks in (1, 3):
+        done = mpirun_snippet(ranks, SMOOTHED, f"{ranks}.h5", cwd=tmp_path)
+        # Of the solution and of the second one, for the estimate.
+        assert (done.returncode, done.stdout.split()) == (0, ["2"] * ranks), done.stderr
+        found.append(open_results(tmp_path / f"{ranks}.h5"))
+    alone, *others = found
+    assert alone.steps.iterations[0] > PATIENCE
+    for results in others:
+        for name in ("iteration", "changed", "stick", "slip", "open"):
+            np.testing.assert_array_equal(results.convergence[name], alone.convergence[name])
+        for name, contact in alone.contact.items():
+            np.testing.assert_array_equal(results.contact[name].mode, contact.mode)
+        size = np.abs(alone.displacement).max()
+        np.testing.assert_allclose(results.displacement, alone.displacement, rtol=0, atol=1e-8 * size)

@@ -19,8 +19,8 @@ from pbem.forecast.usual import (
     BESIDE,
     SETTLING,
     STARTED,
-    Changes,
     expect_changes,
+    expect_second_changes,
     list_memory,
     list_overhead,
     list_seconds,
@@ -91,8 +91,7 @@ def make_forecast(
         eased = replace(coarse.model, solver=choose_operator(model, mesh).ease(coarse.model.solver))
         second = count_work(eased, generate_mesh(eased))
     changes = expect_changes(model, mesh, work.pairs)
-    # The second solution begins from the statuses of the first; some of its steps make factors anew.
-    settled = Changes(float(size.steps), 0.0, 0.75 + 0.25 * size.steps)
+    settled = expect_second_changes(model, mesh, size.steps)
     memory = {"programs and libraries": STARTED * ranks, **list_memory(work, ranks, changes.part, size.steps)}
     if second is not None:
         used = list_memory(second, ranks, 0.0, size.steps)

@@ -40,6 +40,8 @@ SCATTERED = 1.2
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
 # step of the first stage, in which loads grow in proportion; of a step of a further stage.
 SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
+# Where faces soften the tangent operator changes with each iteration: Newton iterations and factorisations of a step.
+SOFTENING, SOFTENING_FACTORS = 3.0, 2.0
 # Factorisations where they may be made anew, and where nobody knows; iterations of GMRES in a system, and where nothing
 # changes; products beside those.
 FACTORISATIONS, FACTORISATIONS_UNKNOWN, GMRES, GMRES_SETTLED, PRODUCTS = 2.0, 1.4, 8.0, 3.0, 3.0
@@ -104,9 +106,24 @@ def expect_changes(model: Model, mesh: Mesh, pairs: int) -> Changes:
     if remote.any() and not model.conditions and pairs:
         part, opened = _judge_pairs(model, mesh, remote[np.abs(remote).sum(axis=1).argmax()])
         number, factors = OPENING if opened else SLIPPING if part else 1.0, FACTORISATIONS
+    if pairs and _has_softening(model, mesh):
+        steps = first.steps + further
+        return Changes(SOFTENING * steps, part, SOFTENING_FACTORS * steps)
     if not pairs or not part:
         return Changes(float(first.steps + further), 0.0)
     return Changes(number + ALIKE * (first.steps - 1) + FURTHER * further, part, factors)
+
+
+def expect_second_changes(model: Model, mesh: Mesh, steps: int) -> Changes:
+    """Of the second solution, which begins from the statuses of the first; some of its steps make factors anew."""
+    if _has_softening(model, mesh):
+        return Changes(SOFTENING * steps, 0.0, SOFTENING_FACTORS * steps)
+    return Changes(float(steps), 0.0, 0.75 + 0.25 * steps)
+
+
+def _has_softening(model: Model, mesh: Mesh) -> bool:
+    """Whether some faces bear less the more they part."""
+    return any(find_joint(model, name).law.softening is not None for name in mesh.interface_names)
 
 
 def _judge_pairs(model: Model, mesh: Mesh, stress: Real) -> tuple[float, bool]:

@@ -23,6 +23,7 @@ from pbem.forecast.usual import (
     FIRST_UNKNOWN,
     SETTLING,
     expect_changes,
+    expect_second_changes,
     list_memory,
     measure_beside,
 )
@@ -142,6 +143,17 @@ def test_changes_follow_from_the_stress_far_away(sxx: float, syy: float, part: f
     model, mesh = read(TILTED.format(sxx=sxx, syy=syy))
     changes = expect_changes(model, mesh, 54)
     assert (changes.part, changes.iterations) == (pytest.approx(part), pytest.approx(first + 2))
+
+
+def test_faces_that_soften_ask_for_factors_in_each_step() -> None:
+    # The tangent operator changes with each iteration, in the second solution as well.
+    soft = 'law = "cohesive"\ntensile_strength = 1.0\nfracture_energy = 1e-3'
+    model, mesh = read(TILTED.format(sxx=-1, syy=-1).replace("friction = 0.5", soft, 1))
+    steps = sum(stage.steps for stage in model.stages)
+    for changes in (expect_changes(model, mesh, 54), expect_second_changes(model, mesh, steps)):
+        assert changes.iterations >= 2 * steps and changes.factorisations >= steps
+    model, mesh = read(TILTED.format(sxx=-1, syy=-1))
+    assert expect_second_changes(model, mesh, 4).factorisations < 4
 
 
 def test_more_ranks_have_more_memory_together_and_less_each() -> None:

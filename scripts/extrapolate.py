@@ -2,8 +2,9 @@
 
 Two sizes are run on one and on two ranks. Each piece is then split into a part that the ranks share (a n / ranks) and a
 part that every rank, or the first one alone, does for the whole model (b n); memory has a constant part besides. A
-third, larger run on two ranks checks the forecast. What passes between the ranks follows from the method: in a product
-all ranks add up the coefficients of all clusters and gather the vector of the unknowns.
+third, larger run on two ranks checks the forecast. What passes between the ranks is counted on 8 and 16 ranks
+(scripts/bench_exchange.py): in a product a rank needs the clusters along its border, whose number is in proportion to
+the root of its unknowns, and of each coarser level of the trees about as many.
 
 usage: .venv/bin/python scripts/extrapolate.py [--small 250] [--large 1000] [--check 2000]
 """
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench_exchange import count_ranks
 from bench_field import make_field
 from measure_run import run_measured
 from scipy.optimize import nnls
@@ -25,6 +27,7 @@ MODELS = ((1_000_000, (16, 64, 256, 1024)), (10_000_000, (16, 64, 256, 1024)))
 BANDWIDTH, LATENCY = 10e9, 2e-6
 NEWTON = 8  # iterations in one load step: fields of 250 to 2000 cracks take 6 to 11
 GMRES = 20  # iterations in each: 11 to 17 were seen
+COUNTED = (8, 16)  # ranks on which messages are counted: most have neighbours on all sides
 
 Forecast = dict[str, Any]
 
@@ -59,20 +62,36 @@ def predict(law: np.ndarray, n: float, ranks: float) -> float:
     return float(law @ np.array([n / ranks, n, 1.0]))
 
 
-def count_communication(n: float, ranks: int, run: Forecast) -> tuple[float, float]:
-    """Bytes that a rank takes part in moving in one product, and their seconds on a usual network."""
-    leaves = n * run["leaves"] / run["unknowns"]
-    volume = 2 * leaves * 4 * (run["terms"] + 1) * 8 + 2 * 8 * n  # all-reduce and all-gather
-    return volume, volume / BANDWIDTH + 2 * LATENCY * np.log2(max(ranks, 2))
+def add_both(counts: Forecast, name: str) -> float:
+    """What a rank exchanges in a product and in its preconditioner."""
+    return float(counts["product"][name] + counts["preconditioned"][name])
 
 
-def print_forecast(laws: dict[str, np.ndarray], memory: np.ndarray, run: Forecast) -> None:
+def fit_traffic(counts: list[Forecast]) -> np.ndarray:
+    """Non-negative a, b of a sqrt(n / ranks) + b log2(n): bytes that a rank receives in a product."""
+    n, ranks = (np.array([each[name] for each in counts], dtype=float) for name in ("unknowns", "ranks"))
+    values = np.array([add_both(each, "received") for each in counts], dtype=float)
+    return nnls(np.column_stack([np.sqrt(n / ranks), np.log2(n)]) / values[:, None], np.ones(len(values)))[0]
+
+
+def forecast_communication(n: float, ranks: int, law: np.ndarray, messages: float) -> tuple[float, float]:
+    """Bytes that a rank receives in one product, and their seconds on a usual network."""
+    volume = float(law @ np.array([np.sqrt(n / ranks), np.log2(n)]))
+    return volume, volume / BANDWIDTH + messages * LATENCY
+
+
+def print_forecast(laws: dict[str, np.ndarray], memory: np.ndarray, counts: list[Forecast]) -> None:
     """The tables of the large models."""
+    law = fit_traffic(counts)
+    messages = max(add_both(each, "messages") for each in counts)
+    for each in counts:
+        counted, known = add_both(each, "received"), forecast_communication(each["unknowns"], each["ranks"], law, 0)[0]
+        print(f"{each['unknowns']} unknowns, {each['ranks']} ranks: MB received: {counted / 1e6:.3g}, law {known / 1e6:.3g}")
     for n, rank_counts in MODELS:
         print(f"\n{n:,} unknowns; seconds")
         print(f"{'':34s}" + "".join(f"{ranks:>10d}" for ranks in rank_counts) + "   ranks")
         rows = {name: [predict(law, n, ranks) for ranks in rank_counts] for name, law in laws.items()}
-        traffic = [count_communication(n, ranks, run) for ranks in rank_counts]
+        traffic = [forecast_communication(n, ranks, law, messages) for ranks in rank_counts]
         for name, values in rows.items():
             print(f"{name:34s}" + "".join(f"{value:10.3g}" for value in values))
         print(f"{'communication, a product':34s}" + "".join(f"{seconds:10.3g}" for _, seconds in traffic))
@@ -84,7 +103,7 @@ def print_forecast(laws: dict[str, np.ndarray], memory: np.ndarray, run: Forecas
         ]  # fmt: skip
         print(f"{'a load step, all in all':34s}" + "".join(f"{value:10.3g}" for value in whole))
         print(f"{'MB a rank':34s}" + "".join(f"{predict(memory, n, ranks):10.0f}" for ranks in rank_counts))
-        print(f"{'MB moved by a rank, a product':34s}" + "".join(f"{volume / 1e6:10.0f}" for volume, _ in traffic))
+        print(f"{'MB received by a rank, a product':34s}" + "".join(f"{volume / 1e6:10.2f}" for volume, _ in traffic))
 
 
 def main() -> None:
@@ -99,6 +118,7 @@ def main() -> None:
         fields = {count: make_field(folder, count) for count in (options.small, options.large, options.check)}
         runs = [run_measured(fields[count], ranks) for count in (options.small, options.large) for ranks in (1, 2)]
         check = run_measured(fields[options.check], 2)
+        counts = [count_ranks(fields[count], ranks) for count in (options.small, options.large) for ranks in COUNTED]
     pieces = [read_pieces(run) for run in runs]
     laws = {name: fit(runs, [each[name] for each in pieces], constant=False) for name in pieces[0]}
     memory = fit(runs, [max(run["memory"]) for run in runs], constant=True)
@@ -110,7 +130,7 @@ def main() -> None:
     for name, value in read_pieces(check).items():
         print(f"{name:34s}{value:10.3g} s{predict(laws[name], check['unknowns'], 2):10.3g} s")
     print(f"{'MB a rank':34s}{max(check['memory']):10.0f}  {predict(memory, check['unknowns'], 2):10.0f}")
-    print_forecast(laws, memory, check)
+    print_forecast(laws, memory, counts)
 
 
 if __name__ == "__main__":

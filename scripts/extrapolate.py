@@ -86,7 +86,7 @@ def print_forecast(laws: dict[str, np.ndarray], memory: np.ndarray, counts: list
     messages = max(add_both(each, "messages") for each in counts)
     for each in counts:
         counted, known = add_both(each, "received"), forecast_communication(each["unknowns"], each["ranks"], law, 0)[0]
-        print(f"{each['unknowns']} unknowns, {each['ranks']} ranks: MB received: {counted / 1e6:.3g}, law {known / 1e6:.3g}")
+        print(f"{each['unknowns']} unknowns on {each['ranks']}: {counted / 1e6:.3g} MB received, law {known / 1e6:.3g}")
     for n, rank_counts in MODELS:
         print(f"\n{n:,} unknowns; seconds")
         print(f"{'':34s}" + "".join(f"{ranks:>10d}" for ranks in rank_counts) + "   ranks")

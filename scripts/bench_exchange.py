@@ -145,17 +145,24 @@ def count_ranks(case: Path, ranks: int) -> dict[str, Any]:
     return found | {"ranks": ranks, "pieces": {name: largest("pieces", name) for name in told[0]["pieces"]}}
 
 
-def print_table(rows: list[dict[str, Any]]) -> None:
-    """Exchange, then memory by piece, a line for each number of ranks."""
-    print("\nof the rank with the most: in a product, and in the preconditioner; kB; collective: largest array, bytes")
+def print_head() -> None:
+    """What the columns of `print_exchange` are."""
+    print("of the rank with the most: in a product, and in the preconditioner; kB; collective: largest array, bytes")
     print(f"{'ranks':>6s}{'unknowns':>10s}{'messages':>10s}{'sent':>9s}{'received':>10s}{'collective':>12s}"
           f"{'messages':>10s}{'received':>10s}{'seconds':>10s}{'times P':>9s}{'MB':>8s}")
-    for row in rows:
-        one, other = row["product"], row["preconditioned"]
-        share = row["seconds"] * row["ranks"] / (rows[0]["seconds"] * rows[0]["ranks"])
-        print(f"{row['ranks']:6d}{row['own']:10d}{one['messages']:10d}{one['sent'] / 1e3:9.0f}"
-              f"{one['received'] / 1e3:10.0f}{max(one['collective'], other['collective']):12d}{other['messages']:10d}"
-              f"{other['received'] / 1e3:10.1f}{row['seconds']:10.4f}{share:9.2f}{row['memory']:8.0f}")
+
+
+def print_exchange(row: dict[str, Any], first: dict[str, Any]) -> None:
+    """A line for a number of ranks."""
+    one, other = row["product"], row["preconditioned"]
+    share = row["seconds"] * row["ranks"] / (first["seconds"] * first["ranks"])
+    print(f"{row['ranks']:6d}{row['own']:10d}{one['messages']:10d}{one['sent'] / 1e3:9.0f}"
+          f"{one['received'] / 1e3:10.0f}{max(one['collective'], other['collective']):12d}{other['messages']:10d}"
+          f"{other['received'] / 1e3:10.1f}{row['seconds']:10.4f}{share:9.2f}{row['memory']:8.0f}", flush=True)
+
+
+def print_pieces(rows: list[dict[str, Any]]) -> None:
+    """Memory by piece, a column for each number of ranks."""
     print("\narrays by piece, MB; after each its part of the first row's, times the ranks")
     print(f"{'ranks':16s}" + "".join(f"{row['ranks']:>10d}{'':7s}" for row in rows))
     sums = [sum(row["pieces"].values()) for row in rows]
@@ -185,12 +192,12 @@ def main() -> None:
         from bench_field import make_field
 
         case = options.case or make_field(Path(name), options.cracks)
-        rows = []
+        rows: list[dict[str, Any]] = []
+        print_head()
         for ranks in options.ranks:
             rows.append(count_ranks(case, ranks))
-            print(f"{ranks} ranks: counted", file=sys.stderr, flush=True)
-        print(f"{case.stem}: {rows[0]['unknowns']} unknowns")
-        print_table(rows)
+            print_exchange(rows[-1], rows[0])
+        print_pieces(rows)
 
 
 if __name__ == "__main__":

@@ -114,6 +114,14 @@ remove_strangers() {
         say "removing $name from .venv, where it hides the one of the distribution"
         "$venv/bin/python" -m pip uninstall -q -y --disable-pip-version-check "$name" || true
     done
+    refuse_strangers
+}
+
+# What pip does not know of it cannot remove.
+refuse_strangers() {
+    local strangers
+    strangers=$(list_strangers)
+    [ -z "$strangers" ] || fail "expected in /usr/lib, but found elsewhere:" $strangers "- remove .venv, then run this again"
 }
 
 # From now on pip keeps these versions. Debian's h5py goes by another name there: pip is told that h5py is installed.
@@ -166,9 +174,7 @@ install_python_packages() {
 
 # The kept packages must be the ones of the distribution: others are built with another MPI.
 check_origin() {
-    local strangers
-    strangers=$(list_strangers)
-    [ -z "$strangers" ] || fail "expected in /usr/lib, but found elsewhere:" $strangers "- remove .venv, then run this again"
+    refuse_strangers
     is_importable || fail "the environment is not usable, see above; remove .venv, then run this again"
 }
 

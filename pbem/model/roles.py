@@ -118,6 +118,9 @@ def _resolve_contacts(
         if name in kinds:
             found = f"the name '{name}', which is that of {kinds[name]}"
             faults.append(Fault.at(("contacts", name), found, "a name of its own, under which results are stored"))
+        if len(set(table.between)) == 2 and all(outer.get(curve) in case.tools for curve in table.between):
+            faults.append(Fault.at(("contacts", name, "between"), "two rigid tools", "a tool and a curve of a body"))
+            continue
         for index, curve in enumerate(table.between):
             loc = ("contacts", name, "between", index)
             if curve not in case.curves:

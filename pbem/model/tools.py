@@ -23,16 +23,14 @@ _NEAR = 0.02
 
 
 def check_tools(case: Case, roles: Roles) -> list[Fault]:
-    """Faults of tools that touch nothing, or each other."""
+    """Faults of tools that touch nothing."""
     faults = []
+    touching = {curve for contact in case.contacts.values() for curve in contact.between}
     for name, table in case.tools.items():
         for curve in (name, *table.curves):
-            if curve in roles.outer and curve not in roles.in_contact:
+            if curve in roles.outer and curve not in touching:
                 found = f"curve '{curve}' of a tool in no contact"
                 faults.append(Fault.at(("tools", name), found, f"a table [contacts.NAME] between '{curve}' and a body"))
-    for name, pair in roles.contacts.items():
-        if all(roles.outer[curve] in case.tools for curve in pair):
-            faults.append(Fault.at(("contacts", name, "between"), "two rigid tools", "a tool and a curve of a body"))
     return faults
 
 

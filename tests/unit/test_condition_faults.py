@@ -69,6 +69,14 @@ WRONG = {
     "pressure of faces that are gone": (
         '[interfaces.seam]\nlaw = "coulomb"\nfriction = 0.3\n[[stages]]\nremove = ["up"]\n[[stages]]\n'
         "[stages.interfaces.seam]\npressure = 5.0", "stages[2].interfaces.seam", ["[stages.boundary.seam]"]),
+    "a pressure that is no value": ('[[stages]]\nremove = ["up"]\n[stages.boundary.seam]\npressure = "2*z"',
+                                    "stages[1].boundary.seam.pressure", ['"2*z"', "{ expression = "]),
+    "tools that touch": (
+        "[curves.anvil]\npoints = [[0, 3], [2, 3]]\nelements = 1\n[tools.anvil]\nuy = 0.0\nux = 0.0\nrotation = 0.0\n"
+        '[contacts.press]\nbetween = ["anvil", "punch"]', "contacts.press.between", ["two rigid tools", "of a body"]),
+    "dilation that is no number": (
+        '[interfaces.seam]\nlaw = "coulomb"\nfriction = 0.5\ndilation_angle = "steep"', "interfaces.seam.dilation_angle",
+        ["steep"]),
 }  # fmt: skip
 
 

@@ -186,8 +186,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
         leader=_find_leaders(model, mesh),
         stiffening=spread([
-            1 / law.parameters["closure"] if "closure" in law.parameters else 0.0
-            for law in laws
+            1 / closure if isinstance(closure := law.parameters.get("closure"), float) else 0.0 for law in laws
         ]),
     )
 

@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from pbem.description.values import FrictionAngle, NotNegative, PartOrWhole, Positive, ResidualAngle, RoughnessNumber
+from pbem.description.values import NotNegative, PartOrWhole, Positive, ResidualAngle, RoughnessNumber
+from pbem.description.varying import Angle
 
 LawName = Annotated[
     Literal["bonded", "coulomb", "open", "frictionless", "rate_and_state", "cohesive", "barton_bandis", "custom"]
@@ -50,7 +51,7 @@ Closure = Annotated[
     ),
 ]
 DilationAngle = Annotated[
-    FrictionAngle | None,
+    Angle | None,
     Field(
         description="of `coulomb`: slip pushes the faces apart by the tangent of this angle, degrees; at most the "
         "angle of friction"

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from pbem.description.table import Table
-from pbem.description.values import LARGEST, NotNegative, Number, Point, Text, is_number
+from pbem.description.values import LARGEST, FrictionAngle, NotNegative, Number, Point, Text, is_number
 
 EXAMPLES = '{ expression = "..." } or { table = [[s, value], ...] } with increasing s'
 
@@ -72,6 +72,10 @@ Value = Annotated[
 ]
 Strength = Annotated[
     Annotated[NotNegative, Tag(NUMBER)] | _Varying, Discriminator(_tell_kind), BeforeValidator(_check_strength)
+]
+# An angle (degrees), or what varies along the curve.
+Angle = Annotated[
+    Annotated[FrictionAngle, Tag(NUMBER)] | _Varying, Discriminator(_tell_kind), BeforeValidator(_check_strength)
 ]
 # A number, or what is linear in x and y.
 LinearValue = Annotated[

@@ -24,7 +24,7 @@ from pbem.model.model import Law
 from pbem.model.touching import find_least
 from pbem.model.varying import Places, Value, Varying, evaluate
 
-# What of a law may vary along its curve.
+# What of a law may vary along its curve; of Coulomb's the dilation angle, too, which is among its parameters.
 VARYING_KEYS = ("friction", "cohesion", "tensile_strength", "friction_dynamic", "gap")
 # A tensile strength or an angle may be written with so few digits that it exceeds what is possible by this part.
 APEX = 1e-4
@@ -59,8 +59,9 @@ def read_law(
         path, wrong = _find_file(case, loc, table)
         faults += wrong
     smooth = kind in ("frictionless", "custom")
-    parameters = {key: getattr(table, key) for key in ("dilation_angle", "dilation_slip") if table.dilation_angle}
-    parameters = {key: value for key, value in parameters.items() if value is not None and not smooth}
+    angle, wrong = read_value((*loc, "dilation_angle"), table.dilation_angle, timed=False)
+    faults += wrong
+    dilation = {"dilation_angle": angle, "dilation_slip": table.dilation_slip} if angle and not smooth else {}
     law = Law(
         kind="custom" if kind == "custom" else "coulomb",
         friction=0.0 if smooth else friction,
@@ -74,7 +75,9 @@ def read_law(
         normal_stiffness=joint[0],
         tangential_stiffness=joint[1],
         file=path,
-        parameters=dict(table.parameters) if kind == "custom" else parameters,
+        parameters=dict(table.parameters) if kind == "custom" else {
+            key: value for key, value in dilation.items() if value is not None
+        },
         frictionless=smooth or 0.0 in (table.friction, table.friction_angle),
     )
     return law, faults
@@ -164,7 +167,24 @@ def check_along(loc: KeyPath, law: Law, curve: Curve) -> list[Fault]:
         elif value is not None and value < floor:
             found = f"gap = {value:g} on '{loc[-1]}', whose faces never touch"
             faults.append(Fault.at((*loc, key), found, 'a gap >= 0, or law = "coulomb" for faces pressed together'))
+    angle = law.parameters.get("dilation_angle")
+    if isinstance(angle, Varying):
+        faults += _check_angle(loc, angle, curve)
     return faults or [*_check_strengths_along(loc, law, curve)]
+
+
+def _check_angle(loc: KeyPath, angle: Varying, curve: Curve) -> Iterator[Fault]:
+    """Dilation angles (degrees) are from 0 to less than 90 everywhere."""
+
+    def reach(places: Places) -> Real:
+        values = _evaluate_or_nan(angle, places)
+        return np.minimum(values, np.nextafter(90.0, 0.0) - values)
+
+    least, place = find_least(curve, reach)
+    if not (math.isfinite(least) and least >= 0):
+        found = f"a dilation angle that is none at {format_point(place)} on curve '{curve.name}'"
+        expected = "an angle from 0 to less than 90 degrees everywhere on the curve"
+        yield Fault.at((*loc, "dilation_angle"), found, expected)
 
 
 def _evaluate_or_nan(value: Value, places: Places) -> Real:
@@ -175,8 +195,8 @@ def _evaluate_or_nan(value: Value, places: Places) -> Real:
 def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fault]:
     """What `_check_strengths` asks of numbers, where one of them varies along the curve."""
     strengths = (law.friction, law.cohesion, law.tensile_strength, law.friction_dynamic)
-    climb = math.tan(math.radians(law.parameters.get("dilation_angle", 0.0))) if law.kind == "coulomb" else 0.0
-    if not any(isinstance(value, Varying) for value in strengths):
+    angle: Value = law.parameters.get("dilation_angle", 0.0) if law.kind == "coulomb" else 0.0
+    if not any(isinstance(value, Varying) for value in (*strengths, angle)):
         return
 
     def falls(places: Places) -> Real:
@@ -191,15 +211,20 @@ def _check_strengths_along(loc: KeyPath, law: Law, curve: Curve) -> Iterator[Fau
         found = f"friction_dynamic above the static friction at {format_point(place)}"
         yield Fault.at((*loc, "friction_dynamic"), found, "friction that decreases with slip everywhere on the curve")
     for friction in (law.friction, law.friction_dynamic):
-        if climb and isinstance(friction, Varying):
-            least, place = find_least(curve, functools.partial(evaluate, friction))
-            if climb > least * (1 + APEX):
+        if angle and friction is not None and (isinstance(friction, Varying) or isinstance(angle, Varying)):
+            least, place = find_least(curve, functools.partial(_spare_friction, friction, angle))
+            if least < 0:
                 found = f"dilation_angle beyond the angle of friction at {format_point(place)}"
                 yield Fault.at((*loc, "dilation_angle"), found, "at most the angle of friction everywhere on the curve")
     least, place = find_least(curve, reaches)
     if law.tensile_strength and law.softening is None and least < 0:
         found = f"tensile_strength beyond the apex of the cone of friction at {format_point(place)}"
         yield Fault.at((*loc, "tensile_strength"), found, "at most cohesion/friction everywhere on the curve")
+
+
+def _spare_friction(friction: Value, angle: Value, places: Places) -> Real:
+    """By how much friction exceeds the tangent of the dilation angle."""
+    return evaluate(friction, places) * (1 + APEX) - np.tan(np.radians(evaluate(angle, places)))
 
 
 def _find_friction(table: LawTable) -> float:
@@ -261,6 +286,8 @@ def _check_dilation(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Fault
     if table.dilation_slip is not None and table.dilation_angle is None:
         found, expected = f"a dilation_slip of '{loc[-1]}' without dilation_angle", "both of them, or none"
         yield Fault.at((*loc, "dilation_slip"), found, expected)
+    if isinstance(table.dilation_angle, VaryingTable):
+        return
     climb = math.tan(math.radians(table.dilation_angle or 0.0))
     # What varies along the curve is looked at there (see `_check_strengths_along`).
     static = [] if isinstance(table.friction, VaryingTable) else [_find_friction(table)]

@@ -76,7 +76,7 @@ class Law:
     normal_stiffness: float | None = None
     tangential_stiffness: float | None = None
     file: str | None = None
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, Value] = field(default_factory=dict)
     softening: str | None = None
     frictionless: bool = field(default=False, compare=False)
 

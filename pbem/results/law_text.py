@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -132,7 +132,7 @@ def summarise_laws(model: Model) -> list[dict[str, Any]]:
     result = []
     for each in collect_equal_laws(model):
         law: dict[str, Any] = {name: to_plain(getattr(each.law, name)) for name in _FIELDS}
-        parameters: Mapping[str, float] = each.law.parameters
-        result.append({"of": list(each.names), "on": each.kind, **law, "parameters": dict(parameters),
+        parameters = {name: to_plain(value) for name, value in each.law.parameters.items()}
+        result.append({"of": list(each.names), "on": each.kind, **law, "parameters": parameters,
                        "pressure": [*map(to_plain, each.pressure)]})
     return result

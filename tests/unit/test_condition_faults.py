@@ -75,8 +75,8 @@ WRONG = {
         "[curves.anvil]\npoints = [[0, 3], [2, 3]]\nelements = 1\n[tools.anvil]\nuy = 0.0\nux = 0.0\nrotation = 0.0\n"
         '[contacts.press]\nbetween = ["anvil", "punch"]', "contacts.press.between", ["two rigid tools", "of a body"]),
     "dilation that is no number": (
-        '[interfaces.seam]\nlaw = "coulomb"\nfriction = 0.5\ndilation_angle = "steep"', "interfaces.seam.dilation_angle",
-        ["steep"]),
+        '[interfaces.seam]\nlaw = "coulomb"\nfriction = 0.5\ndilation_angle = "steep"',
+        "interfaces.seam.dilation_angle", ["steep"]),
 }  # fmt: skip
 
 

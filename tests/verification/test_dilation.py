@@ -271,3 +271,35 @@ def test_fluid_takes_part_where_it_is(inside: bool, tmp_path: Path) -> None:
     np.testing.assert_allclose(energy.dissipated, total, rtol=1e-8)
     left = energy.external - energy.elastic - energy.dissipated
     assert np.abs(left).max() < 1e-8 * np.abs(energy.external).max() and not energy.released.any()
+
+
+@pytest.mark.parametrize(
+    ("angle", "find"),
+    [({"expression": "18 + 8*x"}, lambda x, s: 18 + 8 * x),
+     ({"table": [[0.0, 5.0], [1.5, 26.0]]}, lambda x, s: 5 + 14 * s)],
+)  # fmt: skip
+def test_the_angle_of_dilation_may_vary_along_the_joint(
+    angle: dict[str, Any], find: Callable[[Any, Any], Any], tmp_path: Path
+) -> None:
+    """Faces in touch are as far apart as the angle at each place, and the slip there, make them."""
+    law = {"law": "coulomb", "friction": 0.6, "dilation_angle": angle}
+    states = [Sheared(0.0, 0.0, 0.0, 0.0, 0.0)] * 3
+    joint = pbem.run(make_case(law, PRESSED, [0.02, 0.03], states), tmp_path / "joint.h5").contact["mid"]
+    slides = (joint.mode[-1] == 1) & (np.abs(joint.slip[-1]) > 1e-3)
+    assert slides.sum() > 8
+    raised = np.tan(np.radians(find(joint.position[:, 0], joint.arc_length))) * np.abs(joint.slip[-1])
+    np.testing.assert_allclose(joint.opening[-1][slides], raised[slides], rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("angle", "text"),
+    [({"expression": "20 + 20*x"}, "dilation_angle beyond the angle of friction at"),
+     ({"expression": "x - 1"}, "a dilation angle that is none at"),
+     ({"expression": "95 + x"}, "a dilation angle that is none at"),
+     ({"expression": "20*z"}, "the unknown name 'z'")],
+)  # fmt: skip
+def test_angles_of_dilation_that_cannot_be_are_told(angle: dict[str, Any], text: str, tmp_path: Path) -> None:
+    law = {"law": "coulomb", "friction": 0.6, "dilation_angle": angle}
+    case = make_case(law, 0.02, [0.004], [Sheared(0.0, 0.0, 0.0, 0.0, 0.0)] * 2)
+    with pytest.raises(pbem.CaseError, match="interfaces.mid.dilation_angle.*" + text):
+        pbem.run(case, tmp_path / "wrong.h5")

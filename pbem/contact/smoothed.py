@@ -103,6 +103,16 @@ def read_modes(
     return follow_leaders(laws, ModeState(mode, np.where(y < 0, -1.0, 1.0)))
 
 
+def measure_violation(laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real) -> Real:
+    """By how much the tractions of pairs (m,) are off from what the true laws make of their trial values: the sum along
+    n and s (stress; zero of pairs that are not smoothed). (theory, 122, 123 with e = 0)"""
+    x, y = _try(laws, state, memory, pressure)
+    held = np.maximum(x, 0.0)
+    bound = _find_bound(laws, held, memory, pressure).bound
+    off = np.abs(-(state.p_n + pressure) - held) + np.abs(state.p_s - np.clip(y, -bound, bound))
+    return np.asarray(np.where(smooth, off, 0.0))
+
+
 def _try(laws: PairLaws, state: PairState, memory: Memory, pressure: Real) -> tuple[Real, Real]:
     """x and y (m,): contact pressure less r times the opening; traction along the faces plus r times the slip."""
     opening = state.g_n - laws.compliance_n * state.p_n

@@ -45,7 +45,7 @@ from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
 from pbem.solve.nonlinear.search import PLAIN, PLAIN_FROM_SMOOTHED, PLAIN_IF_LOOSE, Globalisation, Search
-from pbem.solve.nonlinear.smooth_search import SmoothSearch
+from pbem.solve.nonlinear.smooth_search import CLOSELY, SmoothSearch
 from pbem.solve.nonlinear.unsettled import Unsettled, describe_unsettled
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
@@ -156,7 +156,8 @@ def _search_modes(
         )
         constraints = hold.release(problem.constrain(law, load), modes)
         try:
-            solved = tangent.solve(constraints, load, law, forcing.choose(search.level > 0))
+            part = forcing.choose(search.level > 0)
+            solved = tangent.solve(constraints, load, law, min(part, CLOSELY) if search.smoothed else part)
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN

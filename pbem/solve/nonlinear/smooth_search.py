@@ -3,8 +3,9 @@
 In open fractures hang thin blocks that single pairs hold. What holds them changes from one iteration to the next, they
 turn by a multiple of what there is room for, and take the statuses of all around with them. Under smoothed laws every
 pair holds what is near to it, the more the nearer it comes: blocks stay where there is room for them, and the solutions
-change little from one width to the next (X. Chen, Math. Programming 134, 2012, reviews such methods). From the statuses
-of the last the search goes on with the true laws; of the smoothed ones nothing is left but where it begins.
+change little from one width to the next, which follows from how far the true laws are from holding (X. Chen, Math.
+Programming 134, 2012, reviews such methods). From the statuses of the last the search goes on with the true laws; of
+the smoothed ones nothing is left but where it begins.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
-from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, read_modes
+from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, measure_violation, read_modes
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
@@ -25,14 +26,15 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
 
 # The laws are smoothed where after so many iterations ...
-FIRST = 4
+FIRST = 3
 # ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer.
 MANY, LEAST = 0.03, 60
-# The width begins with the largest contact traction, and each is this part of the one before.
-NARROWER = 0.3
-# It ends after so many iterations, or so many in turn in which no more than this part of all pairs change.
-LONGEST, ENOUGH, FEW = 12, 2, 1e-3
-# Where so many times more pairs change than at best, and many, a few of them are unsound: it ends with what was before.
+# The width is this part of the mean violation of the true laws, and at least this part of the largest traction: with
+# less, blocks that touch nothing would be held by nothing but rounding.
+WIDTH, NARROWEST = 0.1, 1e-6
+# It ends after so many iterations, or one in which no more than this part of all pairs, or so many, change.
+LONGEST, FEW, FEWEST = 14, 1e-3, 10
+# Where the violation grows by more than this, systems are all but singular: it ends with what was before.
 WORSE = 2.0
 # The part of the residual that is left: blocks that are nearly free move by far more than it tells.
 CLOSELY = 1e-3
@@ -76,11 +78,12 @@ class SmoothSearch:
         """
         problem, memory, load, state = self._problem, self._memory, self._load, self._first
         assert state is not None
-        holding, quiet, least = close_all(problem.laws, modes), 0, np.inf
-        width = float(max(np.abs(state.p_n + load.pressure).max(), np.abs(state.p_s).max()))
-        if not 0 < width < np.inf:
-            return modes, state
-        for _ in range(min(LONGEST, most)):
+        largest = float(max(np.abs(state.p_n + load.pressure).max(), np.abs(state.p_s).max()))
+        holding, violation = close_all(problem.laws, modes), self._measure(state)
+        for taken in range(min(LONGEST, most)):
+            width = max(WIDTH * violation, NARROWEST * largest)
+            if not 0 < width < np.inf:
+                break
             begin = time.perf_counter()
             law = linearise_smoothly(
                 problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width)
@@ -93,11 +96,16 @@ class SmoothSearch:
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
-            count = np.count_nonzero(changed)
-            if count > max(WORSE * least, MANY * len(changed)):
+            least, violation = violation, self._measure(state)
+            if taken and violation > WORSE * least:
                 return before, former
-            least, quiet = min(least, count), quiet + 1 if count <= FEW * len(changed) else 0
-            if quiet == ENOUGH:
+            if taken and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
                 break
-            width *= NARROWER
         return modes, state
+
+    def _measure(self, state: PairState) -> float:
+        """The mean violation of the true laws along all pairs (stress)."""
+        problem = self._problem
+        weight = np.where(self._smooth, problem.mesh.pairs.weight, 0.0)
+        off = measure_violation(problem.laws, self._smooth, state, self._memory, self._load.pressure)
+        return float(weight @ off / weight.sum())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip, start_memory
 from pbem.contact.modes import Linearisation, linearise
-from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, read_modes
+from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, measure_violation, read_modes
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import smooth_search
 from pbem.solve.nonlinear.newton import PATIENCE, solve_step
@@ -222,17 +222,20 @@ def test_limits_hold_for_iterations_with_smoothed_laws_too(many_groups: None, at
     assert search_once(text, 1)[::2] == (1, "iteration limit")
 
 
-def test_smoothing_ends_before_a_width_at_which_most_pairs_change(
+def test_smoothing_ends_before_a_width_that_leads_away(
     many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[ModeState] = []
+    violations: list[float] = []
 
-    def read_badly(*arguments: Any) -> ModeState:
-        modes = read_modes(*arguments)
-        if len(asked) == 6:
-            modes = ModeState(((modes.mode + 1) % 3).astype(np.int8), modes.sign)
-        asked.append(modes)
-        return modes
+    def read(*arguments: Any) -> ModeState:
+        asked.append(read_modes(*arguments))
+        return asked[-1]
+
+    def measure_badly(*arguments: Any) -> Real:
+        violation = measure_violation(*arguments)
+        violations.append(float(violation.mean()))
+        return violation if len(violations) != 5 else violation + 3 * violations[0]
 
     found: list[ModeState] = []
     find = SmoothSearch.find
@@ -242,8 +245,24 @@ def test_smoothing_ends_before_a_width_at_which_most_pairs_change(
         found.append(result[0])
         return result
 
-    monkeypatch.setattr(smooth_search, "read_modes", read_badly)
+    monkeypatch.setattr(smooth_search, "read_modes", read)
+    monkeypatch.setattr(smooth_search, "measure_violation", measure_badly)
     monkeypatch.setattr(SmoothSearch, "find", listen)
-    step = march_over(grow_branches(0, 6))
-    assert len(asked) == 7 and found[0].fingerprint() == asked[5].fingerprint()
-    assert step.iterations[7].changed > 0.5 * len(step.contact.mode)
+    march_over(grow_branches(0, 6))
+    # The first is of the state where it begins.
+    assert len(asked) == 4 and len(violations) == 5 and violations[-1] < 0.01 * violations[0]
+    assert found[0].fingerprint() == asked[2].fingerprint() != asked[3].fingerprint()
+
+
+def test_the_violation_is_what_the_laws_are_off() -> None:
+    laws, memory, pressure = make_case()
+    everywhere = np.ones(COUNT, dtype=bool)
+    state, _ = converge(laws, memory, pressure, 3, 1e-9)
+    assert measure_violation(laws, everywhere, state, memory, pressure).max() < 1e-8
+    # Pairs that interpenetrate without a traction; closed ones that slide without friction.
+    zeros, ones = np.zeros(COUNT), np.ones(COUNT)
+    inside = PairState(-pressure, zeros, -0.1 * ones, memory.slip)
+    np.testing.assert_allclose(measure_violation(laws, everywhere, inside, memory, pressure), 0.1 * laws.stiffness)
+    sliding = PairState(-1.0 - pressure, zeros, zeros, memory.slip + 5.0)
+    np.testing.assert_allclose(measure_violation(laws, everywhere, sliding, memory, pressure), 0.6)
+    assert not measure_violation(laws, ~everywhere, sliding, memory, pressure).any()

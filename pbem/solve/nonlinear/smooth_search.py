@@ -26,7 +26,7 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
 
 # The laws are smoothed where after so many iterations ...
-FIRST = 3
+FIRST = 4
 # ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer.
 MANY, LEAST = 0.03, 60
 # The width is this part of the mean violation of the true laws, and at least this part of the largest traction: with

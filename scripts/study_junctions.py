@@ -56,11 +56,12 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Junction:
-    """What meets where (kind), at an angle (degrees), with so many elements asked on each branch."""
+    """What meets where (kind), at an angle (degrees), with so many elements of an order asked on each branch."""
 
     kind: str
     angle: float
     elements: int = 8
+    order: int = 2
 
     def write(self, friction: float, load: tuple[float, float, float]) -> str:
         """The case."""
@@ -83,7 +84,7 @@ class Junction:
                 "regions": {"plane": {"material": "rock", "infinite": True, "cracks": list(curves)}},
                 "interfaces": {name: {"law": "coulomb", "friction": friction} for name in curves},
                 "remote": dict(zip(("sxx", "syy", "sxy"), load, strict=True)),
-                "analysis": {"steps": 1},
+                "analysis": {"steps": 1, "order": self.order},
                 "solver": {"operator": "dense"},
             }
         )
@@ -109,7 +110,7 @@ class Junction:
                     "bottom": {"ux": 0.0, "uy": 0.0}, "top": {"tx": sxy, "ty": syy}, "right": {"tx": sxx, "ty": sxy},
                     "above": left, "below": left,
                 },
-                "analysis": {"steps": 1},
+                "analysis": {"steps": 1, "order": self.order},
                 "solver": {"operator": "dense"},
             }
         )  # fmt: skip

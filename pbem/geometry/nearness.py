@@ -58,7 +58,8 @@ class Surroundings:
     """The faces of all regions, and which of them a leg does not see: itself, and those that it meets at a corner.
 
     legs: of all curves, one after the other; shapes: their geometry; regions: names of the curves of every region;
-    blind: further pairs of legs (numbers) that do not see each other; cracks: names of the curves that are cracks.
+    blind: further pairs of legs (numbers) that do not see each other; cracks: names of the curves that are cracks;
+    is_crack (legs,): whether a leg is one of these.
     """
 
     def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]],
@@ -75,7 +76,8 @@ class Surroundings:
         for names in regions:
             numbers = [first[name] + at for name in dict.fromkeys(names) for at in range(len(curves[name].legs))]
             self._members.append(np.array(sorted(numbers), dtype=np.int64))
-        crack_legs = frozenset(number for number, name in enumerate(self.curve) if name in cracks)
+        self.is_crack = np.array([name in cracks for name in self.curve], dtype=bool)
+        crack_legs = frozenset(np.flatnonzero(self.is_crack).tolist())
         self.corners, met = _find_meetings(self.legs, self._members, crack_legs)
         unseen = [min(pair) * len(self.legs) + max(pair) for pair in blind]
         self._unseen = np.union1d(met, np.array(unseen, dtype=np.int64))
@@ -139,7 +141,7 @@ class Corner:
     ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
     two legs `sides`; beside: further legs that end at the point, in corners that are no wedges; branching: whether
     three ends of cracks meet, and nothing else does; turning: whether two do, of a crack that does not go on smoothly
-    and ends in a tip.
+    and ends in a tip; bends: whether one of `sides` is a crack's and the other one bounds the region.
     """
 
     point: complex
@@ -149,6 +151,7 @@ class Corner:
     beside: tuple[tuple[int, bool], ...] = ()
     branching: bool = False
     turning: bool = False
+    bends: bool = False
 
 
 def _find_legs_of_tips(
@@ -204,7 +207,9 @@ def _find_meetings(
                 (leg, at_end) for leg, _, at_end in ends
                 if (leg, at_end) not in around and (every or any(regions[leg] & regions[at] for at, _ in around))
             ]
-            corners.append(Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning))
+            bends = (one in cracks) != (other in cracks)
+            corners.append(
+                Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning, bends))
     return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
 
 

@@ -51,6 +51,15 @@ MOST_GROWTH = 1.0
 
 
 @dataclass(frozen=True)
+class Reach:
+    """Longest element, as a multiple of the distance to the next face: usual; bending: between a crack and a face that
+    bounds the region, where what lies between bends."""
+
+    usual: float
+    bending: float
+
+
+@dataclass(frozen=True)
 class Tie:
     """The bit of a curve from arc length `start` to `end` that follows the pair next to it; corner, angle (degrees)
     and the other side of the wedge are for messages."""
@@ -77,7 +86,7 @@ class Wedges:
         """The ends of legs (number, whether it is the leg's end) where a crack turns sharply."""
         return frozenset(end for end, number in self.at.items() if self.corners[number].turning)
 
-    def tabulate(self, legs: int, reach: float) -> tuple[Real, Real]:
+    def tabulate(self, legs: int, reach: Reach) -> tuple[Real, Real]:
         """Per end of a leg (legs, 2): length of the last bit, and growth of lengths; zeros where no wedge is."""
         floor, growth = np.zeros((legs, 2)), np.zeros((legs, 2))
         for corner, bit in zip(self.corners, self.bits, strict=True):
@@ -87,7 +96,7 @@ class Wedges:
         return floor, growth
 
     def grade(
-        self, leg: int, at_end: bool, length: float, places: Real, limits: Real, reach: float
+        self, leg: int, at_end: bool, length: float, places: Real, limits: Real, reach: Reach
     ) -> Sequence[float]:
         """Ends of elements, as fractions of the leg from a corner on: in geometric progression, equal on all legs of
         the corner, up to where they would be longer than a limit (fractions), given from the places (fractions) on;
@@ -116,12 +125,12 @@ def measure_growth(angle: float, reach: float) -> float:
     return min(MOST_GROWTH, reach * math.sin(angle))
 
 
-def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: float) -> float:
+def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: Reach) -> float:
     if corner.turning:
-        return 0.5 * reach * min(1.0, corner.angle / SHARPER)
+        return 0.5 * reach.usual * min(1.0, corner.angle / SHARPER)
     if end in corner.beside:
-        return MOST_GROWTH if corner.ends else reach
-    return measure_growth(corner.angle, reach)
+        return MOST_GROWTH if corner.ends else reach.usual
+    return measure_growth(corner.angle, reach.bending if corner.bends else reach.usual)
 
 
 def measure_last_bit(angle: float, singular: bool = False) -> float:

@@ -72,7 +72,7 @@ def test_every_key_reaches_the_model() -> None:
     assert (model.title, model.units_length, model.units_stress) == ("Everything", "m", "kN/m^2")
     material = model.regions[0].material
     assert (material.young, material.poisson, material.plane, material.density) == (2000.0, 0.25, "stress", 2.5)
-    assert [leg.elements for leg in model.curves["bottom"].legs] == [7]
+    assert [leg.elements for leg in model.curves["bottom"].legs] == [8]  # 7, and one for the crack
     assert [(leg.elements, leg.power) for leg in model.curves["sides"].legs] == [(4, 2.0), (6, 2.0), (4, 2.0)]
     law = model.interfaces["crack"].law
     assert law.kind == "coulomb" and law.friction == pytest.approx(3**-0.5, rel=1e-14)

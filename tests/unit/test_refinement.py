@@ -120,7 +120,7 @@ def test_two_neighbours_become_three_gently(plate: Model) -> None:
     marked = {name: np.ones(count_elements(curve), bool) for name, curve in plate.curves.items()}
     gentle = bisect_elements(plate, marked, gently=True)
     counts = {name: count_elements(curve) for name, curve in gentle.curves.items()}
-    assert counts == {"bottom": 11, "right": 6, "round": 12, "left": 5, "crack": 8}
+    assert counts == {"bottom": 12, "right": 6, "round": 12, "left": 6, "crack": 8}
     assert np.allclose(np.diff(gentle.curves["round"].legs[0].element_fractions()), 1 / 12)
 
 

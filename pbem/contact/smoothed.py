@@ -57,7 +57,7 @@ def linearise_smoothly(
     laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real, traction_scale: float,
     width: float,
 ) -> Linearisation:
-    """The tangents of the smoothed laws of pairs (m,) at a state; others stick, or are open for good.
+    """The tangents of the smoothed laws of pairs (m,) at a state; others are closed, or open for good.
 
     width: e, a stress. (theory, 122, 123)
     """

@@ -43,7 +43,7 @@ CLOSELY = 1e-3
 class SmoothSearch:
     """Whether the laws are smoothed in a search, once, and the modes that this leads to.
 
-    Decided by counts and modes that all ranks know. allowed: whether it may be so at all.
+    Decided by counts, modes and violations that all ranks have from the first one. allowed: whether it may be at all.
     """
 
     def __init__(self, problem: Problem, memory: Memory, load: Load, allowed: bool) -> None:
@@ -78,8 +78,9 @@ class SmoothSearch:
         """
         problem, memory, load, state = self._problem, self._memory, self._load, self._first
         assert state is not None
-        largest = float(max(np.abs(state.p_n + load.pressure).max(), np.abs(state.p_s).max()))
-        holding, violation = close_all(problem.laws, modes), self._measure(state)
+        first, holding = state, close_all(problem.laws, modes)
+        largest, violation = problem.decide(lambda: (
+            float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
         for taken in range(min(LONGEST, most)):
             width = max(WIDTH * violation, NARROWEST * largest)
             if not 0 < width < np.inf:
@@ -91,13 +92,13 @@ class SmoothSearch:
             solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
             forcing.used |= solved.loosely
             before, former, state = modes, state, evaluate_pairs(problem.mesh, law, solved.unknowns)
-            modes = problem.decide(lambda at=state: read_modes(  # type: ignore[misc]
-                problem.laws, self._smooth, at, memory, load.pressure))
+            last = violation
+            modes, violation = problem.decide(lambda at=state: (  # type: ignore[misc]
+                read_modes(problem.laws, self._smooth, at, memory, load.pressure), self._measure(at)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
-            least, violation = violation, self._measure(state)
-            if taken and violation > WORSE * least:
+            if taken and violation > WORSE * last:
                 return before, former
             if taken and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
                 break

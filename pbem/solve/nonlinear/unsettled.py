@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Integer
+from pbem.arrays import Bool, Integer
+from pbem.contact.laws import PairLaws, find_linear
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
@@ -41,6 +42,10 @@ def describe_unsettled(
     """
     if not proposal.changed.any():
         return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
+    if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
+        losing = find_losing(problem.laws) & proposal.changed
+        if losing.any():
+            return _blame_loss(problem, losing, proposal)
     if failed is not None and failed.wrong.any():
         return ConvergenceError(
             "unsound mesh",
@@ -59,15 +64,38 @@ def describe_unsettled(
             f"{len(group)}: {_name(problem, group)}; {lost} lost at once where faces part, and back "
             "where they meet: cohesion_lost = true makes that loss last",
         )
+    return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
+                            _list_places(problem, np.flatnonzero(proposal.changed)))
+
+
+def find_losing(laws: PairLaws) -> Bool:
+    """The pairs (m,) that have tensile strength or cohesion, lose it where they part, and have it back where they meet.
+    """
+    losing = laws.tensile_strength > 0
+    for group in laws.strengths:
+        losing[group.pairs] |= group.parameters.get("cohesion", 0.0) > 0
+    return losing & ~laws.brittle & find_linear(laws)
+
+
+def _blame_loss(problem: Problem, losing: Bool, proposal: Proposal) -> ConvergenceError:
+    """The error where pairs that lose their strength go on changing: what the search made of them last, a cycle or
+    pairs of the wrong sign in a body that hangs on two of them, is chance."""
+    return ConvergenceError(
+        "no admissible modes",
+        f"{_describe_changed(problem, proposal)}; tensile strength and cohesion are lost at once where faces part, and "
+        "back where they meet, so that no modes may fulfil the laws: cohesion_lost = true makes that loss last; where "
+        "elements are longer than the distance to the nearest face, use shorter ones",
+        _list_places(problem, np.flatnonzero(losing)),
+    )
+
+
+def _describe_changed(problem: Problem, proposal: Proposal) -> str:
     names = problem.mesh.interface_names
     numbers, counts = np.unique(problem.mesh.pairs.interface[proposal.changed], return_counts=True)
     first = zip(numbers[:MOST_NAMED], counts[:MOST_NAMED], strict=True)
     where = ", ".join(f"{count} on {names[number]}" for number, count in first)
     worst = np.array([int(np.argmax(proposal.violation))])
-    return ConvergenceError(
-        reason, f"pairs that still change mode: {where}; the worst {_name(problem, worst)}; try shorter elements there",
-        _list_places(problem, np.flatnonzero(proposal.changed)),
-    )
+    return f"pairs that still change mode: {where}; the worst {_name(problem, worst)}"
 
 
 def _list_places(problem: Problem, pairs: Integer) -> tuple[complex, ...]:

@@ -1,0 +1,49 @@
+"""The reasons of searches that end: the same for the same law, whatever the search made of its last iterations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbem.contact.modes import Proposal
+from pbem.contact.subset import Settled
+from pbem.solve.nonlinear.unsettled import describe_unsettled, find_losing
+from tests.unit.test_nearby import draw_modes
+from tests.unit.test_sweeps import assemble, write_network
+
+WRONG = np.array([True, False])
+
+
+@pytest.mark.parametrize(("law", "losing"), [
+    ("friction = 0.4", False),
+    ("friction = 0.4, cohesion = 0.1", True),
+    ("friction = 0.4, cohesion = 0.1, tensile_strength = 0.05", True),
+    ("friction = 0.4, cohesion = 0.1, cohesion_lost = true", False),
+    ("friction = 0.4, cohesion = 0.1, friction_dynamic = 0.3, slip_distance = 1e-3", False),
+])  # fmt: skip
+def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -> None:
+    problem = assemble(write_network(teeth=2, law=law))
+    count = problem.mesh.pairs.count
+    assert (find_losing(problem.laws) == losing).all()
+    violation = np.zeros(count)
+    violation[[3, 5]] = 1.0, 2.0
+    proposal = Proposal(draw_modes(count), violation)
+    group = np.array([3, 5])
+    wrong, none = (Settled(None, False, 4, each) for each in (WRONG, ~WRONG & False))
+    found = [
+        describe_unsettled(problem, "mode cycle", proposal, group, wrong),
+        describe_unsettled(problem, "mode cycle", proposal, group, none),
+        describe_unsettled(problem, "mode cycle", proposal, group[:0], None),
+        describe_unsettled(problem, "no admissible modes", proposal, group, none),
+    ]
+    if losing:
+        assert {error.reason for error in found} == {"no admissible modes"}
+        assert "cohesion_lost = true" in str(found[1]) and len(found[1].places) == 2
+    else:
+        assert [error.reason for error in found[:3]] == ["unsound mesh", "mode cycle", "mode cycle"]
+    # What the user limits is the user's to change; and laws of slipping pairs may be what does not settle.
+    assert describe_unsettled(problem, "iteration limit", proposal, group[:0], None).reason == "iteration limit"
+    settled = replace(proposal, violation=np.zeros(count))
+    assert describe_unsettled(problem, "mode cycle", settled, group, wrong).reason == "mode cycle"

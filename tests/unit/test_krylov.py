@@ -17,8 +17,11 @@ from pbem.results.reader import Results
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.preconditioner import schwarz
 from pbem.solve.preconditioner import subdomains as groups
+from pbem.solve.problem.response import find_response
 from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.problem.tangent import Solved
 from pbem.solve.system.assembly import assemble_problem
+from pbem.solve.tangent import krylov
 from pbem.solve.tangent.krylov import KrylovTangent
 from tests.cli.cli_sample import BLOCKS
 from tests.identities.solving import linearise_pairs
@@ -292,6 +295,33 @@ def test_groups_take_in_more_around_them_where_gmres_is_slow(monkeypatch: pytest
     tangent.solve(problem.constrain(linearise_pairs(problem), load), load)
     assert tangent.iterations[so_far] < 0.75 * slow
     tangent.destroy()
+
+
+@pytest.mark.parametrize("name", ["cracks", "blocks HST", "inclusions"])
+def test_pairs_are_asked_for_responses_after_the_groups_took_in_more(
+    name: str, many_groups: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the same iteration of Newton's method, with the same constraint map as the system that was slow."""
+    monkeypatch.setattr(krylov, "RESPONSE", 1e-11)
+    monkeypatch.setattr(groups, "NEIGHBOUR_UNKNOWNS", 100)
+    responses, preconditioned = [], []
+    for most in (10**6, 0):
+        monkeypatch.setattr(krylov, "SLOW", most)
+        tangent = solve_once(TEXTS[name]())
+        assert tangent.widening == (1 if most else krylov.WIDENING)
+        problem, load, constraints = tangent.problem, tangent.problem.evaluate_load(0, 1.0), tangent.constraints
+        assert constraints is not None and tangent.solution is not None
+        solved = Solved(tangent.solution, constraints.evaluate(tangent.solution), 0.0)
+        pairs = np.array([1, problem.laws.count - 2])
+        given = (constraints, load, linearise_pairs(problem), solved, pairs)
+        responses.append(find_response(problem, tangent, *given).change)
+        residual = np.random.default_rng(4).standard_normal(problem.unknowns)
+        preconditioned.append(tangent.precondition(residual))
+        assert all(inverse.formed for inverse in tangent.preconditioner.inverses)
+        tangent.destroy()
+    before, after = responses
+    np.testing.assert_allclose(after, before, rtol=0, atol=1e-7 * np.abs(before).max())
+    assert np.abs(preconditioned[1] - preconditioned[0]).max() > 1e-6 * np.abs(preconditioned[0]).max()
 
 
 SLIT = """

@@ -91,7 +91,10 @@ class SchwarzPreconditioner:
             inverse.matrix, inverse.formed = None, False
 
     def regroup(self, groups: Sequence[Subdomain], widening: int) -> None:
-        """Take other surroundings of the same groups, so many times as many; `update` then forms all inverses."""
+        """Take other surroundings of the same groups, so many times as many; `update` then forms all inverses.
+
+        Until then `apply` leaves residuals as they are.
+        """
         self._formed, self._widening = None, widening
         self._take_groups(groups)
 
@@ -100,7 +103,12 @@ class SchwarzPreconditioner:
         self.inverses = [self._place(group) for group in groups]
         elements = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(group.around for group in groups)]))
         self.beyond = np.setdiff1d(list_nodes(self._mesh, elements), self._nodes)
-        self._turn = np.zeros((0, 2, 2))  # of the own nodes' equations, and of those beyond
+        # Of the own nodes' equations, and of those beyond.
+        self._turn = np.zeros((0, 2, 2)) if self._less is None else self._choose_turn(self._less)
+
+    def _choose_turn(self, less: Elimination) -> Real:
+        seen = np.concatenate([self._nodes, self.beyond])
+        return less.turn if len(self._nodes) == self._mesh.nodes else less.turn[seen]
 
     def _place(self, group: Subdomain) -> LocalInverse:
         at = np.searchsorted(self._nodes, list_nodes(self._mesh, group.elements))
@@ -131,8 +139,7 @@ class SchwarzPreconditioner:
         change[self._local.find_anchored(constraints)] = np.inf
         self._free = (self.free @ matrix).tocsr()
         less = self._less = eliminate_tractions(matrix, self._free, self._node_crack)
-        seen = np.concatenate([self._nodes, self.beyond])
-        self._turn = less.turn if len(self._nodes) == self._mesh.nodes else less.turn[seen]
+        self._turn = self._choose_turn(less)
         if former is not None:
             change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
         return change
@@ -147,7 +154,7 @@ class SchwarzPreconditioner:
         turned = np.einsum("nij,nj->ni", self._turn, residual.reshape(-1, 2)).ravel()
         # Single precision has few powers of ten, which lengths in small units would fall out of. By a power of two, so
         # that its rounding is the same however many ranks there are.
-        size = float(np.ldexp(0.5, np.frexp(np.abs(turned).max(initial=0.0))[1])) or 1.0
+        size = float(np.ldexp(0.5, np.frexp(np.abs(turned).max(initial=0.0))[1]))
         single = (turned / size).astype(np.float32)
         own = turned[: 2 * len(nodes)].reshape(-1, 2)
         eliminated = np.einsum("nij,nj->ni", less.inverse[nodes], own).ravel()

@@ -129,11 +129,18 @@ class NodeGhosts:
 
 
 def place_unknowns(own: Integer, ghosts: Integer, unknowns: Integer) -> Integer:
-    """Places of unknowns in a vector of two values for each own node, and then for each ghost; nodes are rising."""
+    """Places of unknowns in a vector of two values for each own node, and then for each ghost; nodes are rising.
+
+    Each of the unknowns must be of one of these nodes.
+    """
     node, component = np.divmod(unknowns, 2)
     place = np.searchsorted(own, node)
     there = own[np.minimum(place, len(own) - 1)] == node if len(own) else np.zeros(len(node), dtype=bool)
-    place[~there] = len(own) + np.searchsorted(ghosts, node[~there])
+    beyond = node[~there]
+    ghost = np.searchsorted(ghosts, beyond)
+    found = ghosts[np.minimum(ghost, len(ghosts) - 1)] if len(ghosts) else np.full(len(beyond), -1)
+    assert np.array_equal(found, beyond), "a rank looks for a node that it neither owns nor has asked for"
+    place[~there] = len(own) + ghost
     return np.asarray(2 * place + component)
 
 

@@ -208,6 +208,9 @@ class KrylovTangent(TangentOperator):
             residual = problem.measure(true) / size_residual(now.scale, unknowns, constraints.given)
             solved = residual <= tolerance
             widened = self.iterations[-1] > SLOW and self._widen()
+            if widened:  # when solved, too: `respond` goes on with the same constraint map
+                self.preconditioner.update(constraints)
+                self._solver.getPC().setUp()
             if solved:
                 self.solution, self._now = unknowns, now
                 return Solved(unknowns, v, residual, linear_iterations=count)
@@ -218,9 +221,6 @@ class KrylovTangent(TangentOperator):
             if not helps:
                 anew = True
                 self._space.forget()
-            if widened:
-                self.preconditioner.update(constraints)
-                self._solver.getPC().setUp()
         singular = int(add_up(problem.comm, np.array([float(self.preconditioner.singular)]))[0])
         loose = f"; {singular} groups of elements are not held by any neighbour" if singular else ""
         raise ConvergenceError(

@@ -49,6 +49,18 @@ def count_pieces(legs: Elements) -> Integer:
     return np.maximum(1, np.ceil(np.abs(legs.turns) / WIDEST_PIECE - 1e-9)).astype(np.int64)
 
 
+@dataclass(frozen=True)
+class Distances:
+    """Of points (k,) on legs: distance of the nearest face that they see within a reach, and the number of its leg;
+    other_kind: distance of the nearest one that bounds the region while the leg is a crack's, or the reverse.
+
+    Infinity and -1 where nothing is that near."""
+
+    nearest: Real
+    leg: Integer
+    other_kind: Real
+
+
 def measure_nearness(points: Complex, pieces: Pieces) -> Real:
     """Distance of each point (k,) from the piece (k,) with the same number."""
     return pieces.shapes.distances(points[:, None])[:, 0]
@@ -59,7 +71,7 @@ class Surroundings:
 
     legs: of all curves, one after the other; shapes: their geometry; regions: names of the curves of every region;
     blind: further pairs of legs (numbers) that do not see each other; cracks: names of the curves that are cracks;
-    is_crack (legs,): whether a leg is one of these.
+    is_crack (legs,): whether a leg is one of these; is_mixed: whether some legs are and some are not.
     """
 
     def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]],
@@ -77,6 +89,7 @@ class Surroundings:
             numbers = [first[name] + at for name in dict.fromkeys(names) for at in range(len(curves[name].legs))]
             self._members.append(np.array(sorted(numbers), dtype=np.int64))
         self.is_crack = np.array([name in cracks for name in self.curve], dtype=bool)
+        self.is_mixed = bool(self.is_crack.any() and not self.is_crack.all())
         crack_legs = frozenset(np.flatnonzero(self.is_crack).tolist())
         self.corners, met = _find_meetings(self.legs, self._members, crack_legs)
         unseen = [min(pair) * len(self.legs) + max(pair) for pair in blind]
@@ -99,27 +112,29 @@ class Surroundings:
         return Meetings(self._boxes, at, seen)
 
     def find_distances(self, leg: Integer, t: Real, points: Complex, reach: Real, near: Meetings | None = None
-                       ) -> tuple[Real, Integer]:
-        """Distance (k,) from points at the fractions t of legs (k,) to the nearest face that they see within a reach
-        (k,), and the number of its leg; infinity and -1 where nothing is that near.
+                       ) -> Distances:
+        """How far points at the fractions t of legs (k,) are from the faces that they see within a reach (k,).
 
         near: what `find_near` found in squares of this reach around the points, if it is known."""
         if near is None:
             near = self.find_near(leg, Boxes.around_points(points, reach))
         piece_of_point = np.minimum((t * self._counts[leg]).astype(np.int64), self._counts[leg] - 1)
-        distance, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
         at, seen = near.other, near.box
         apart = np.abs(piece_of_point[at] - self.pieces.number[seen]) > 1
         keep = np.where(leg[at] == self.pieces.leg[seen], apart, ~self._are_blind(leg[at], self.pieces.leg[seen]))
         at, seen = at[keep], seen[keep]
         far = measure_nearness(points[at], self.pieces.select(seen))
+        close = far < reach[at]
+        at, far, seen = at[close], far[close], self.pieces.leg[seen[close]]
+        other_kind = np.full(len(points), np.inf)
+        if self.is_mixed:
+            other = self.is_crack[leg[at]] != self.is_crack[seen]
+            np.minimum.at(other_kind, at[other], far[other])
+        distance, nearest = np.full(len(points), np.inf), np.full(len(points), -1)
         order = np.lexsort((far, at))
-        at, far, seen = at[order], far[order], seen[order]
-        head = np.flatnonzero(np.diff(at, prepend=-1))
-        close = head[far[head] < reach[at[head]]]
-        distance[at[close]] = far[close]
-        nearest[at[close]] = self.pieces.leg[seen[close]]
-        return distance, nearest
+        head = order[np.flatnonzero(np.diff(at[order], prepend=-1))]
+        distance[at[head]], nearest[at[head]] = far[head], seen[head]
+        return Distances(distance, nearest, other_kind)
 
     def _are_blind(self, one: Integer, other: Integer) -> Bool:
         code = np.minimum(one, other) * len(self.legs) + np.maximum(one, other)
@@ -141,7 +156,8 @@ class Corner:
     ends: number of each of these legs, and whether it is its end; angle: of the narrowest wedge (radians), between the
     two legs `sides`; beside: further legs that end at the point, in corners that are no wedges; branching: whether
     three ends of cracks meet, and nothing else does; turning: whether two do, of a crack that does not go on smoothly
-    and ends in a tip; bends: whether one of `sides` is a crack's and the other one bounds the region.
+    and ends in a tip; bending: angle of the narrowest wedge between a crack and a face that bounds the region, or
+    infinity.
     """
 
     point: complex
@@ -151,7 +167,7 @@ class Corner:
     beside: tuple[tuple[int, bool], ...] = ()
     branching: bool = False
     turning: bool = False
-    bends: bool = False
+    bending: float = math.inf
 
 
 def _find_legs_of_tips(
@@ -207,9 +223,9 @@ def _find_meetings(
                 (leg, at_end) for leg, _, at_end in ends
                 if (leg, at_end) not in around and (every or any(regions[leg] & regions[at] for at, _ in around))
             ]
-            bends = (one in cracks) != (other in cracks)
+            bending = min((each for each, i, j in found if (i in cracks) != (j in cracks)), default=math.inf)
             corners.append(
-                Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning, bends))
+                Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning, bending))
     return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve
-from pbem.geometry.nearness import Surroundings
+from pbem.geometry.nearness import Distances, Surroundings
 from pbem.model.sliver import Reach, Wedges
 
 # Longest element, as a multiple of the distance to the next face, by the order of the polynomials. Measured by pairs
@@ -107,8 +107,7 @@ class LengthField:
     ) -> None:
         legs = surroundings.legs
         self.surroundings, self.wedges, self.reach = surroundings, wedges, Reach(REACH[order], BENDING[order])
-        self._is_crack = surroundings.is_crack
-        self._least_reach = self.reach.bending if len(set(self._is_crack.tolist())) > 1 else self.reach.usual
+        self._least_reach = self.reach.bending if surroundings.is_mixed else self.reach.usual
         self.length = np.array([leg.length for leg in legs])
         self.kept = np.array([name in kept for name in surroundings.curve], dtype=bool)
         self.kept_legs = frozenset(np.flatnonzero(self.kept).tolist())
@@ -152,8 +151,8 @@ class LengthField:
         graded = self.refined[legs].any(axis=1)
         sight = np.where(graded, np.maximum(cells.wanted, self._mean[legs]), cells.wanted) / self._least_reach + length
         near = self._find_near(cells, points, sight, length, before)
-        distance, nearest = self.surroundings.find_distances(legs, t, points, sight, near.faces)
-        allowed = self._allow(legs, distance, nearest)
+        distances = self.surroundings.find_distances(legs, t, points, sight, near.faces)
+        distance, allowed = distances.nearest, self._allow(distances)
         thin = np.isfinite(distance)
         corner = np.zeros(len(t), dtype=bool)
         allowed = np.where(self.kept[legs], np.inf, allowed)
@@ -170,18 +169,18 @@ class LengthField:
         steepest = max(self.reach.usual, GROWTH, SLOPE)
         allowed = np.minimum(allowed, beside_tips)
         final = (length <= FINENESS * allowed) | (allowed - 0.5 * steepest * length >= cells.wanted) | corner
-        return Measured(allowed, final, distance, nearest, near)
+        return Measured(allowed, final, distance, distances.leg, near)
 
     def measure_by_distance(self, cells: Cells) -> Real:
         """Lengths (k,) that the distance of other faces allows in the middle of cells, whosever their grading is."""
         sight = cells.wanted / self._least_reach * (1 + 1e-9)
         t = 0.5 * (cells.low + cells.high)
-        return self._allow(cells.leg, *self.surroundings.find_distances(cells.leg, t, self.place(cells), sight))
+        return self._allow(self.surroundings.find_distances(cells.leg, t, self.place(cells), sight))
 
-    def _allow(self, legs: Integer, distance: Real, nearest: Integer) -> Real:
-        """Lengths (k,) on legs (k,) at distances from the legs (k,) that are nearest, -1 where none is in sight."""
-        bends = (nearest >= 0) & (self._is_crack[legs] != self._is_crack[nearest])
-        return np.where(bends, self.reach.bending, self.reach.usual) * distance
+    def _allow(self, distances: Distances) -> Real:
+        """Lengths (k,) at distances from other faces: the least that any of them allows, not only the nearest one, so
+        that they change by no more than the usual reach per distance."""
+        return np.minimum(self.reach.usual * distances.nearest, self.reach.bending * distances.other_kind)
 
     def place(self, cells: Cells) -> Complex:
         """The middles (k,) of cells."""

@@ -130,7 +130,8 @@ def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: Reach) 
         return 0.5 * reach.usual * min(1.0, corner.angle / SHARPER)
     if end in corner.beside:
         return MOST_GROWTH if corner.ends else reach.usual
-    return measure_growth(corner.angle, reach.bending if corner.bends else reach.usual)
+    growth = measure_growth(corner.angle, reach.usual)
+    return growth if math.isinf(corner.bending) else min(growth, measure_growth(corner.bending, reach.bending))
 
 
 def measure_last_bit(angle: float, singular: bool = False) -> float:

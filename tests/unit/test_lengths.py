@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import pytest
 
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.nearness import Surroundings
 from pbem.model.lengths import LengthField
+from pbem.model.sizing import fit_lengths
 from pbem.model.sliver import find_wedges
+from pbem.model.slot import SlotSide
 
 
 def make_field() -> LengthField:
@@ -41,7 +46,9 @@ def test_distances_are_those_of_the_nearest_piece_that_is_seen() -> None:
     leg, t = random.integers(40, size=200), random.uniform(0, 1, 200)
     points = surroundings.shapes.select(leg).place_fractions(t[:, None])[:, 0]
     reach = 10.0 ** random.uniform(-2, 0.5, 200)
-    far, nearest = surroundings.find_distances(leg, t, points, reach)
+    distances = surroundings.find_distances(leg, t, points, reach)
+    far, nearest = distances.nearest, distances.leg
+    assert (distances.other_kind == np.inf).all()
     for k, own in enumerate(leg):
         first, last = 0 if own < 25 else 20, 25 if own < 20 else 40
         others = np.array([other for other in range(first, last) if other != own])
@@ -52,3 +59,49 @@ def test_distances_are_those_of_the_nearest_piece_that_is_seen() -> None:
             np.testing.assert_allclose(far[k], apart.min(), rtol=1e-9)
         elif nearest[k] != own:
             assert far[k] == np.inf
+
+
+def divide_below_surface(turn: complex, *cracks: tuple[complex, complex]) -> list[np.ndarray]:
+    """Lengths of the elements of cracks in a block with a long surface at y = 0, turned and scaled, in the units of the
+    cracks' points. Those of the surface's halves left and right of the origin, in its direction, come first."""
+    corners = [-20 - 20j, 20 - 20j, 20 + 0j, 0j, -20 + 0j]
+    around = [*zip(corners, corners[1:] + corners[:1], strict=True)]
+    ends = {f"side{k}": (pair, 3) for k, pair in enumerate(around)}
+    ends |= {f"c{k}": (pair, 4) for k, pair in enumerate(cracks)}
+    curves = {
+        name: Curve(name, (Leg(a * turn, b * turn, count, refine_start=False, refine_end=False),))
+        for name, ((a, b), count) in ends.items()
+    }
+    sides = [SlotSide(name, True if name.startswith("side") else None) for name in curves]
+    tips = {f"c{k}": (a.imag < 0, b.imag < 0) for k, (a, b) in enumerate(cracks)}
+    sizes = fit_lengths(curves, [sides], tips, frozenset(), 2)
+    assert sizes.excess is None
+    legs = {name: curve.legs[0] for name, curve in sizes.curves.items()}
+    return [
+        legs[name].length * np.diff(legs[name].element_fractions()) / abs(turn)
+        for name in ("side3", "side2", *(f"c{k}" for k in range(len(cracks))))
+    ]
+
+
+@pytest.mark.parametrize("turn", [1.0, 1e-3, np.exp(0.7j), 1e-3 * np.exp(-2.1j)])
+@pytest.mark.parametrize("below", [None, 0.95, 0.5, 3.0])
+def test_a_crack_nearer_than_the_surface_does_not_lengthen_elements(turn: complex, below: float | None) -> None:
+    # Twice the distance of cracks from each other, but no more than that of a crack from the surface.
+    cracks = [(-6 - 1j, 6 - 1j)]
+    if below is not None:
+        cracks.append((-6 - 1j * (1 + below), 6 - 1j * (1 + below)))
+    left, right, upper, *lower = divide_below_surface(turn, *cracks)
+    assert 0.9 < upper.max() <= 1 + 1e-9
+    assert max(left[0], right[-1]) <= 1 + 1e-9
+    if below is not None:
+        most = min(2 * below, 1 + below)
+        assert max(each.max() for each in lower) <= min(most, 3) + 1e-9
+
+
+@pytest.mark.parametrize("turn", [1.0, 1e-3 * np.exp(0.7j)])
+def test_a_wedge_between_cracks_does_not_hide_the_one_beside_the_surface(turn: complex) -> None:
+    # Wedges of 15 degrees at the surface and of 10 between the cracks: sin(15) is less than 2 sin(10).
+    rays = [np.exp(-1j * math.radians(angle)) for angle in (15, 25)]
+    _, right, *cracks = divide_below_surface(turn, *((0j, 8 * complex(ray)) for ray in rays))
+    for lengths in (right[::-1], *cracks):
+        np.testing.assert_allclose(lengths[2:12] / lengths[1:11], 1 + math.sin(math.radians(15)), rtol=1e-9)

@@ -11,6 +11,10 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 
+# Places and circles that differ by less than this part of their cluster, or of their size, are alike: trees of regular
+# models are the same in all units.
+ROUNDED = 2.0**-30
+
 
 class Circles(Protocol):
     """Circles around clusters: center (k,) complex, radius (k,)."""
@@ -140,7 +144,10 @@ def _cut(order: Integer, middle: Complex, first: int, last: int, twice: bool) ->
     own = order[first:last]
     places = middle[own]
     x, y = places.real, places.imag
-    along = x if np.ptp(x) >= np.ptp(y) else y
+    wide, tall = float(np.ptp(x)), float(np.ptp(y))
+    along, extent = (x, wide) if wide >= tall * (1 - ROUNDED) else (y, tall)
+    if extent > 0:  # what differs by rounding keeps its order, in all units
+        along = np.rint((along - along.min()) / extent / ROUNDED)
     order[first:last] = own[np.argsort(along, kind="stable")]
     half = (first + last) // 2
     if not twice:
@@ -192,6 +199,7 @@ def find_interactions(targets: Forest, sources: Forest, ratio: float, wanted: Bo
         if wanted is not None:
             target, source = target[wanted[target]], source[wanted[target]]
         distance = np.abs(targets.center[target] - sources.center[source])
+        distance *= 1 + ROUNDED  # regular models have clusters that are just apart, in some units
         own, other = targets.radius[target], sources.radius[source]
         apart = (other <= ratio * (distance - own)) & (own <= ratio * (distance - other)) & (distance > own + other)
         far.append((target[apart], source[apart]))
@@ -199,7 +207,8 @@ def find_interactions(targets: Forest, sources: Forest, ratio: float, wanted: Bo
         inner_target, inner_source = targets.children[target] > 0, sources.children[source] > 0
         ended = ~inner_target & ~inner_source
         near.append((target[ended], source[ended]))
-        split_target = inner_target & (~inner_source | (targets.radius[target] >= sources.radius[source]))
+        larger = targets.radius[target] >= (1 - ROUNDED) * sources.radius[source]
+        split_target = inner_target & (~inner_source | larger)
         split_source = ~ended & ~split_target
         one = _replace_by_children(targets, target[split_target], source[split_target])
         other_source, other_target = _replace_by_children(sources, source[split_source], target[split_source])

@@ -35,6 +35,11 @@ def format_point(point: complex) -> str:
     return f"({', '.join(f'{each:.{10 if 1e4 <= abs(each) < 1e10 else 6}g}' for each in (point.real, point.imag))})"
 
 
+def format_vector(vector: complex) -> str:
+    """A force or another vector for a message."""
+    return f"({vector.real:.6g}, {vector.imag:.6g})"
+
+
 def _pair(found: tuple[Integer, Integer]) -> Iterator[tuple[int, int]]:
     return zip(found[0].tolist(), found[1].tolist(), strict=True)
 

@@ -11,7 +11,7 @@ import numpy as np
 from pbem.description.case import Case
 from pbem.errors import CaseError, Fault, KeyPath
 from pbem.geometry.curve import Curve
-from pbem.geometry.junction import find_crossings, format_point, split_at_junctions
+from pbem.geometry.junction import find_crossings, format_vector, split_at_junctions
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.approach import find_closing
 from pbem.model.coincidence import find_coincidences
@@ -375,7 +375,7 @@ def _check_support(model: Model, recall: Recall) -> tuple[list[Fault], list[str]
             continue
         if describe_unbalance(_leave_out_point_loads(model), motion, moving) is None:
             force = find_unbalanced_force(model, motion, moving)
-            notes.append(f"Weight and point loads have a net force of {format_point(force)} on the infinite region "
+            notes.append(f"Weight and point loads have a net force of {format_vector(force)} on the infinite region "
                          f"'{name}', with the bodies in it and without excavated regions: its "
                          "displacement grows with the logarithm of the distance, so that only stresses "
                          "and relative displacements are meaningful.")

@@ -9,7 +9,7 @@ import numpy as np
 from pbem.arrays import Complex
 from pbem.errors import Fault
 from pbem.geometry.curve import Leg
-from pbem.geometry.junction import format_point
+from pbem.geometry.junction import format_vector
 from pbem.geometry.loop import side_legs
 from pbem.model.model import Model, list_timed
 from pbem.model.resultants import BALANCED, FRACTIONS
@@ -44,7 +44,7 @@ def check_pulled(model: Model) -> Iterator[Fault]:
             pulls = [force for force in forces if (np.conj(force) * normal).real < -BALANCED * abs(force)]
             if pulls:
                 where = list_names([f"'{contact}'" for contact in touched])
-                yield Fault.at(("tools", name), f"a force of {format_point(pulls[0])} in stage "
+                yield Fault.at(("tools", name), f"a force of {format_vector(pulls[0])} in stage "
                                f"'{stage.name}', which pulls it off {where}",
                                "a force towards what it touches, a motion in its place (ux, uy), or a law that carries "
                                "tension")

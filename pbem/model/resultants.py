@@ -10,7 +10,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.geometry.curve import Curve
-from pbem.geometry.junction import format_point
+from pbem.geometry.junction import format_point, format_vector
 from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.rigid_body import find_reference
@@ -49,7 +49,7 @@ def describe_unbalance(
             loads = " and ".join([", ".join(kinds[:-1]), kinds[-1]] if len(kinds) > 1 else kinds)
             return (
                 f"the {loads} of stage '{stage.name}' drive it, with resultant "
-                f"{format_point(force)} and moment {moment:.6g} about {about}"
+                f"{format_vector(force)} and moment {moment:.6g} about {about}"
             )
     return None
 

@@ -64,7 +64,8 @@ def test_the_small_examples_are_computed_by_the_dense_operator(name: str) -> Non
 def test_costs_are_counted() -> None:
     model, mesh = read(CRACKS)
     nodes, crack = mesh.nodes, int(mesh.node_crack.sum())
-    assert (crack, count_changing(model, mesh), count_searches(model)) == (16 * 5 * 3, 16 * 5 * 3, 1)
+    assert crack == 3 * int(mesh.crack.sum()) >= 16 * 5 * 3
+    assert (count_changing(model, mesh), count_searches(model)) == (mesh.pairs.count, 1)
     factors = 2 / 3 * (2 * nodes) ** 3
     entries = 2 * nodes * (4 * nodes - 2 * crack)
     changes = min(2 * factors, 4 * crack * (2 * nodes) ** 2)

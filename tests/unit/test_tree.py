@@ -234,3 +234,22 @@ def test_trees_do_not_depend_on_units(size: float, shift: complex) -> None:
     np.testing.assert_array_equal(plain.order, moved.order)
     np.testing.assert_allclose(moved.radius, size * plain.radius, rtol=1e-9)
     np.testing.assert_allclose(moved.center, size * (plain.center + shift), rtol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-3, 0.7, 1e3])
+def test_regular_models_have_the_same_trees_in_all_units(size: float) -> None:
+    """A lattice of crosses, in which boxes are square, middles in line and clusters just apart, but for rounding."""
+    x, y = np.meshgrid(0.3 * np.arange(9), 0.3 * np.arange(7))
+    centers = (x + 1j * y).ravel()
+    start = np.concatenate([centers - 0.1, centers - 0.1j])
+    end = np.concatenate([centers + 0.1, centers + 0.1j])
+    nothing = np.zeros(len(start), dtype=np.int64)
+    found = []
+    for unit in (1.0, size):
+        forest = build_forest(unit * start, unit * end, np.zeros(len(start)), nothing, np.array([2]))
+        found.append((forest, find_interactions(forest, forest, 0.55)))
+    (one, met), (other, met_there) = found
+    np.testing.assert_array_equal(one.order, other.order)
+    np.testing.assert_array_equal(one.first, other.first)
+    for name in ("far_target", "far_source", "near_target", "near_source"):
+        np.testing.assert_array_equal(getattr(met, name), getattr(met_there, name))

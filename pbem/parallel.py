@@ -42,6 +42,30 @@ def check_communicator(comm: Comm | None) -> Comm:
     return comm
 
 
+def _free_duplicate(comm: MPI.Comm, _: int, own: MPI.Comm) -> None:
+    """What MPI calls when a communicator is freed, or at its own end, when nothing can be freed any more."""
+    if comm not in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        own.Free()
+
+
+_DUPLICATE = MPI.Comm.Create_keyval(delete_fn=_free_duplicate)
+
+
+def keep_duplicate(comm: Comm) -> Comm:
+    """A duplicate for messages from rank to rank, which a host program that receives from any rank cannot take.
+
+    All ranks call this together. It is made once, kept with the communicator, and freed with it: MPI has few of them.
+    """
+    if comm.size == 1:
+        return comm
+    own: Comm | None = comm.Get_attr(_DUPLICATE)  # type: ignore[assignment]
+    if own is None:
+        own = comm.Dup()  # type: ignore[assignment]
+        comm.Set_attr(_DUPLICATE, own)
+    assert own is not None
+    return own
+
+
 @contextmanager
 def abort_if_unexpected(comm: MPI.Intracomm, expected: type[Exception]) -> Iterator[None]:
     """End all ranks at once, with the traceback printed once, when an exception other than `expected` leaves the block.

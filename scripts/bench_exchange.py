@@ -74,7 +74,7 @@ def name_pieces(problem: Any, tangent: Any, law: Any, load: Any) -> dict[str, An
 
 def measure(case: Path) -> list[dict[str, Any]]:
     """What each rank counts; on the first rank."""
-    from counted import CountedComm, Ledger
+    from counted import CountedComm
 
     from pbem.case.build import read_model
     from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, follow_leaders, start_memory
@@ -84,7 +84,7 @@ def measure(case: Path) -> list[dict[str, Any]]:
     from pbem.solve.system.assembly import assemble_problem
 
     def count(action: Any) -> dict[str, Any]:
-        comm.ledger = Ledger()
+        comm.ledger.clear()
         action()
         kinds = comm.ledger.kinds
         whole = [each for name, each in kinds.items() if name not in ("Isend", "Irecv")]

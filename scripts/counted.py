@@ -44,15 +44,35 @@ class Ledger:
             whole.largest = max(whole.largest, each.largest)
         return whole
 
+    def clear(self) -> None:
+        """Begin anew."""
+        self.kinds.clear()
+
+
+# What a communicator may be asked for without a count: nothing of a model is sent. All that is neither here nor counted
+# below is refused, as nobody would see what it sends.
+SILENT = frozenset((
+    "Abort", "Barrier", "Create_keyval", "Delete_attr", "Free", "Get_attr", "Get_rank", "Get_size", "Ibarrier",
+    "Set_attr", "barrier", "py2f", "rank", "size",
+))  # fmt: skip
+
 
 def count_bytes(buffer: Any) -> int:
     """Bytes of a buffer as mpi4py takes it: an array, or [array, counts]."""
     return int(np.asarray(buffer[0] if isinstance(buffer, list | tuple) else buffer).nbytes)
 
 
+def count_object(item: Any) -> int:
+    """Bytes of numbers, and of other objects what they take as they are sent."""
+    return int(np.asarray(item).nbytes if isinstance(item, float | int | np.ndarray) else len(MPI.pickle.dumps(item)))
+
+
 class CountedComm(MPI.Intracomm):
     """The same ranks; collective calls count what an algorithm without a tree has to send to and take from a rank.
 
+    A duplicate, and its own duplicates count with it: nothing that others keep with the communicator is used. What
+    libraries as PETSc and MUMPS send on theirs is not seen. Ways to send that are not counted raise
+    NotImplementedError.
     An all-reduce is counted once each way, as its array: of P ranks each sends and receives at least 2 (P - 1)/P of it.
     """
 
@@ -61,9 +81,21 @@ class CountedComm(MPI.Intracomm):
     ledger: Ledger
 
     def __new__(cls, comm: MPI.Intracomm) -> CountedComm:
-        """The communicator itself, with an empty ledger."""
-        made = super().__new__(cls, comm)
+        """All ranks together; with an empty ledger."""
+        made = super().__new__(cls, MPI.Intracomm(comm).Dup())
         made.ledger = Ledger()
+        return made
+
+    def __getattribute__(self, name: str) -> Any:
+        """As usual, but for what would send without being counted."""
+        if hasattr(MPI.Intracomm, name) and not (name.startswith("_") or name in SILENT or name in vars(CountedComm)):
+            raise NotImplementedError(f"{name} is not counted")
+        return super().__getattribute__(name)
+
+    def Dup(self, info: MPI.Info | None = None) -> CountedComm:  # noqa: N802
+        """A duplicate that counts in the same ledger."""
+        made = CountedComm(self)
+        made.ledger = self.ledger
         return made
 
     def Allreduce(self, sendbuf: Any, recvbuf: Any, op: MPI.Op = MPI.SUM) -> None:  # noqa: N802
@@ -87,6 +119,11 @@ class CountedComm(MPI.Intracomm):
         self.ledger.add("Alltoallv", 1, count_bytes(sendbuf), count_bytes(recvbuf))
         super().Alltoallv(sendbuf, recvbuf)
 
+    def Alltoall(self, sendbuf: Any, recvbuf: Any) -> None:  # noqa: N802
+        """Counted."""
+        self.ledger.add("Alltoall", 1, count_bytes(sendbuf), count_bytes(recvbuf))
+        super().Alltoall(sendbuf, recvbuf)
+
     def Isend(self, buf: Any, dest: int, tag: int = 0) -> MPI.Request:  # noqa: N802
         """Counted."""
         self.ledger.add("Isend", 1, count_bytes(buf), 0)
@@ -98,13 +135,26 @@ class CountedComm(MPI.Intracomm):
         return super().Irecv(buf, source, tag)
 
     def allreduce(self, sendobj: Any, op: Any = MPI.SUM) -> Any:
-        """Counted as the numbers that are sent; of other objects one message of nothing."""
-        size = np.asarray(sendobj).nbytes if isinstance(sendobj, float | int | np.ndarray) else 0
+        """Counted as the numbers that are sent, and of other objects their bytes."""
+        size = count_object(sendobj)
         self.ledger.add("allreduce", 1, size, size)
         return super().allreduce(sendobj, op)
 
     def allgather(self, sendobj: Any) -> list[Any]:
         """Counted likewise."""
-        size = np.asarray(sendobj).nbytes if isinstance(sendobj, float | int | np.ndarray) else 0
-        self.ledger.add("allgather", 1, size, size * self.size)
-        return super().allgather(sendobj)
+        found = super().allgather(sendobj)
+        self.ledger.add("allgather", 1, count_object(sendobj), sum(count_object(each) for each in found))
+        return found
+
+    def bcast(self, obj: Any, root: int = 0) -> Any:
+        """Counted likewise."""
+        found = super().bcast(obj, root)
+        size, first = count_object(found), self.rank == root
+        self.ledger.add("bcast", 1, size * first, size * (not first))
+        return found
+
+    def gather(self, sendobj: Any, root: int = 0) -> list[Any] | None:
+        """Counted likewise."""
+        found = super().gather(sendobj, root)
+        self.ledger.add("gather", 1, count_object(sendobj), sum(count_object(each) for each in found or ()))
+        return found

@@ -12,6 +12,7 @@ import pbem
 from pbem.results.reader import open_results
 from tests.cli.cli_sample import BLOCKS
 from tests.parallel.launch import launch, launch_snippet
+from tests.unit.far_sample import CRACKS
 
 ALONE = """
 import sys
@@ -72,6 +73,85 @@ def test_each_rank_computes_a_case_of_its_own(folder: Path) -> None:
     for name in ("pair0.h5", "pair1.h5"):
         np.testing.assert_allclose(open_results(folder / name).displacement, whole.displacement, rtol=0, atol=1e-12)
     assert not (folder / "wrong.h5").exists()
+
+
+# Argument 1: the case. A receive from anybody is open on the communicator as long as the program computes with it.
+HOST = """
+import sys
+import numpy as np
+from mpi4py import MPI
+import pbem
+from pbem.parallel import keep_duplicate
+from pbem.solve.preconditioner import subdomains as groups
+
+groups.ONE_GROUP = 0
+groups.GROUP_ELEMENTS = groups.BODY_ELEMENTS = 12
+world = MPI.COMM_WORLD
+comm = world.Dup()
+taken = np.full(100_000, -1.0)
+request = comm.Irecv(taken)
+for k in range(2):
+    assert pbem.run(sys.argv[1], f"run{k}.h5", comm=comm, operator="hierarchical").ranks == world.size
+assert not request.Test() and (taken == -1).all(), "messages of the program reached the host"
+comm.Barrier()
+comm.Send(np.array([3.0 + world.rank]), (world.rank + 1) % world.size)
+request.Wait()
+assert taken[0] == 3 + (world.rank - 1) % world.size and taken[1] == -1
+own = keep_duplicate(comm)
+assert own is keep_duplicate(comm) and MPI.Comm.Compare(own, comm) == MPI.CONGRUENT
+copy = comm.Dup()
+assert keep_duplicate(copy) != own
+comm.Free()
+assert own == MPI.COMM_NULL, "it outlives the communicator it was made of"
+copy.Free()
+print("done\\n", end="", flush=True)
+"""
+
+
+def test_messages_do_not_reach_the_host_program(tmp_path: Path) -> None:
+    (tmp_path / "cracks.toml").write_text(CRACKS)
+    done = launch_snippet(2, HOST, "cracks.toml", cwd=tmp_path, timeout=30)
+    assert (done.returncode, done.stdout.count("done")) == (0, 2), done.stderr
+    expected = pbem.run(tmp_path / "cracks.toml", tmp_path / "one.h5", operator="dense")
+    found = open_results(tmp_path / "run1.h5").displacement
+    np.testing.assert_allclose(found, expected.displacement, rtol=0, atol=1e-6 * np.abs(found).max())
+
+
+COUNTED = """
+import numpy as np
+from mpi4py import MPI
+from scripts.counted import CountedComm
+
+comm = CountedComm(MPI.COMM_WORLD)
+ranks, rank = comm.size, comm.rank
+numbers = np.arange(4.0 * ranks)
+for name in dir(MPI.Intracomm):  # all that sends is counted or refused
+    if name.lstrip("I").lower().startswith(("all", "bcast", "gather", "reduce", "scatter", "scan", "exscan", "send",
+                                           "isend", "recv", "bsend", "ssend", "rsend", "split", "create_")):
+        try:
+            getattr(comm, name)
+        except NotImplementedError:
+            continue
+        assert name in vars(CountedComm) or name == "Create_keyval", name
+other = comm.Dup()
+requests = [other.Irecv(np.empty(3), (rank - 1) % ranks, 5), other.Isend(np.ones(3), (rank + 1) % ranks, 5)]
+MPI.Request.Waitall(requests)
+comm.Alltoall(numbers, np.empty_like(numbers))
+comm.bcast(numbers if rank == 1 else None, root=1)
+comm.gather(numbers)
+kinds, size = comm.ledger.kinds, numbers.nbytes
+assert {name: (each.sent, each.received) for name, each in kinds.items()} == {
+    "Irecv": (0, 24), "Isend": (24, 0), "Alltoall": (size, size), "bcast": ((0, size), (size, 0))[rank == 1],
+    "gather": (size, ranks * size * (rank == 0)),
+}, kinds
+other.Free()
+comm.Free()
+"""
+
+
+def test_what_is_sent_is_counted_or_refused(tmp_path: Path) -> None:
+    done = launch_snippet(2, COUNTED, cwd=Path(__file__).parents[2], timeout=60)
+    assert done.returncode == 0, done.stderr
 
 
 def test_what_is_no_communicator_is_refused() -> None:

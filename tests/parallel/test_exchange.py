@@ -54,7 +54,7 @@ from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.choice import HierarchicalSystem
 from pbem.solve.system import assembly
-from scripts.counted import CountedComm, Ledger
+from scripts.counted import CountedComm
 
 hierarchical.LEAF_ELEMENTS = hierarchical.SMALL_REGION = 4
 groups.ONE_GROUP = 0
@@ -78,7 +78,7 @@ def compute(case):
     unknowns = random.standard_normal((problem.mesh.nodes, 2))
     part = unknowns[problem.system.nodes].ravel()
     tangent.precondition(part)
-    comm.ledger = Ledger()
+    comm.ledger.clear()
     product, preconditioned = tangent.multiply(part), tangent.precondition(part)
     counted = {name: (each.messages, each.received, each.largest) for name, each in comm.ledger.kinds.items()}
     parts = world.gather((problem.system.nodes, product, preconditioned, counted))

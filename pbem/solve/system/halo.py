@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from pbem.arrays import Integer, Real
 from pbem.bem.sharing import Ghosts, Share
-from pbem.parallel import add_up
+from pbem.parallel import add_up, keep_duplicate
 
-# Of all messages here: no other part of the program sends from rank to rank, and these arrive in the order of sending.
+# Of all messages here: on this communicator nothing else sends from rank to rank, and these arrive in their order.
 TAG = 7014
 
 
@@ -145,9 +145,12 @@ def place_unknowns(own: Integer, ghosts: Integer, unknowns: Integer) -> Integer:
 
 
 def share_elements(comm: MPI.Intracomm, groups: list[Integer], bounds: Sequence[tuple[int, int]]) -> Share:
-    """Elements by the groups that ranks own: each those from its first up to its last number (bounds)."""
+    """Elements by the groups that ranks own: each those from its first up to its last number (bounds).
+
+    All ranks call this together; their messages pass on a communicator of their own.
+    """
     of_element = np.zeros(sum(len(group) for group in groups), dtype=np.int64)
     for rank, (first, last) in enumerate(bounds):
         for group in groups[first:last]:
             of_element[group] = rank
-    return Share(AllRanks(comm), of_element)
+    return Share(AllRanks(keep_duplicate(comm)), of_element)

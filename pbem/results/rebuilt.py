@@ -24,8 +24,9 @@ from pbem.model.point_loads import PointLoad
 from pbem.model.swelling import Swelling
 from pbem.results import contents
 
-# Coordinates of nodes on their elements that differ by no more are the same.
-SAME_NODE = 1e-3
+# Coordinates of nodes on their elements that differ by no more are the same, and by so many times what places in the
+# file are rounded by: on maps, whose coordinates have seven digits before the point, few are left for short elements.
+SAME_NODE, ROUNDINGS = 1e-3, 8.0
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,13 @@ def _build_mesh(
     position = (nodes.position @ np.array([1, 1j]))[each] - model.origin
     crack, local, crack_local = elements.crack[:count], place_nodes(order), place_crack_nodes(order)
     found = inner.preimage(position.reshape(count, -1)).real
-    if np.abs(found - np.where(crack[:, None], crack_local, local)).max(initial=0.0) > SAME_NODE:
+    rounding = np.finfo(float).eps * np.abs(nodes.position).max(initial=0.0)
+    length = np.abs(inner.end - inner.start)
+    if not (length > ROUNDINGS * rounding).all():
+        reason = f"has elements of {length.min():.2g}, which its coordinates, rounded to {rounding:.2g}, do not tell"
+        raise ResultFileError(path, f"{reason}: fields in its regions need coordinates nearer to the origin")
+    off = np.abs(found - np.where(crack[:, None], crack_local, local)).max(axis=1)
+    if not (off <= SAME_NODE + ROUNDINGS * rounding / length).all():
         raise ResultFileError(path, "was written by another version of pbem, whose nodes lie elsewhere")
     none = np.zeros(0, dtype=np.int64)
     real, places = none + 0.0, none + 0j

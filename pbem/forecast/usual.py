@@ -51,16 +51,16 @@ CHANGING = 0.35
 # Seconds: of the start; of a vector's entry in an iteration, and with the hierarchical operator; of an entry in a
 # product, shared and on every rank; of an unknown in the preconditioner; of a call of a library that shares matrices;
 # of an interior point and a node.
-START, VECTOR, VECTOR_FAR, PRODUCT, PRODUCT_ALONE = 1.3, 10e-6, 5e-6, 0.55e-6, 0.25e-6
+START, VECTOR, VECTOR_FAR, PRODUCT, PRODUCT_ALONE = 1.05, 10e-6, 5e-6, 0.36e-6, 0.03e-6
 INVERSE, CALL, POINT = 5e-6, 0.1, 0.15e-6
 # Of an unknown in the assembly of the hierarchical operator; of a crack in the tables and checks of the file, in the
 # estimate of errors, and there in each step.
-PLACED, CRACK_WRITTEN, CRACK_JUDGED, CRACK_JUDGED_STEP = 20e-6, 6.5e-3, 2.6e-3, 0.9e-3
+PLACED, CRACK_WRITTEN, CRACK_JUDGED, CRACK_JUDGED_STEP = 20e-6, 2e-3, 2.6e-3, 0.9e-3
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
 ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 1.0, 110.0, 0.5, 1.0, 0.5
-SPARSE, SPARSE_SHARED, GROUPED = 1.4, 2.8, 0.65
+SPARSE, SPARSE_SHARED, GROUPED = 1.2, 2.5, 0.65
 # How the rate of shared dense factors, on more ranks than two, grows with their number.
-FACTOR_RANKS = 1.5
+FACTOR_RANKS = 1.0
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def list_overhead(size: Size, speed: Speed) -> dict[str, float]:
         "start": python * START,
         "reading": python * (0.5e-3 * size.curves + 15e-3 * (size.regions - 1) + 25e-6 * size.nodes),
         "evaluation": python * size.stored * size.points * POINT * size.nodes,
-        "writing": python * (0.1 + 0.03 * size.stored + CRACK_WRITTEN * size.cracks
+        "writing": python * (0.05 + 0.016 * size.stored + CRACK_WRITTEN * size.cracks
                              + (20e-6 + 8e-6 * size.stored) * size.nodes),
         "estimate": python * (CRACK_JUDGED + CRACK_JUDGED_STEP * size.steps) * size.cracks,
     }

@@ -38,8 +38,8 @@ BODIES_FORMED, BODIES_FACTORS = 4.0, 1.3
 SCATTERED = 1.2
 
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
-# step of the first stage, in which loads grow in proportion; of a step of a further stage.
-SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 1.0, 2.0
+# step of the first stage, in which loads grow in proportion, where that is all known; of a step of a further stage.
+SLIPPING, OPENING, UNKNOWN, ALIKE, FURTHER = 4.0, 7.0, 4.0, 0.25, 2.0
 # Where faces soften the tangent operator changes with each iteration: Newton iterations and factorisations of a step.
 SOFTENING, SOFTENING_FACTORS = 3.0, 2.0
 # Factorisations where they may be made anew, and where nobody knows; iterations of GMRES in a system, and where nothing

@@ -58,7 +58,7 @@ INVERSE, CALL, POINT = 5e-6, 0.1, 0.15e-6
 PLACED, CRACK_WRITTEN, CRACK_JUDGED, CRACK_JUDGED_STEP = 20e-6, 2e-3, 2.6e-3, 0.9e-3
 # To the calibrated rates of kernels (dense, near blocks), bytes that are moved, and operations.
 ENTRY, NEAR, FORMED, FACTOR, FACTOR_SHARED, COLUMN = 0.65, 1.0, 110.0, 0.5, 1.0, 0.5
-SPARSE, SPARSE_SHARED, GROUPED = 1.2, 2.5, 0.65
+SPARSE, SPARSE_SHARED, GROUPED = 1.1, 2.4, 0.65
 # How the rate of shared dense factors, on more ranks than two, grows with their number.
 FACTOR_RANKS = 1.0
 

@@ -51,7 +51,7 @@ def _build(
     draft: Draft, source: str, changes: Mapping[str, Any], label: Label, recall: Recall | None = None
 ) -> tuple[description.Case, Model]:
     """The case and the model of a draft with values set. Raises CaseError with the faults of all together."""
-    if changes and draft.case is not None:
+    if _sets(changes) and draft.case is not None:
         draft = change_draft(draft, changes, label)
     model, found = examine(draft.case, draft.conditions_known, recall) if draft.case else (None, [])
     if isinstance(draft, ChangedDraft):
@@ -64,6 +64,11 @@ def _build(
     return draft.case, replace(model, overrides=write_overrides(changes))
 
 
+def _sets(changes: Mapping[str, Any]) -> bool:
+    """Whether anything is set; what is no dictionary is a fault that is found later."""
+    return not (isinstance(changes, Mapping) and not changes)
+
+
 def describe_model(
     tables: Mapping[str, Any], changes: Mapping[str, Any] | None = None, recall: Recall | None = None
 ) -> Model:
@@ -72,7 +77,7 @@ def describe_model(
     Its text, which the results store, is that of a file with these tables.
     """
     draft = description.draft_tables(tables)
-    _, model = _build(draft, description.UNNAMED, changes or {}, label_key, recall)
+    _, model = _build(draft, description.UNNAMED, {} if changes is None else changes, label_key, recall)
     assert draft.case is not None
     return replace(model, source=write_tables(draft.case.given))
 
@@ -93,15 +98,17 @@ def make_checked_model(
     messages name them. recall: what was found of the last case, for this one where that is the same.
     Raises CaseError with its faults; those of laws come last.
     """
+    changes = {} if changes is None else changes
     if isinstance(source, description.Case):
         name = source.source
-        model = _build(Draft(source, ()), name, changes, label, recall)[1] if changes else build_model(source)
+        draft = Draft(source, ())
+        model = _build(draft, name, changes, label, recall)[1] if _sets(changes) else build_model(source)
         model = replace(model, source=_find_text(source))
     elif isinstance(source, Mapping):
         name, model = description.UNNAMED, describe_model(source, changes, recall)
     else:
         name = str(source)
-        model = _build_text(read_case_text(source), name, changes or {}, label, recall)[1]
+        model = _build_text(read_case_text(source), name, changes, label, recall)[1]
     return _take_laws(model, name)
 
 

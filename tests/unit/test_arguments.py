@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import pbem
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
+from tests.unit.case_sample import BLOCKS
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 
 MODEL = make_model()
@@ -66,3 +68,13 @@ def test_other_odd_options(tmp_path: Path) -> None:
         pbem.sweep(tmp_path / "none.toml", {}, neighbours=None)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="listener: found 'print'; expected a function"):
         pbem.sweep(tmp_path / "none.toml", {}, listener="print")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("odd", [np.ones((2, 2)), [], [1.0], "a", 0])
+def test_what_is_set_is_a_dictionary(odd: Any, tmp_path: Path) -> None:
+    path = tmp_path / "blocks.toml"
+    path.write_text(BLOCKS)
+    for source in (path, pbem.Case.read(path), tomllib.loads(BLOCKS)):
+        with pytest.raises(pbem.CaseError, match=r"what is set: found .*; expected a dictionary"):
+            pbem.run(source, tmp_path / "blocks.h5", set=odd)
+    assert not (tmp_path / "blocks.h5").exists()

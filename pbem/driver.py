@@ -90,10 +90,12 @@ def run(
     every step reached), StorageError (the disk has no room for a step; the file holds the steps before it), LawError (a
     custom law failed), StopError (stopped by a signal; KeyboardInterrupt for SIGINT). Any other exception on one rank
     ends all ranks, unless the rank computes alone. ValueError: unknown operator. TypeError: comm is not a communicator,
-    petsc is not a dictionary, or resume or force is neither True nor False.
+    petsc is not a dictionary, resume or force is neither True nor False, or kept is something else.
     """
     comm = check_communicator(comm)
     check_arguments(operator, petsc, {"resume": resume, "force": force})
+    if kept is not None and not isinstance(kept, KeptProblems):
+        raise TypeError(f"kept: found {kept!r}; expected what earlier runs of a sweep have kept")
     path = find_file(case)
     name = UNNAMED if path is None else str(path)
     try:

@@ -41,7 +41,7 @@ def plot(
     at = _choose_step(results, step)
     for name, limits in (("xlim", xlim), ("ylim", ylim)):
         _check_limits(name, limits)
-    if x not in ABSCISSAE:
+    if not isinstance(x, str) or x not in ABSCISSAE:
         raise ValueError(f"x: found {x!r}; expected one of {', '.join(ABSCISSAE)}")
     if ax is not None and not isinstance(ax, Axes):
         raise ValueError(f"ax: found an object of type {type(ax).__name__}; expected axes of matplotlib")

@@ -61,7 +61,11 @@ def test_steps_are_indices(results: Results) -> None:
     assert results.choose_steps(-1) == [1] and results.choose_steps([0, 1]) == [0, 1]
 
 
-def test_other_odd_options(tmp_path: Path) -> None:
+def test_other_odd_options(results: Results, tmp_path: Path) -> None:
+    with pytest.raises(TypeError, match="kept: found 'seat'; expected what"):
+        pbem.run(tmp_path / "none.toml", kept="seat")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match=r"x: found array\(.*; expected one of"):
+        results.plot(curve="seat", x=np.ones((1, 2)))  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="resume: found 1; expected True or False"):
         pbem.run(tmp_path / "none.toml", resume=1)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="neighbours: found None; expected True or False"):

@@ -13,6 +13,7 @@ import numpy as np
 from pbem.exact import arc_crack_intensity
 from tests.verification.kinks import GRADINGS, MOST_PIECES, MOST_RATIO, YOUNG, TipErrors, solve_tips
 from tests.verification.proofs.proof import line
+from tests.verification.ways import draw_straight
 
 # Degrees that an element of an arc may turn by as it is given; far more is refused.
 MOST_TURN = 40.0
@@ -42,18 +43,14 @@ class Cut:
 def draw_straight_cut(seed: int) -> Cut:
     """A straight crack anywhere, in any direction and any units, under any stress that opens it."""
     rng = np.random.default_rng(seed)
-    half, stress = 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-3, 9)
-    along = np.exp(2j * np.pi * rng.random())
-    middle = half * complex(rng.uniform(-10, 10), rng.uniform(-10, 10))
-    parallel, shear = rng.uniform(-1, 1, 2) * stress
-    # s_xx + s_yy and s_yy - s_xx + 2 i s_xy turn with the axes.
-    turned = (stress - parallel + 2j * shear) * np.conj(along) ** 2
-    remote = (0.5 * (parallel + stress - turned.real), 0.5 * (parallel + stress + turned.real), 0.5 * turned.imag)
+    drawn = draw_straight(rng)
+    half, stress = drawn.half, drawn.stress
     order, parts = int(rng.integers(1, 4)), _cut(rng)
-    points = [complex(middle + half * along * (2 * part - 1)) for part in parts]
+    points = [complex(drawn.middle + half * drawn.along * (2 * part - 1)) for part in parts]
     curves = tuple(line(*ends, *_draw_mesh(rng)) for ends in pairwise(points))
     root = math.sqrt(math.pi * half)
-    return Cut(curves, remote, YOUNG * stress, order, _complete(stress * root, abs(shear) * root, YOUNG * stress))
+    tips = _complete(stress * root, abs(drawn.shear) * root, YOUNG * stress)
+    return Cut(curves, drawn.remote, YOUNG * stress, order, tips)
 
 
 def draw_arc_cut(seed: int) -> Cut:

@@ -50,9 +50,22 @@ class Errors:
     T: float
 
 
-def make_griffith(seed: int) -> Way:
+@dataclass(frozen=True)
+class Straight:
+    """A straight crack of half-length `half` about `middle`, in the direction `along`, under `stress` across it,
+    `parallel` along it and `shear`; remote: sxx, syy, sxy of the same state."""
+
+    half: float
+    stress: float
+    along: complex
+    middle: complex
+    parallel: float
+    shear: float
+    remote: tuple[float, float, float]
+
+
+def draw_straight(rng: np.random.Generator) -> Straight:
     """A straight crack anywhere, in any direction and in any units, under any stress that opens it."""
-    rng = np.random.default_rng(seed)
     half, stress = 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-3, 9)
     along = np.exp(2j * np.pi * rng.random())
     middle = half * complex(rng.uniform(-10, 10), rng.uniform(-10, 10))
@@ -60,13 +73,21 @@ def make_griffith(seed: int) -> Way:
     # s_xx + s_yy and s_yy - s_xx + 2 i s_xy turn with the axes.
     turned = (stress - parallel + 2j * shear) * np.conj(along) ** 2
     remote = (0.5 * (parallel + stress - turned.real), 0.5 * (parallel + stress + turned.real), 0.5 * turned.imag)
+    return Straight(half, stress, along, middle, parallel, shear, remote)
+
+
+def make_griffith(seed: int) -> Way:
+    """A straight crack anywhere, in any direction and in any units, under any stress that opens it."""
+    rng = np.random.default_rng(seed)
+    drawn = draw_straight(rng)
+    half, stress, along, middle = drawn.half, drawn.stress, drawn.along, drawn.middle
     order = int(rng.integers(1, 4))
     legs = _cut(rng, Leg(complex(middle - half * along), complex(middle + half * along), 1))
     root = math.sqrt(math.pi * half)
-    KI, KII = stress * root, abs(shear) * root
+    KI, KII = stress * root, abs(drawn.shear) * root
     material = Material("rock", 1e3 * stress, 0.3)
-    exact = _make_tips(KI, KII, (KI**2 + KII**2) / material.plane_modulus, parallel - stress)
-    return Way(legs, remote, material, order, exact, stress, _describe("griffith", seed, order, legs))
+    exact = _make_tips(KI, KII, (KI**2 + KII**2) / material.plane_modulus, drawn.parallel - stress)
+    return Way(legs, drawn.remote, material, order, exact, stress, _describe("griffith", seed, order, legs))
 
 
 def make_arc_crack(seed: int) -> Way:

@@ -52,7 +52,7 @@ from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
 from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
-from pbem.solve.steps.march import free_at_last, go_on, march, note_place, resume_modes, start_from
+from pbem.solve.steps.march import free_at_last, march, note_place, resume_modes, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
@@ -277,7 +277,7 @@ def _fill(
         estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
     tangent = kept.take_tangent(problem) if kept else None
     try:
-        steps = clock.each("steps", march(problem, watch, start, tangent, go_on(unfinished)))
+        steps = clock.each("steps", march(problem, watch, start, tangent, unfinished=unfinished))
         steps = steps if kept else free_at_last(problem, steps)
         store_steps(steps, model.output_every, interior, writer, watch, estimator, comm)
     except ConvergenceError:

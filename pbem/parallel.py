@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import sys
@@ -26,6 +27,13 @@ PETSC_ERR_MEM, PETSC_ERR_LIB = 55, 76
 MUMPS_LACKS_MEMORY = re.compile(r"\bMUMPS\b.*INFOG\(1\) ?= ?-(5|7|13|19|22|29)\b")
 # SIGUSR1 is what batch systems send some time before the end, where they are asked to.
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGXCPU)
+
+# Signals within so many seconds after the first are the same request: a batch system signals the launcher and the
+# ranks, and the launcher passes it on about a second later.
+REPEATED = 3.0
+# After so many seconds a run that is to stop does not wait for the end of its iteration. Launchers kill ranks that have
+# not ended a second or two after SIGTERM.
+PATIENCE = 0.3
 
 Comm = MPI.Intracomm
 
@@ -110,25 +118,37 @@ class StopSignals:
     """Notes the signals by which users and batch systems stop a run, so that all ranks can stop together.
 
     Used as a context, in the main thread; elsewhere, and for signals that are ignored (nohup), it does nothing. The
-    first signal is noted only, a second one does what it does without this. asked: reason, detail and exit code, as of
-    StopError; None as long as the run may go on. With `at_once` the first signal raises StopError itself: for what one
-    rank does between two occasions to ask.
+    first signal is noted only, and those that follow at once, as launchers pass on what batch systems send to all
+    processes; a later one does what it does without this. asked: reason, detail and exit code, as of StopError; None as
+    long as the run may go on. With `at_once` the first signal raises StopError itself: for what one rank does between
+    two occasions to ask.
     """
 
     def __init__(self) -> None:
         self.asked: tuple[str, str, int] | None = None
         self.at_once = False
         self._former: dict[int, Any] = {}
+        self._since = 0.0
+
+    @property
+    def overdue(self) -> bool:
+        """Whether it was asked so long ago that the end of an iteration should not be waited for."""
+        return self.asked is not None and time.monotonic() > self._since + PATIENCE
 
     def ask(self, reason: str, detail: str, code: int) -> None:
         """Let the run stop at the next occasion; the first reason counts."""
-        self.asked = self.asked or (reason, detail, code)
+        if self.asked is None:
+            self.asked, self._since = (reason, detail, code), time.monotonic()
 
     def _note(self, number: int, _: object) -> None:
         name = signal.Signals(number).name
+        if self.asked is not None and time.monotonic() > self._since + REPEATED:
+            self._restore()
+            os.kill(os.getpid(), number)
+            return
+        again = self.asked is not None
         self.ask(name, f"stopped by {name}", 128 + number)
-        self._restore()
-        if self.at_once and self.asked is not None:
+        if self.at_once and not again and self.asked is not None:
             raise StopError(*self.asked)
 
     def __enter__(self) -> StopSignals:

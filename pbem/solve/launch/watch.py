@@ -57,10 +57,19 @@ class Watch:
         self.check()
 
     def iterate(self, iteration: Iteration) -> None:
-        """Hand on, count, and check."""
+        """Hand on, count, and look after the laws."""
         self.iterations += 1
         self._tell("iterate", iteration)
+        self.check(stopping=False)
+
+    def pause(self) -> None:
+        """Check."""
         self.check()
+
+    def must_stop(self) -> bool:
+        """Whether a rank was asked to stop some time ago."""
+        overdue = self._signals.overdue
+        return overdue if self.comm.size == 1 else bool(self.comm.allreduce(overdue, op=MPI.LOR))
 
     def accept(self, step: Step) -> None:
         """Check, and hand on."""
@@ -81,8 +90,11 @@ class Watch:
             self._listener = None
             self._signals.ask("reader", "nobody reads the progress any more", 1)
 
-    def check(self) -> None:
-        """Raise StopError or LawError on all ranks if one of them has to stop. Called by all together."""
+    def check(self, stopping: bool = True) -> None:
+        """Raise StopError or LawError on all ranks if one of them has to stop. Called by all together.
+
+        stopping: whether this is the place for it; laws that fail end the run anywhere.
+        """
         fault = find_fault(self._laws)
         sums = np.concatenate([np.zeros(0), *(law.sums for law in self._laws)])
         own = np.concatenate([[bool(self._signals.asked), bool(fault)], sums])
@@ -90,7 +102,7 @@ class Watch:
         self.comm.Allgather(own, alike)
         for law in self._laws:
             law.sums[:] = 0.0
-        if alike[:, 0].any():
+        if stopping and alike[:, 0].any():
             asked = next(each for each in self.comm.allgather(self._signals.asked) if each)
             raise StopError(*asked)
         if alike[:, 1].any():

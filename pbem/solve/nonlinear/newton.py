@@ -18,7 +18,6 @@ from pbem.contact.laws import (
     ModeState,
     PairState,
     find_linear,
-    find_pivoting,
     follow_leaders,
     plastic_slip,
 )
@@ -37,20 +36,28 @@ from pbem.contact.modes import (
 from pbem.contact.seat import find_seat
 from pbem.contact.separating import begin_jump, choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import run_cascade
+from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
-from pbem.solve.nonlinear.search import PLAIN, PLAIN_FROM_SMOOTHED, PLAIN_IF_LOOSE, Globalisation, Search
+from pbem.solve.nonlinear.search import (
+    PLAIN,
+    PLAIN_FROM_SMOOTHED,
+    PLAIN_IF_LOOSE,
+    Globalisation,
+    Search,
+    go_on_warily,
+    list_searches,
+)
 from pbem.solve.nonlinear.smooth_search import CLOSELY, SmoothSearch
 from pbem.solve.nonlinear.unsettled import Unsettled, describe_unsettled
-from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
-from pbem.solve.problem.step import Iteration, Reporter
+from pbem.solve.problem.step import Iteration, Supervisor
 from pbem.solve.problem.tangent import Solved, TangentOperator
 from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
 
@@ -80,9 +87,9 @@ PATIENCE = 8
 
 
 def solve_step(
-    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Reporter,
+    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
     refuse: Callable[[Memory], ConvergenceError | None] = lambda memory: None, hurried: bool = False,
-    once: bool = False,
+    once: bool = False, resumed: Plain | None = None,
 ) -> Solution:
     """Converge one load step from the memory of the last.
 
@@ -92,63 +99,102 @@ def solve_step(
     first, only when the modes of all other pairs have settled. Where groups of a crack network that settle by
     themselves lead to modes that do not, the search begins anew without that. All decisions are taken by the first
     rank. Linear systems are solved loosely while modes change (pbem.solve.nonlinear.forcing); a search that fails so
-    begins anew with every system solved in full. once: the first search alone, whose end is the step's.
+    begins anew with every system solved in full. once: the first search alone, whose end is the step's. resumed: where
+    the step was when a run was stopped in it, as it is in StopError.unfinished; it goes on from there.
     Raises ConvergenceError: "free motion", "no admissible modes", "unsound mesh", "mode cycle", "iteration limit",
     "singular tangent", "linear solver"; and what `refuse` answers, asked now and then with the memory as it is by then:
     "limit load" in a march, where nothing can balance the loads with the bonds that are left.
     """
     iterations: list[Iteration] = []
+    tangent.listen(reporter.must_stop, reporter.pause)
     # Where friction changes with slip, Newton's steps lead through states that have to be followed exactly.
     loosely = bool(find_linear(problem.laws).all())
-    for forcing in (Forcing(loosely), Forcing(False)):
-        *first, last = _list_searches(problem, tangent)
+    begin = (resumed["forcing"], resumed["search"]) if resumed else (0, 0)
+    for first, forcing in enumerate((Forcing(loosely), Forcing(False))):
+        searches = list_searches(problem, tangent)
         try:
-            for search in first:
+            for second, search in enumerate(searches):
+                if (first, second) < begin:
+                    continue
+                saved = resumed["inner"] if resumed and (first, second) == begin else None
                 try:
-                    return _search_modes(
-                        problem, tangent, memory, load, reporter, refuse, hurried, search, iterations, forcing)
+                    return _search_modes(problem, tangent, memory, load, reporter, refuse, hurried, search, iterations,
+                                         forcing, saved)
+                except StopError as stop:
+                    stop.unfinished = stop.unfinished and stop.unfinished.within(forcing=first, search=second)
+                    raise
                 except ConvergenceError:
-                    if once or not (search.swept or (search.varying and search.unsettled)):
+                    last = search is searches[-1]
+                    if once or last or not (search.swept or (search.varying and search.unsettled)):
                         raise
-            return _search_modes(
-                problem, tangent, memory, load, reporter, refuse, hurried, last, iterations, forcing)
         except ConvergenceError:
             if once or not forcing.used:
                 raise
     raise AssertionError("a search without forcing ends with a solution or an error")
 
 
-def _list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
-    """The searches of one step, one after the other where the former does not settle."""
-    settling, linear = tangent.settling, find_linear(problem.laws)
-    sweeps = settling.nearby and not is_one_group(problem.mesh) and bool(linear.all())
-    interface = problem.mesh.pairs.interface if settling.with_neighbours else None
-    # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
-    # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
-    varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
-    return [
-        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary)
-        for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
-    ]
-
-
 def _search_modes(
-    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Reporter,
+    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
     refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, search: Search, iterations: list[Iteration],
-    forcing: Forcing,
+    forcing: Forcing, resumed: Plain | None,
 ) -> Solution:
-    """See solve_step; by one search, whose iterations join those before."""
-    laws = problem.laws
-    hold = Hold(problem, memory)
-    comm = problem.comm
+    """See solve_step; by one search, whose iterations join those before. resumed: see Checkpoint."""
+    parts = {
+        "hold": Hold(problem, memory), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
+        "smoothing": SmoothSearch(problem, memory, load, search.sweeps),
+    }
+    checkpoint = Checkpoint(tangent, load, iterations, parts)
+    course = checkpoint.resume(resumed) if resumed else None
+    try:
+        return _run_search(problem, tangent, memory, load, reporter, refuse, hurried, iterations, checkpoint, course,
+                           **parts)  # type: ignore[arg-type]
+    except StopError as stop:
+        stop.unfinished = checkpoint.describe()
+        raise
+
+
+def _begin_course(hold: Hold, asked: int) -> Course:
+    """What the first iteration begins with."""
+    problem, memory, laws = hold.problem, hold.memory, hold.problem.laws
     modes = problem.decide(lambda: follow_leaders(
         laws, hold.apply(memory.modes, problem.approached, np.zeros(laws.count))))
-    normal_traction, slip, jump = memory.normal_traction, begin_slip(laws, modes, memory), begin_jump(laws, memory)
-    fixed_point, kept = FixedPoint(), (modes, normal_traction, slip, jump)
+    at = modes, memory.normal_traction, begin_slip(laws, modes, memory), begin_jump(laws, memory)
+    return Course(memory.broken, *at, at, asked)
+
+
+def _run_search(
+    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
+    refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
+    checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
+    fixed_point: FixedPoint, smoothing: SmoothSearch,
+) -> Solution:
+    """See _search_modes; course: with which it begins, None at its first iteration."""
+    laws = problem.laws
+    course = course or _begin_course(hold, len(iterations) // PATIENCE)
+    modes, normal_traction, slip, jump = course.modes, course.normal_traction, course.slip, course.jump
+    memory, kept, asked = memory.lose(course.broken), course.kept, course.asked
     record = Record(problem, reporter, iterations)
-    smoothing = SmoothSearch(problem, memory, load, search.sweeps)
-    asked, most = len(iterations) // PATIENCE, problem.model.solver.newton_max_iterations
+    most = problem.model.solver.newton_max_iterations
+
+    def pause() -> None:
+        checkpoint.follow()
+        reporter.pause()
+
     while True:
+        checkpoint.take(Course(memory.broken, modes, normal_traction, slip, jump, kept, asked))
+        reporter.pause()
+        if smoothing.begun:
+            try:
+                modes, pairs = smoothing.find(tangent, hold, forcing, modes, record, most - search.taken - 1, pause)
+            except ConvergenceError:  # the true laws may have what smoothed ones have not
+                continue
+            finally:
+                search.spent += smoothing.taken
+                smoothing.begun = False
+            normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
+            modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
+                laws, hold.apply(new, at.g_n, slipped)))
+            continue
         begin = time.perf_counter()
         law = linearise(
             laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale,
@@ -189,7 +235,7 @@ def _search_modes(
         elif outcome.settled and not fails:
             forcing.used = False  # what follows is said of a solution in full
             problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
-            for note in hold.describe(modes) if comm.rank == 0 else ():
+            for note in hold.describe(modes) if problem.comm.rank == 0 else ():
                 reporter.note(note)
             whole = pairs.bear(load.carried)
             return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations),
@@ -211,27 +257,19 @@ def _search_modes(
         # One iteration at least is left for the true laws.
         if smoothing.begins(search.counts, pairs) and search.taken + 1 < most:
             search.go_on_from_smoothed()
-            try:
-                modes, pairs = smoothing.find(tangent, hold, forcing, modes, record, most - search.taken - 1)
-            except ConvergenceError:  # the true laws may have what smoothed ones have not
-                continue
-            finally:
-                search.spent += smoothing.taken
-            normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
-            modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
-                laws, hold.apply(new, at.g_n, slipped)))
+            smoothing.begun = True
             continue
         chosen = cascade.modes if cascade else None
         # The first rank alone knows which pairs hold a body.
-        share = broadcast(comm, max(search.globalisation.share, hold.share))
+        share = broadcast(problem.comm, max(search.globalisation.share, hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
         if not cascade and not (share > search.globalisation.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
-        if chosen is not None and search.returns(chosen.fingerprint()) and not _go_on(forcing, search):
+        if chosen is not None and search.returns(chosen.fingerprint()) and not go_on_warily(forcing, search):
             raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, share)
-            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not _go_on(forcing, search):
+            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not go_on_warily(forcing, search):
                 raise _end(hold, "mode cycle", proposal, search)
         slipped, former = plastic_slip(laws, pairs) - memory.slip, modes
         modes = problem.decide(
@@ -249,15 +287,6 @@ def _search_modes(
         jump = choose_jump(laws, former, memory, pairs, load.pressure)
         if search.just_returned:
             kept = (modes, normal_traction, slip, jump)
-
-
-def _go_on(forcing: Forcing, search: Search) -> bool:
-    """Where modes come back: at first with systems that are solved in full, then with more caution; False at the end.
-    """
-    if forcing.end():
-        search.seen.clear()
-        return True
-    return search.descend()
 
 
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:

@@ -8,7 +8,6 @@ import numpy as np
 
 from pbem.arrays import Bool
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
-from pbem.errors import StopError
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Iteration, Reporter
 from pbem.solve.problem.tangent import Solved
@@ -23,8 +22,7 @@ class Record:
         self._products = problem.system.products
 
     def add(self, solved: Solved, modes: ModeState, changed: Bool, begin: float) -> None:
-        """Tell of an iteration that began at a time; where the run is stopped by that, say with which modes a search
-        can go on."""
+        """Tell of an iteration that began at a time."""
         stick, slip, is_open = (int((modes.mode == kind).sum()) for kind in (STICK, SLIP, OPEN))
         seconds, before = time.perf_counter() - begin, self._products
         self._products = self._system.products
@@ -32,8 +30,4 @@ class Record:
             len(self.iterations) + 1, solved.residual, int(np.count_nonzero(changed)), stick, slip, is_open, seconds,
             solved.linear_iterations, self._products - before,
         ))  # fmt: skip
-        try:
-            self._reporter.iterate(self.iterations[-1])
-        except StopError as stop:
-            stop.unfinished = modes
-            raise
+        self._reporter.iterate(self.iterations[-1])

@@ -17,13 +17,19 @@ tangent comes back at once, as the fixed point itself closes in slowly.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
 
 from pbem.arrays import Bool, Integer
+from pbem.contact.laws import find_linear, find_pivoting
 from pbem.contact.modes import Frozen, Proposal
 from pbem.contact.subset import Settled
+from pbem.solve.nonlinear.forcing import Forcing
+from pbem.solve.preconditioner.subdomains import is_one_group
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import TangentOperator
 
 
 @dataclass(frozen=True)
@@ -259,8 +265,9 @@ class Search:
 
     def returns(self, fingerprint: bytes) -> bool:
         """Note a state of modes; whether it was there before at this level of caution."""
-        back = fingerprint in self.seen
-        self.seen.add(fingerprint)
+        digest = hashlib.sha256(fingerprint).digest()
+        back = digest in self.seen
+        self.seen.add(digest)
         return back
 
     def descend(self) -> bool:
@@ -279,3 +286,26 @@ class Search:
             return False
         self._enter(self.level + 1)
         return True
+
+
+def list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
+    """The searches of one step, one after the other where the former does not settle."""
+    settling, linear = tangent.settling, find_linear(problem.laws)
+    sweeps = settling.nearby and not is_one_group(problem.mesh) and bool(linear.all())
+    interface = problem.mesh.pairs.interface if settling.with_neighbours else None
+    # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
+    # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
+    varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
+    return [
+        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary)
+        for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
+    ]
+
+
+def go_on_warily(forcing: Forcing, search: Search) -> bool:
+    """Where modes come back: at first with systems that are solved in full, then with more caution; False at the end.
+    """
+    if forcing.end():
+        search.seen.clear()
+        return True
+    return search.descend()

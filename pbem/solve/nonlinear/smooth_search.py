@@ -11,7 +11,8 @@ the smoothed ones nothing is left but where it begins.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,6 +41,18 @@ WORSE = 2.0
 CLOSELY = 1e-3
 
 
+@dataclass(frozen=True)
+class SmoothCourse:
+    """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, the
+    modes that hold all bodies, the largest traction of the first state, and the violation of the true laws (stress)."""
+
+    modes: ModeState
+    state: PairState
+    holding: ModeState
+    largest: float
+    violation: float
+
+
 class SmoothSearch:
     """Whether the laws are smoothed in a search, once, and the modes that this leads to.
 
@@ -53,6 +66,8 @@ class SmoothSearch:
         self._allowed = bool((self._smooth | laws.bonded | laws.parted | laws.follows).all() and self._smooth.any())
         self._first: PairState | None = None
         self.taken = 0  # iterations so far
+        self.begun = False  # whether `find` is to be asked, or has not ended yet
+        self._course: SmoothCourse | None = None
 
     def begins(self, counts: Sequence[int], state: PairState) -> bool:
         """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
@@ -69,19 +84,21 @@ class SmoothSearch:
 
     def find(
         self, tangent: TangentOperator, hold: Hold, forcing: Forcing, modes: ModeState, record: Record,
-        most: int = LONGEST,
+        most: int = LONGEST, pause: Callable[[], None] = lambda: None,
     ) -> tuple[ModeState, PairState]:
         """Modes (m,), and the state of all pairs that they were read from, after `most` iterations at most; modes:
-        those before.
+        those before. pause: called between iterations, where the run may be stopped; `find` then goes on from there.
 
         Raises ConvergenceError: "singular tangent", "linear solver".
         """
-        problem, memory, load, state = self._problem, self._memory, self._load, self._first
-        assert state is not None
-        first, holding = state, close_all(problem.laws, modes)
-        largest, violation = problem.decide(lambda: (
-            float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
-        for taken in range(min(LONGEST, most)):
+        problem, memory, load = self._problem, self._memory, self._load
+        if self._course is None:
+            self._course = self._start(modes)
+        modes, state, holding = self._course.modes, self._course.state, self._course.holding
+        largest, violation = self._course.largest, self._course.violation
+        for taken in range(self.taken, min(LONGEST, most)):
+            self._course = SmoothCourse(modes, state, holding, largest, violation)
+            pause()
             width = max(WIDTH * violation, NARROWEST * largest)
             if not 0 < width < np.inf:
                 break
@@ -103,6 +120,13 @@ class SmoothSearch:
             if taken and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
                 break
         return modes, state
+
+    def _start(self, modes: ModeState) -> SmoothCourse:
+        problem, load, first = self._problem, self._load, self._first
+        assert first is not None
+        largest, violation = problem.decide(lambda: (
+            float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
+        return SmoothCourse(modes, first, close_all(problem.laws, modes), largest, violation)
 
     def _measure(self, state: PairState) -> float:
         """The mean violation of the true laws along all pairs (stress)."""

@@ -10,6 +10,7 @@ operator, so that a system that was solved loosely is solved in full by going on
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -51,7 +52,8 @@ class Rows(Protocol):
 class MinimalResidual:
     """See the module; the context of a PETSc KSP of type "python".
 
-    residual: of the last solution, this rank's part.
+    residual: of the last solution, this rank's part. must_stop: asked in each iteration, all ranks together, whether to
+    end there; stopped: whether it was so.
     """
 
     def __init__(self, comm: MPI.Intracomm, rows: Rows, most: int) -> None:
@@ -59,6 +61,8 @@ class MinimalResidual:
         self._comm, self._rows, self._most = comm, rows, most
         self.forget()
         self.residual: Real = np.zeros(0)
+        self.must_stop: Callable[[], bool] = lambda: False
+        self.stopped = False
 
     def forget(self) -> None:
         """Drop all directions, as those of another operator."""
@@ -91,7 +95,8 @@ class MinimalResidual:
             shares = np.append(shares, share)
             before, norm, number = norm, self._measure(residual), number + 1
             reason = _ask(solver, number, norm, first)
-            if not reason and self._count >= self._most:
+            self.stopped = not reason and self.must_stop()
+            if not reason and (self.stopped or self._count >= self._most):
                 reason = PETSc.KSP.ConvergedReason.DIVERGED_MAX_IT
         solver.setConvergedReason(reason)
         if reason == PETSc.KSP.ConvergedReason.DIVERGED_NANORINF:  # nothing of it can be used

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,13 +38,19 @@ class Unfinished:
     """Where the search for the contact statuses of a load step was when the run was stopped.
 
     stage: index; factor: of the step, the fraction of the stage at its end; mode (m,) int8 and sign (m,) of the
-    friction traction, in the order of Mesh.pairs: with them the search goes on.
+    friction traction, in the order of Mesh.pairs: with them the search goes on. search: all else that it knew, as plain
+    data (see pbem.solve.nonlinear.checkpoint); nothing where another search is to begin with the modes.
     """
 
     stage: int
     factor: float
     mode: NDArray[np.int8]
     sign: Real
+    search: Mapping[str, Any] = field(default_factory=dict)
+
+    def within(self, **place: Any) -> Unfinished:
+        """With the place at which the search was begun, by names, around what the search knew."""
+        return replace(self, search={**place, "inner": self.search})
 
 
 @dataclass(frozen=True)
@@ -180,8 +186,19 @@ class Reporter(Protocol):
         """A step has failed and will be halved."""
 
 
+class Supervisor(Reporter, Protocol):
+    """A reporter on every rank, which also stops the run: what it does is the same on all."""
+
+    def pause(self) -> None:
+        """Nothing is half done: raises StopError if the run is to be stopped."""
+
+    def must_stop(self) -> bool:
+        """Within an iteration that takes long: whether the run is to be stopped now."""
+        raise NotImplementedError
+
+
 class SilentReporter:
-    """A reporter that says nothing."""
+    """A reporter that says nothing, and lets the run go on."""
 
     def begin(self, model: Model) -> None:
         """Nothing."""
@@ -197,6 +214,13 @@ class SilentReporter:
 
     def iterate(self, iteration: Iteration) -> None:
         """Nothing."""
+
+    def pause(self) -> None:
+        """Nothing."""
+
+    def must_stop(self) -> bool:
+        """Never."""
+        return False
 
     def accept(self, step: Step) -> None:
         """Nothing."""

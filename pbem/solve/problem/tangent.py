@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -98,6 +98,18 @@ class TangentOperator(Protocol):
     ) -> ModeState:
         """Modes (m,) on which groups of elements settle by themselves; those that there are where none do."""
         return modes
+
+    def listen(self, must_stop: Callable[[], bool], stop: Callable[[], None]) -> None:
+        """Ask now and then, all ranks together, whether to stop, and then do so; where one solution may take long."""
+        return
+
+    def remember(self, load: Load) -> Mapping[str, Any]:
+        """What the next solution under a load begins from, by names: references, to be left as they are."""
+        return {}
+
+    def recall(self, remembered: Mapping[str, Any], load: Load) -> None:
+        """Begin the next solution from what another tangent operator of the same problem had remembered."""
+        return
 
     def take_over(self, problem: Any) -> None:
         """Serve another problem with the same system and the same pairs that can change; what holds for it is kept."""

@@ -13,11 +13,13 @@ from pbem.arrays import Real
 from pbem.contact.laws import Memory, ModeState, commit, start_memory
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError, StopError
+from pbem.solve.nonlinear.checkpoint import describe_error, from_plain, recall_error, to_plain
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.arranged import Arranged, begin_stage, describe_rest
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.step import ContactState, Reporter, Step, Unfinished
+from pbem.solve.problem.step import ContactState, Step, Supervisor, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
+from pbem.solve.steps.attempt import Attempt, take_up
 from pbem.solve.steps.ceiling import SAFE, Ceiling
 from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, find_reason, refuse_load
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
@@ -65,22 +67,9 @@ def start_from(problem: Problem, number: int, stage: int, factor: float, contact
     return Start(number, stage, factor, memory, contact)
 
 
-def go_on(unfinished: Unfinished | None) -> Guess | None:
-    """The modes with which the step begins in which a run was stopped."""
-    if unfinished is None:
-        return None
-    modes = ModeState(unfinished.mode, unfinished.sign)
-
-    def guess(stage: int, factor: float, memory: Memory, pressure: Real) -> ModeState | None:
-        same = stage == unfinished.stage and abs(factor - unfinished.factor) <= 1e-12
-        return modes if same else None
-
-    return guess
-
-
 def march(
-    problem: Problem, reporter: Reporter, start: Start | None = None, kept: TangentOperator | None = None,
-    guess: Guess | None = None, recover: bool = True,
+    problem: Problem, reporter: Supervisor, start: Start | None = None, kept: TangentOperator | None = None,
+    guess: Guess | None = None, recover: bool = True, unfinished: Unfinished | None = None,
 ) -> Iterator[Step]:
     """Yield the converged steps of all stages in turn.
 
@@ -89,7 +78,8 @@ def march(
     that fails, fractions in between are not tried, though faces may slip there. The factors of a stage's own steps are
     always met. Raises ConvergenceError with the reason of the last failure, or "limit load" or "not in balance", after
     the steps before it were yielded. kept: a tangent operator that is used and not destroyed. guess: the modes
-    with which the search for those of a step begins. recover: see `describe_step`. Unless the tangent operator is kept,
+    with which the search for those of a step begins. recover: see `describe_step`. unfinished: the step in which a
+    run was stopped that had come to `start`; it is gone on with where it was. Unless the tangent operator is kept,
     its storage is free by the time of the last step, after which nothing is solved for any more.
     """
     begin = start or start_from_rest(problem)
@@ -106,9 +96,11 @@ def march(
             ceiling = Ceiling()
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
+                attempt = take_up(unfinished, stage, reached, planned) or Attempt(ceiling)
                 solution, reached, ceiling = _advance(
-                    problem, tangent, memory, stage, reached, planned, ceiling, reporter, guess
+                    problem, tangent, memory, stage, reached, planned, attempt, reporter, guess
                 )
+                unfinished = None
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
                 number += 1
                 step = describe_step(problem, solution, memory, number, stage, reached, recover)
@@ -138,37 +130,45 @@ def free_at_last(problem: Problem, steps: Iterator[Step]) -> Iterator[Step]:
 
 def _advance(
     problem: Problem, tangent: TangentOperator, memory: Memory, stage: int, reached: float, planned: float,
-    ceiling: Ceiling, reporter: Reporter, guess: Guess | None,
+    attempt: Attempt, reporter: Supervisor, guess: Guess | None,
 ) -> tuple[Solution, float, Ceiling]:
     """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
 
     Raises ConvergenceError: of the last try, or "limit load".
     """
-    least = problem.model.solver.min_step
-    if ceiling.error is not None and ceiling.is_reached(reached, planned, least):
+    least, ceiling = problem.model.solver.min_step, attempt.ceiling
+    if attempt.target is None and ceiling.error is not None and ceiling.is_reached(reached, planned, least):
         raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
-    target, tries = ceiling.choose(reached, planned, least), 0
+    attempt = attempt.aim(ceiling.choose(reached, planned, least))
     proportional = cache(lambda: is_proportional(problem, memory, stage, reached))  # what a right guess never asks
     while True:
-        reporter.start_step(stage, reached, target)
+        ceiling, target = attempt.ceiling, attempt.target
+        assert target is not None
+        with attempt.note_try(stage, reached, memory.modes):
+            reporter.start_step(stage, reached, target)
         refuse_without_value(problem, stage, reached, target)
         load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
         begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
         try:
-            guessed = guess and guess(stage, target, begin, load.pressure)
-            with note_place(stage, target):
-                solution = _solve_guessed(problem, tangent, begin, load, reporter, guessed)
+            with attempt.note_try(stage, reached, memory.modes):
+                guessed = attempt.guess or (guess and guess(stage, target, begin, load.pressure))
+                solution = _solve_guessed(problem, tangent, begin, load, reporter, guessed, attempt)
                 if solution is None:
                     # From rest nothing is gained by an early end.
                     refuse = _never if proportional() else partial(refuse_load, problem, memory, stage, target)
-                    solution = solve_step(problem, tangent, begin, load, reporter, refuse, hurried)
+                    solution = _solve_usually(problem, tangent, begin, load, reporter, refuse, hurried, attempt)
             return solution, target, ceiling.pass_by(target)
         except ConvergenceError as failure:
             error = find_reason(problem, memory, stage, target, failure)
             balanced = find_balanced(problem, memory, stage, reached, target)
             if balanced >= target and not hurried:
-                with note_place(stage, target):
-                    solution = solve_softly(problem, tangent, begin, load, reporter, error)
+                softly = attempt.find_phase("softly")
+                with (
+                    attempt.note_try(stage, reached, memory.modes),
+                    attempt.note_phase("softly", error=describe_error(error)),
+                ):
+                    solution = solve_softly(
+                        problem, tangent, begin, load, reporter, error, softly and softly["inner"])
                 if solution is not None:
                     return solution, target, ceiling.pass_by(target)
             if proportional():
@@ -183,33 +183,50 @@ def _advance(
             if half < least:
                 raise end_march(problem, memory, stage, reached, target, error) from failure
             reporter.reject(error.reason, error.detail)
-            tries += 1
+            tries = attempt.tries + 1
             smallest = tries == TRIED_FROM_REST and is_proportional_at_last(problem, memory, stage, reached)
-            target = reached + (least if smallest else half)
+            attempt = Attempt(ceiling, tries, reached + (least if smallest else half))
 
 
 def _solve_guessed(
-    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Reporter, guessed: ModeState | None
+    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Supervisor,
+    guessed: ModeState | None, attempt: Attempt,
 ) -> Solution | None:
     """The solution of a search that begins with other modes than those of the memory; None if it does not settle."""
-    if guessed is None:
+    resumed = attempt.find_phase("guess")
+    if resumed:
+        guessed = from_plain(resumed["guessed"])
+    if guessed is None or (attempt.resumed and not resumed):
         return None
     try:
-        solution = solve_step(problem, tangent, replace(begin, modes=guessed), load, reporter, hurried=True)
+        with attempt.note_phase("guess", guessed=to_plain(guessed)):
+            solution = solve_step(problem, tangent, replace(begin, modes=guessed), load, reporter, hurried=True,
+                                  resumed=resumed and resumed["inner"])
     except ConvergenceError:
         return None
     return replace(solution, memory=replace(solution.memory, modes=begin.modes))
 
 
+def _solve_usually(
+    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Supervisor,
+    refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, attempt: Attempt,
+) -> Solution:
+    """The solution of the search that begins with the memory's modes; it may have failed before the run was stopped."""
+    if softly := attempt.find_phase("softly"):
+        raise recall_error(softly["error"])
+    resumed = attempt.find_phase("usual")
+    with attempt.note_phase("usual"):
+        return solve_step(problem, tangent, begin, load, reporter, refuse, hurried,
+                          resumed=resumed and resumed["inner"])
+
+
 @contextmanager
-def note_place(stage: int, factor: float, modes: ModeState | None = None) -> Iterator[None]:
+def note_place(stage: int, factor: float, modes: ModeState) -> Iterator[None]:
     """Where the run is stopped within, say in which step, and with which modes of the pairs it can go on."""
     try:
         yield
     except StopError as stop:
-        known = modes or stop.unfinished
-        if known is not None:
-            stop.unfinished = Unfinished(stage, factor, known.mode, known.sign)
+        stop.unfinished = Unfinished(stage, factor, modes.mode, modes.sign)
         raise
 
 

@@ -12,10 +12,11 @@ from dataclasses import replace
 
 from pbem.contact.laws import Memory, find_linear
 from pbem.contact.loads import Load
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, StopError
+from pbem.solve.nonlinear.checkpoint import Plain, from_plain, to_plain
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.step import Iteration, Reporter
+from pbem.solve.problem.step import Iteration, Supervisor
 from pbem.solve.problem.tangent import TangentOperator
 
 # Compliances of the pairs, one after the other, in lengths of the pair over the modulus beside it.
@@ -25,21 +26,31 @@ UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh")
 
 
 def solve_softly(
-    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Reporter, error: ConvergenceError
+    problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Supervisor,
+    error: ConvergenceError, resumed: Plain | None = None,
 ) -> Solution | None:
     """A load step whose search has ended with an error, by statuses of softer contacts; None if these do not settle.
 
     The solution is one of the true laws, found by their own search. Its iterations are those of all contacts. None,
     too, for crack networks and large models, whose groups settle by themselves, for laws that are not linear in each
-    status, and for other errors.
+    status, and for other errors. resumed: see solve_step.
     """
     if error.reason not in UNSETTLED or tangent.settling.nearby or not find_linear(problem.laws).all():
         return None
-    iterations: list[Iteration] = []
-    guess = begin
+    iterations: list[Iteration] = from_plain(resumed["iterations"]) if resumed else []
+    guess = replace(begin, modes=from_plain(resumed["modes"])) if resumed else begin
+    first = resumed["contact"] if resumed else 0
     try:
-        for each in (*(soften(problem, softness) for softness in SOFTNESS), problem):
-            found = solve_step(each, tangent, guess, load, reporter, hurried=True, once=True)
+        for number, each in enumerate((*(soften(problem, softness) for softness in SOFTNESS), problem)):
+            if number < first:
+                continue
+            inner = resumed["inner"] if resumed and number == first else None
+            try:
+                found = solve_step(each, tangent, guess, load, reporter, hurried=True, once=True, resumed=inner)
+            except StopError as stop:
+                stop.unfinished = stop.unfinished and stop.unfinished.within(
+                    contact=number, modes=to_plain(guess.modes), iterations=to_plain(iterations))
+                raise
             iterations += [replace(one, number=len(iterations) + k) for k, one in enumerate(found.iterations, 1)]
             guess = replace(begin, modes=found.modes)
     except ConvergenceError:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
 from pbem.heap import give_back
-from pbem.mesh.numbering import number_components
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.petsc.minimal_residual import MinimalResidual
 from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence, petsc_options
@@ -24,7 +24,7 @@ from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
-from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows
+from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows, choose_options, find_order
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.tangent.shared_product import SharedProduct, SharedRows
 from pbem.solve.tangent.sweeps import Sweeps
@@ -89,7 +89,7 @@ class KrylovTangent(TangentOperator):
         rows = 2 * len(problem.system.nodes)
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
         self._sweeps: Sweeps | None = None
-        self._order = _find_order(problem)
+        self._order = find_order(problem)
         self._matrix = PETSc.Mat().createPython(sizes, Product(self), comm=problem.comm)
         self._matrix.setUp()
         self._right, self._left = self._matrix.createVecs()
@@ -97,13 +97,14 @@ class KrylovTangent(TangentOperator):
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self._matrix)
         self._space = MinimalResidual(problem.comm, Rows(self), MOST_ITERATIONS)
+        self._stop: Callable[[], None] = lambda: None
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
         inner = solver.getPC()
         inner.setType("python")
         inner.setPythonContext(Preconditioning(self))
-        with petsc_options(_choose_options()):
+        with petsc_options(choose_options()):
             solver.setFromOptions()
         # The user may have asked for another method.
         self._keeps_directions = solver.getType() == "python"
@@ -245,6 +246,8 @@ class KrylovTangent(TangentOperator):
         """Improve the left vector for the right one; whether it is good enough is measured by the callers."""
         with clock.piece("GMRES", 8.0 * self._right.getLocalSize()), pass_over_divergence():
             self._solver.solve(self._right, self._left)
+        if self._space.stopped:
+            self._stop()
 
     def _widen(self) -> bool:
         """Let the groups of the preconditioner take in more around them; whether there was more to take.
@@ -356,6 +359,25 @@ class KrylovTangent(TangentOperator):
             part -= self.preconditioner.correct(-self._space.residual)[0]
         return self.gather(part)
 
+    def listen(self, must_stop: Callable[[], bool], stop: Callable[[], None]) -> None:
+        """See TangentOperator; a solver that the user has chosen in place of our own does not ask."""
+        self._space.must_stop, self._stop = must_stop, stop
+
+    def remember(self, load: Load) -> Mapping[str, Any]:
+        """See TangentOperator."""
+        scale = self._now.scale if self._now.load is load else 0.0
+        return {"solution": self.solution, "law": self.law, "expected": self.expected, "scale": scale,
+                "widening": self.widening}
+
+    def recall(self, remembered: Mapping[str, Any], load: Load) -> None:
+        """See TangentOperator."""
+        self.solution, self.law, self.expected = (remembered[name] for name in ("solution", "law", "expected"))
+        if remembered["scale"]:
+            self._now = _Iterate(load, np.zeros(0), np.zeros(0), remembered["scale"])
+        self._forget()
+        while self.widening < remembered["widening"] and self._widen():
+            pass
+
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
         self.problem, self.expected, self._sweeps = problem, None, None
@@ -370,20 +392,3 @@ class KrylovTangent(TangentOperator):
         self.preconditioner.drop_inverses()
         for item in (self._solver, self._matrix, self._right, self._left):
             item.destroy()
-
-
-def _choose_options() -> dict[str, str]:
-    """Options of PETSc's that have no function of their own, unless the user says otherwise.
-
-    GMRES orthogonalises its vectors twice: with traction equations on graded meshes rows differ so much in size that
-    once is not enough, and it stagnates.
-    """
-    name = "ksp_gmres_cgs_refinement_type"
-    return {} if PETSc.Options().hasName(PREFIX + name) else {name: "refine_always"}
-
-
-def _find_order(problem: Problem) -> Integer:
-    """Unknowns of all ranks, one rank after the other."""
-    own = problem.system.nodes.astype(float)
-    nodes = gather_parts(problem.comm, own).astype(np.int64)
-    return number_components(nodes)

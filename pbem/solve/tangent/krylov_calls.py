@@ -5,10 +5,13 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from petsc4py import PETSc
 
-from pbem.arrays import Real
+from pbem.arrays import Integer, Real
+from pbem.mesh.numbering import number_components
+from pbem.parallel import gather_parts
+from pbem.solve.petsc.session import PREFIX, PETSc
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
+from pbem.solve.problem.problem import Problem
 
 
 class Called(Protocol):
@@ -62,3 +65,20 @@ class Preconditioning:
 
     def apply(self, preconditioner: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         y.setArray(self._tangent.precondition(np.array(x.getArray(readonly=True))))
+
+
+def choose_options() -> dict[str, str]:
+    """Options of PETSc's that have no function of their own, unless the user says otherwise.
+
+    GMRES orthogonalises its vectors twice: with traction equations on graded meshes rows differ so much in size that
+    once is not enough, and it stagnates.
+    """
+    name = "ksp_gmres_cgs_refinement_type"
+    return {} if PETSc.Options().hasName(PREFIX + name) else {name: "refine_always"}
+
+
+def find_order(problem: Problem) -> Integer:
+    """Unknowns of all ranks, one rank after the other."""
+    own = problem.system.nodes.astype(float)
+    nodes = gather_parts(problem.comm, own).astype(np.int64)
+    return number_components(nodes)

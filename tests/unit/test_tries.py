@@ -68,11 +68,11 @@ def _fail_first(monkeypatch: pytest.MonkeyPatch, times: int) -> list[int]:
     """Let the first marches fail as if contacts had not settled; returns the numbers of elements of all marches."""
     march, seen = driver.march, []
 
-    def fail(problem: Any, *rest: Any) -> Iterator[Any]:
+    def fail(problem: Any, *rest: Any, **named: Any) -> Iterator[Any]:
         seen.append(len(problem.mesh.start))
         if len(seen) <= times:
             raise CYCLE
-        yield from march(problem, *rest)
+        yield from march(problem, *rest, **named)
 
     monkeypatch.setattr(driver, "march", fail)
     return seen

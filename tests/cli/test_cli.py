@@ -191,8 +191,8 @@ def break_run(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
 
     whole = pbem.driver.march
 
-    def march(*arguments: object) -> Iterator[object]:
-        yield next(whole(*arguments))  # type: ignore[arg-type]
+    def march(*arguments: object, **options: object) -> Iterator[object]:
+        yield next(whole(*arguments, **options))  # type: ignore[arg-type]
         raise error
 
     monkeypatch.setattr(pbem.driver, "march", march)

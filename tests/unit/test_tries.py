@@ -130,7 +130,7 @@ def test_a_pass_of_many_iterations_is_the_last(
 ) -> None:
     seen: list[int] = []
 
-    def fail(problem: Any, reporter: Any, *rest: Any) -> Iterator[Any]:
+    def fail(problem: Any, reporter: Any, *rest: Any, **named: Any) -> Iterator[Any]:
         seen.append(len(problem.mesh.start))
         for number in range(MOST_ITERATIONS + more):
             reporter.iterate(Iteration(number + 1, 0.0, 1, 0, 0, 1, 0.0))

@@ -193,9 +193,9 @@ def failing_second_pass(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseExcept
     march, passes = driver.march, []
 
     def install(error: BaseException) -> None:
-        def break_off(*arguments: Any) -> Iterator[Step]:
+        def break_off(*arguments: Any, **options: Any) -> Iterator[Step]:
             passes.append(1)
-            for step in march(*arguments):
+            for step in march(*arguments, **options):
                 yield step
                 if len(passes) > 1:
                     raise error

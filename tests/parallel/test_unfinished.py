@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,9 @@ import pytest
 
 import pbem
 from pbem.cli import main
+from pbem.errors import StopError
 from pbem.results.reader import Results, open_results
+from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.parallel.launch import launch_snippet
 
 # Cracks in one load step: their statuses take a number of iterations.
@@ -78,6 +81,36 @@ def test_the_search_goes_on_with_the_statuses_that_it_had(
     expect_alike(open_results(path), whole)
     with h5py.File(path) as file:
         assert "unfinished" not in file
+
+
+class Stopping(SilentReporter):
+    """Sends a signal to its own process in the iteration of this number."""
+
+    def __init__(self, number: int) -> None:
+        self.number, self.seen = number, 0
+
+    def iterate(self, iteration: Iteration) -> None:
+        self.seen += 1
+        if self.seen == self.number:
+            os.kill(os.getpid(), signal.SIGUSR1)
+
+
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+def test_no_iteration_is_made_twice(operator: str, tmp_path: Path) -> None:
+    """The resumed search is where it was: the iterations in the file are those of a run left alone, one by one."""
+    make_case(tmp_path)
+    case, path = tmp_path / "case.toml", tmp_path / "case.h5"
+    whole = pbem.run(case, tmp_path / "whole.h5", operator=operator)
+    count = count_iterations(whole.path)
+    for number in range(1, count):
+        with pytest.raises(StopError):
+            pbem.run(case, path, operator=operator, reporter=Stopping(number), force=True)
+        after = Stopping(-1)
+        results = pbem.run(case, path, operator=operator, reporter=after, resume=True)
+        assert after.seen == count - number
+        expect_alike(results, whole)
+        for name in ("iteration", "changed", "stick", "slip", "open"):
+            np.testing.assert_array_equal(results.convergence[name], whole.convergence[name])
 
 
 def test_a_run_that_is_stopped_during_the_estimate_does_not_lose_the_step(tmp_path: Path, whole: Results) -> None:

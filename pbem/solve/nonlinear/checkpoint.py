@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 
 from pbem.arrays import Bool, Real
-from pbem.contact.laws import ModeState, PairState
+from pbem.contact.laws import ModeState, PairState, follow_leaders
 from pbem.contact.loads import Load
-from pbem.contact.modes import Linearisation
+from pbem.contact.modes import Linearisation, begin_slip
+from pbem.contact.separating import begin_jump
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
+from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.smooth_search import SmoothCourse
 from pbem.solve.problem.step import Iteration, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
@@ -53,6 +55,15 @@ class Course:
     jump: Real
     kept: tuple[ModeState, Real, Real, Real]
     asked: int
+
+
+def begin_course(hold: Hold, asked: int) -> Course:
+    """What the first iteration of a search begins with."""
+    problem, memory, laws = hold.problem, hold.memory, hold.problem.laws
+    modes = problem.decide(lambda: follow_leaders(
+        laws, hold.apply(memory.modes, problem.approached, np.zeros(laws.count))))
+    at = modes, memory.normal_traction, begin_slip(laws, modes, memory), begin_jump(laws, memory)
+    return Course(memory.broken, *at, at, asked)
 
 
 class Checkpoint:

@@ -25,7 +25,6 @@ from pbem.contact.loads import Load
 from pbem.contact.modes import (
     Linearisation,
     Proposal,
-    begin_slip,
     choose_slip,
     find_failures,
     limit_changes,
@@ -34,12 +33,12 @@ from pbem.contact.modes import (
     update_active_set,
 )
 from pbem.contact.seat import find_seat
-from pbem.contact.separating import begin_jump, choose_bond_slip, choose_jump
+from pbem.contact.separating import choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
 from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import run_cascade
-from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain
+from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain, begin_course
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
@@ -153,15 +152,6 @@ def _search_modes(
         raise
 
 
-def _begin_course(hold: Hold, asked: int) -> Course:
-    """What the first iteration begins with."""
-    problem, memory, laws = hold.problem, hold.memory, hold.problem.laws
-    modes = problem.decide(lambda: follow_leaders(
-        laws, hold.apply(memory.modes, problem.approached, np.zeros(laws.count))))
-    at = modes, memory.normal_traction, begin_slip(laws, modes, memory), begin_jump(laws, memory)
-    return Course(memory.broken, *at, at, asked)
-
-
 def _run_search(
     problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
     refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
@@ -170,7 +160,7 @@ def _run_search(
 ) -> Solution:
     """See _search_modes; course: with which it begins, None at its first iteration."""
     laws = problem.laws
-    course = course or _begin_course(hold, len(iterations) // PATIENCE)
+    course = course or begin_course(hold, len(iterations) // PATIENCE)
     modes, normal_traction, slip, jump = course.modes, course.normal_traction, course.slip, course.jump
     memory, kept, asked = memory.lose(course.broken), course.kept, course.asked
     record = Record(problem, reporter, iterations)

@@ -146,7 +146,9 @@ def test_what_is_left_over_is_measured(tmp_path: Path) -> None:
         assert each.relative[[0, 2]].max() < 1e-12
         # A body that is free in all its motions: anchors carry all that is left.
         assert each.carried[1] == pytest.approx(each.relative[1], rel=1e-9)
-        assert describe_imbalance(problem, each) is None
+        assert "region 'b1'" in str(describe_imbalance(problem, each))  # more than a thousandth
+        less = replace(each, relative=0.5 * each.relative, whole_relative=0.5 * each.whole_relative)
+        assert describe_imbalance(problem, less) is None
     # The sums without signs: 2 on the sides, 2 x 2 on the others.
     lengths = 4 * np.hypot(*(stress @ [0.0, 1.0])) + np.hypot(3.01, 1.0) + np.hypot(2.99, 1.0)
     assert left.relative[1] == pytest.approx(0.02 / lengths, rel=1e-9)

@@ -10,8 +10,8 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Balance
 
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
-# anchors hold it, and that make a result wrong, where they are more than NOTED of those on the most loaded region too.
-NOTED, DRIVEN, NOT_IN_BALANCE = 1e-2, 3e-2, 1e-1
+# anchors hold it, and that make a result wrong, where they are more than WEIGHTY of those on the most loaded region too.
+NOTED, DRIVEN, NOT_IN_BALANCE, WEIGHTY = 1e-3, 3e-2, 1e-1, 1e-2
 # The same of a net force on an infinite region that prescribed displacements or springs bring about.
 NET_FORCE = 1e-2
 # Parts that cracks cut off are judged if they carry more than this part of what the most loaded region does.
@@ -29,7 +29,7 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
     weight = np.concatenate([balance.weight, balance.part_weight, [1.0]])
     # Slivers between cracks carry little, of which much may be left over.
     relative[len(balance.relative) :][weight[len(balance.relative) :] < SLIGHT] = 0.0
-    wrong = (relative > NOT_IN_BALANCE) & (relative * weight > NOTED)
+    wrong = (relative > NOT_IN_BALANCE) & (relative * weight > WEIGHTY)
     worst = int(np.argmax(np.where(wrong, relative, 0.0) if wrong.any() else relative))
     amount, at = float(relative[worst]), worst - len(balance.relative)
     if amount <= NOTED:
@@ -45,7 +45,7 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
         f"the forces on {on} do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
         f"{100 * amount:.2g} % of their sum without signs"
     )
-    if at < 0 and float(balance.carried[worst]) > NOTED:
+    if at < 0 and float(balance.carried[worst]) > WEIGHTY:
         left += ", which only the condition on its mean motion carries"
     if wrong.any():
         raise ConvergenceError("not in balance", f"{left}; use shorter elements, or order 2, near to it")

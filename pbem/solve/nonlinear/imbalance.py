@@ -10,7 +10,7 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Balance
 
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
-# anchors hold it, and that make a result wrong, where they are more than WEIGHTY of those on the most loaded region too.
+# anchors hold it, and that make a result wrong, where they are more than WEIGHTY of those on the most loaded region.
 NOTED, DRIVEN, NOT_IN_BALANCE, WEIGHTY = 1e-3, 3e-2, 1e-1, 1e-2
 # The same of a net force on an infinite region that prescribed displacements or springs bring about.
 NET_FORCE = 1e-2

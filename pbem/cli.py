@@ -72,19 +72,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if isinstance(stream, io.TextIOWrapper):  # a title may have characters that the terminal's encoding has not
                 stream.reconfigure(errors="backslashreplace")
         petsc, plain = split_petsc_options(sys.argv[1:] if arguments is None else arguments)
-        code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank)
+        code = _report_errors(lambda: _dispatch(plain, petsc, rank), rank, launch.ranks)
     if code and rank > 0:
         # A launcher that sees one rank end with an error ends the others: the first must have spoken by then.
         time.sleep(1.0)
     return code
 
 
-def _report_errors(action: Callable[[], int], rank: int) -> int:
+def _report_errors(action: Callable[[], int], rank: int, ranks: int) -> int:
     """The exit code of the action, with what went wrong said once."""
     try:
         return action()
     except KeyboardInterrupt:
         say("pbem: interrupted", rank)
+        if ranks > 1:
+            _leave(rank)
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of a pipe (`| head`) has gone; nothing is wrong.
@@ -100,6 +102,20 @@ def _report_errors(action: Callable[[], int], rank: int) -> int:
         return WRONG_INPUT
     except Exception:
         return _report_unexpected(rank)
+
+
+def _leave(rank: int) -> None:
+    """End this process of several where runs do not yet, or no longer, stop together.
+
+    Others may be anywhere, also within the start of MPI: its end, which Python asks for at its own, would wait for them
+    for ever. A launcher that sees a process leave without it ends the others.
+    """
+    if rank > 0:
+        time.sleep(1.0)
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(INTERRUPTED)
 
 
 def _report_unexpected(rank: int) -> int:

@@ -195,3 +195,25 @@ def test_a_second_run_on_the_same_file_is_refused(folder: Path, whole: Results) 
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("[2, 2] ") and done.stdout.count("is being written by another run") == 2
     expect_equal(open_results(folder / "case.h5"), whole)
+
+
+# A rank that is interrupted while others have not come as far as where runs stop together.
+INTERRUPTED = """
+import sys
+from mpi4py import MPI
+import pbem.cli as cli
+
+def interrupt(*given):
+    raise KeyboardInterrupt
+
+if MPI.COMM_WORLD.rank == int(sys.argv[1]):
+    cli._dispatch = interrupt
+sys.exit(cli.main(sys.argv[2:]))
+"""
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_a_rank_that_is_interrupted_alone_ends_all(rank: int, folder: Path) -> None:
+    done = launch_snippet(2, INTERRUPTED, str(rank), "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 130
+    assert not (folder / "case.h5").exists() or open_results(folder / "case.h5").status != "finished"

@@ -258,8 +258,7 @@ def read_jump(solved: Solved, name: str, values: np.ndarray, place: np.ndarray) 
     own = np.abs(along.mean(axis=1)[None, :] - place[:, None]) / np.ptp(along, axis=1)
     at = np.argmin(own, axis=1)
     nodes, tip = along[at], mesh.tip[chain][at]
-    ends = mesh.start[chain][at], mesh.end[chain][at]
-    length = np.abs(ends[1] - ends[0])
+    length = mesh.pairs.weight[pairs].reshape(len(chain), -1).sum(axis=1)[at]  # along arcs, too
     middle = 0.5 * (nodes[:, 0] + nodes[:, -1])
     local = 2 * (nodes - middle[:, None]) / length[:, None]
     s = np.clip(2 * (place - middle) / length, -1, 1)[:, None]

@@ -176,7 +176,7 @@ def study_rings(quick: bool) -> Iterator[Row]:
             stresses = []
             for place in (HERE, ELSEWHERE):
                 solved = solve_ring(ligament, order, place)
-                at = np.argmin(np.abs(solved.mesh.position - place.point(2 - ligament)))
+                at = np.argmin(np.abs(solved.mesh.position + solved.model.origin - place.point(2 - ligament)))
                 stresses.append(solved.hoop_stress()[at] / place.stress)
             yield Row(f"ring, ligament {ligament:g}, order {order}: stress", solved.unknowns,
                       abs(stresses[0] / exact - 1), 0.01, abs(stresses[1] / stresses[0] - 1))
@@ -212,7 +212,8 @@ def solve_slot(
 def read_lift(solved: Solved, place: Place) -> float:
     """Of the upper right corner, along the load."""
     nodes = solved.nodes("top")
-    corner = nodes[np.argmin(np.abs(solved.mesh.position[nodes] - place.point(3 + 1j)))]
+    points = solved.mesh.position[nodes] + solved.model.origin
+    corner = nodes[np.argmin(np.abs(points - place.point(3 + 1j)))]
     return place.back(complex(solved.last.displacement[corner])).imag
 
 

@@ -27,6 +27,12 @@ WIDEST_RATIO = 2.0
 # The jump follows the root of the distance over the elements next to a tip, which are halved together: with unequal
 # ones K and the jumps are off by far more.
 EQUAL_AT_TIPS = 3
+# That on a tip is divided at this part of its length, so that it stays twice as long as the next one: beyond it the
+# root is a polynomial, which follows it the better the farther from the tip. With equal elements the error of the jump
+# is two to ten times as large, and falls with the root of their length alone.
+TIP_PART = 2 / 3
+# Legs with fewer elements are halved in any case: of three elements the coarser mesh has a long and a short one.
+LEAST_GENTLY = 4
 
 
 @dataclass(frozen=True)
@@ -111,8 +117,10 @@ def bisect_elements(model: Model, marked: Mapping[str, Bool], gently: bool = Fal
     curves, begin = {}, 0
     for name in names:
         legs = []
-        for leg in model.curves[name].legs:
-            legs.append(_divide_marked(leg, halved[begin : begin + leg.elements], gently))
+        at_start, at_end = model.crack_tips.get(name, (False, False))
+        for number, leg in enumerate(model.curves[name].legs):
+            tips = at_start and number == 0, at_end and number == len(model.curves[name].legs) - 1
+            legs.append(_divide_marked(leg, halved[begin : begin + leg.elements], gently, tips))
             begin += leg.elements
         curves[name] = Curve(name, tuple(legs))
     return replace(model, curves=curves)
@@ -220,17 +228,22 @@ def _divide_leg(leg: Leg, ends: Sequence[float] | Real) -> Leg:
     return replace(leg, elements=len(ends) - 1, fractions=tuple(float(t) for t in ends))
 
 
-def _divide_marked(leg: Leg, marked: Bool, gently: bool) -> Leg:
+def _divide_marked(leg: Leg, marked: Bool, gently: bool, tips: tuple[bool, bool]) -> Leg:
+    """tips: whether the leg begins and ends at the tip of a crack."""
     if not marked.any():
         return leg
+    parts = np.full(leg.elements, 0.5)
+    if leg.elements > 1 or not all(tips):
+        parts[0], parts[-1] = (TIP_PART if tips[0] else parts[0]), (1 - TIP_PART if tips[1] else parts[-1])
     at: list[float] = [0.0]  # new ends, in numbers of elements
     number = 0
     while number < leg.elements:
-        if gently and marked[number : number + 2].sum() == 2:
+        alike = marked[number : number + 2].sum() == 2 and (parts[number : number + 2] == 0.5).all()
+        if gently and alike and leg.elements >= LEAST_GENTLY:
             at += [number + 2 / 3, number + 4 / 3, number + 2.0]
             number += 2
             continue
-        at += [number + 0.5, number + 1.0] if marked[number] else [number + 1.0]
+        at += [number + parts[number], number + 1.0] if marked[number] else [number + 1.0]
         number += 1
     ends = np.interp(at, np.arange(leg.elements + 1), leg.element_fractions())
     return _divide_leg(leg, ends)

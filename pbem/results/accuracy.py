@@ -20,7 +20,7 @@ ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"
 ROUNDING = 1e-13
 
 # The estimates are to be so many times below the accuracy: they are within a factor, and too small more often.
-SAFETY = 2.0
+SAFETY = 1.5
 
 # Passes at most, and unknowns at most over those of the first mesh.
 MOST_PASSES = 20
@@ -32,6 +32,8 @@ FAR = 8.0
 # Elements with this part of the largest energy are refined in any case: where errors are spread evenly, to refine some
 # of them alone brings nothing.
 ALIKE = 0.1
+# And those with nearly the energy of the last one that is: what is symmetrical stays so.
+AS_LAST = 0.9
 # Elements shorter by this factor bring the error below the accuracy if it falls with the power order + 1: then there is
 # no need to halve.
 NEAR = 1.5
@@ -139,12 +141,12 @@ def mark_elements(
         by_curve[name][2] = np.maximum(by_curve[name][2], jumps[elements])
     *kinds, local = np.concatenate(list(by_curve.values()), axis=1)
     part = LARGE_PART if worst > FAR * accuracy else PART
-    chosen = local > max(accuracy, NEAR_WORST * local.max(initial=0.0))
+    chosen = local > max(0.5 * accuracy / SAFETY, NEAR_WORST * local.max(initial=0.0))
     for each in kinds:
         if each.sum() >= SMALL_KIND * energy.sum():
             order = np.argsort(-each, kind="stable")
-            chosen[order[: np.searchsorted(np.cumsum(each[order]), part * each.sum()) + 1]] = True
-            chosen |= each >= ALIKE * each.max()
+            last = min(int(np.searchsorted(np.cumsum(each[order]), part * each.sum())), len(order) - 1)
+            chosen |= each >= min(AS_LAST * each[order[last]], ALIKE * each.max())
     legs = [leg.elements for curve in model.curves.values() for leg in curve.legs]
     leg = np.repeat(np.arange(len(legs)), legs)
     chosen |= (np.bincount(leg, chosen) > MOST_OF_LEG * np.array(legs))[leg]

@@ -5,6 +5,7 @@ There tractions or jumps follow a root of the distance, which meshes resolve mor
 
 from __future__ import annotations
 
+import cmath
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,6 +15,8 @@ from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import SLIP
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.model.refinement import count_elements
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState
 
@@ -24,6 +27,9 @@ FIXED, MOVING = 1.0, 2.0
 # That of jumps on the elements of the second solution next to a tip, so many of them: between the power 3/2, which
 # would give 1.8, and smooth fields (scripts/bench_estimate.py --accuracy).
 TIP, AT_TIP = 4.0, 2
+# That of jumps on the element next to a corner, or to the mouth of a crack, where they follow other powers: over the
+# same problems 1.5 to 2.5. Legs that turn by more (radians) have a corner.
+CORNER, TURN = 2.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -79,10 +85,30 @@ def choose_jump_divisors(beside: Beside, tips: Mapping[str, tuple[bool, bool]], 
     tips: of each crack, whether its start and its end is a tip; smooth: elsewhere.
     """
     coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
+    at_corner = _mark_corners(beside.model)
     for name, own in list_curve_elements(beside.model, coarse) if beside.kind == "merged" else ():
         at_start, at_end = tips.get(name, (False, False))
         result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
+        result[own[at_corner[name]]] = min(CORNER, smooth)
     return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
+
+
+def _mark_corners(model: Model) -> dict[str, Bool]:
+    """Per curve, whether an element (along all legs) ends where it meets another one at an angle, or several."""
+    marks = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in model.curves.items()}
+    meeting: dict[complex, list[tuple[str, int, complex]]] = {}
+    for name, curve in model.curves.items():
+        number = 0
+        for leg in curve.legs:
+            meeting.setdefault(leg.start, []).append((name, number, leg.tangent(False)))
+            number += leg.elements
+            meeting.setdefault(leg.end, []).append((name, number - 1, -leg.tangent(True)))
+    for ends in meeting.values():
+        # The tip of a crack meets nothing.
+        smooth = len(ends) == 2 and abs(cmath.phase(-ends[0][2] / ends[1][2])) < TURN
+        for name, number, _ in ends if len(ends) > 1 and not smooth else ():
+            marks[name][number] = True
+    return marks
 
 
 class _Chain:

@@ -4,7 +4,9 @@
 
 Each seed draws a model of one kind with gaps of 1e-6 to 1e-2 of its size, materials, friction, scheme and mesh, presses
 it until the gaps are closed and on, and prints what is left over on the worst body at the given mesh and at twice the
-elements, and how far the force is from that without gaps and pressed by as much less (stacks, grains and wedges).
+elements, and how far the force is from that without gaps and pressed by as much less (stacks, grains and wedges). What
+is left over is a sum with signs, which can pass through zero between two meshes: where twice the elements leave more,
+four times as many have to leave less than a half of that.
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ KINDS = ("stack", "grains", "wedge", "pin")
 SCHEMES = ("SST", "DBEM", "HST", "THST")
 # Parts of the force that may be left over, and by which it may differ.
 LEFT_OVER, OFF = 1e-3, 1e-2
-COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "off", "error")
+# What four times the elements may leave of what twice as many do, where these leave more than the given mesh.
+HALVED = 0.5
+COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "finest", "off", "error")
 
 
 @dataclass(frozen=True)
@@ -202,6 +206,7 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
 
             row["left"], force = run(sample.elements, False)
             row["finer"] = run(2 * sample.elements, False)[0] if operator == "dense" else math.nan
+            row["finest"] = run(4 * sample.elements, False)[0] if leaves_more(row) else math.nan
             row["off"] = math.nan
             if sample.kind != "pin":
                 expected = run(sample.elements, True)[1]
@@ -214,15 +219,24 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
     return rows
 
 
+def leaves_more(row: dict[str, Any]) -> bool:
+    """Whether the finer mesh leaves more."""
+    return bool(row["finer"] > max(row["left"], 1e-5))
+
+
 def is_wrong(row: dict[str, Any]) -> bool:
-    """Whether a run failed, is out of balance or has another force."""
-    return "error" in row or row["left"] > LEFT_OVER or row["off"] > OFF or row["finer"] > max(row["left"], 1e-5)
+    """Whether a run failed, is out of balance, does not come closer to it or has another force."""
+    if "error" in row or row["left"] > LEFT_OVER or row["off"] > OFF:
+        return True
+    return leaves_more(row) and not row["finest"] < HALVED * row["finer"]
 
 
 def describe(row: dict[str, Any]) -> str:
     """A line for a run."""
     drawn = "{seed:3d} {kind:7s} {scheme:5s} {operator:13s} gap {gap:.1e} friction {friction:.1f}: ".format(**row)
     found = row.get("error") or "left over {left:.1e}, finer {finer:.1e}, force off {off:.1e}".format(**row)
+    if row.get("finest", math.nan) > 0:
+        found += ", finest {finest:.1e}".format(**row)
     return drawn + found + ("  WRONG" if is_wrong(row) else "")
 
 

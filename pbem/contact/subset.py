@@ -66,7 +66,7 @@ def settle_subset(
 ) -> Settled:
     """Find modes of s pairs that `judge` leaves as they are; the judge sees modes and states of these pairs alone.
 
-    holds: whether all bodies are held in modes of these pairs.
+    holds: whether all bodies are held in modes of these pairs; modes that free one are none.
     """
     problem = pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
@@ -80,7 +80,7 @@ def settle_subset(
         return Settled(stepped, False, 0, wrong)
     if len(loses) > MOST_PIVOTED:
         return Settled(None, False, 0, wrong)
-    kept = _release(subset, response, compliance, loses, judge)
+    kept = _release(subset, response, compliance, loses, judge, holds)
     if kept is not None:
         return Settled(kept, False, 1, wrong)
     tried: set[bytes] = set()
@@ -90,11 +90,13 @@ def settle_subset(
         while follow is not None and follow.tobytes() not in tried and len(tried) < count_most_tried(loses):
             tried.add(follow.tobytes())
             modes = pivot_pairs(problem, compliance, follow)
-            if modes is None:
+            # Whether pivoting ends on a ray or in modes that free a body, and whether their equations then have a
+            # solution, is a matter of the last bits: both are no modes.
+            if modes is None or not holds(modes):
                 complete = False
                 break
             d = solve_in_modes(problem, modes)
-            if d is None:  # a body that these modes leave free: it has to be held, and cannot be judged here
+            if d is None:
                 return Settled(modes, False, len(tried), wrong)
             proposal = judge(modes, response.evaluate(d))
             if not proposal.changed.any():
@@ -130,7 +132,7 @@ def _step(
 
 def _release(
     subset: Subset, response: Response, compliance: Real, loses: Bool,
-    judge: Callable[[ModeState, PairState], Proposal],
+    judge: Callable[[ModeState, PairState], Proposal], holds: Callable[[ModeState], bool],
 ) -> ModeState | None:
     """Modes where pairs lose what they can lose as they part, one after the other; None where they slip without it.
 
@@ -147,7 +149,7 @@ def _release(
             modes = pivot_pairs(
                 pose(replace(subset, memory=subset.memory.lose(broken)), response), compliance, nothing
             )
-            if modes is None:
+            if modes is None or not holds(modes):
                 break
             parted = loses & (modes.mode == OPEN) & ~lost
             if parted.any():

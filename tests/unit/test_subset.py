@@ -145,6 +145,23 @@ def test_pairs_that_alone_hold_a_body_are_settled() -> None:
     assert found.modes is not None and found.modes.mode.tolist() == [STICK, STICK]
 
 
+@pytest.mark.parametrize("cohesion", [0.0, 0.2])
+@pytest.mark.parametrize("last", [-1e-13, 0.0, 1e-13])
+def test_modes_that_free_a_body_are_not_judged_by_its_rounding(cohesion: float, last: float) -> None:
+    # The body of the test above, pulled off: where it then is, and whether the arithmetic finds that, hangs on `last`.
+    subset = pose(np.full(2, 0.5), np.full(2, cohesion))
+    change = np.zeros((2, 4, 4))
+    change[:, 0, 0], change[:, 1, 1] = (1.0, -1.0), (1.0, -1.0)
+    change[:, 2, 2] = change[:, 3, 3] = 1.0 + last
+    change[:, 2, 0], change[:, 3, 1] = (-0.5, 0.5 + last), (-0.5, 0.5)
+    values = np.array([[1.5, 0.4, 0.1, 0.3], [1.5, 0.4 + last, 0.1, 0.3]])
+    found = settle_subset(
+        subset, Response(values, change, 1.0, 1.0), judge_by(subset),  # type: ignore[arg-type]
+        lambda modes: bool((modes.mode == STICK).any() or (modes.mode != OPEN).all()),
+    )
+    assert found.modes is None and not found.exhaustive
+
+
 @pytest.mark.parametrize("size", [2.0**-30, 2.0**30])
 def test_units_change_no_mode(size: float) -> None:
     subset = pose(np.array([0.3, 0.6, 0.9]), np.zeros(3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +29,14 @@ from pbem.parallel import (
     lacks_memory,
     world,
 )
-from pbem.passes import Target, blame_pass, blame_tries, plan_finer, recall_mesh
+from pbem.passes import Target, blame_pass, blame_tries, plan_finer, plan_graded, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide
 from pbem.results.doubts import find_smooth
 from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
 from pbem.results.overrides import choose_overrides
-from pbem.results.passes import KeptPass, keep_pass, read_refinement
+from pbem.results.passes import KeptPass, PassOutput, open_beside, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.tip_notes import compare_release
 from pbem.results.tips import TipRules
@@ -161,6 +161,7 @@ def _refine_and_solve(
         model, one = (model, one) if read is None else (recall_mesh(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
     first, tries, begun = model, 0, one.number
+    graded = one.number - 1  # accuracy, whose passes count as well, is not asked for beside
     while True:
         with clock.piece("reading"):
             mesh = generate_mesh(model)
@@ -172,10 +173,13 @@ def _refine_and_solve(
             watch.tell(line)
         for note in (*notes, *mesh.notes, *placement, *remarks) if anew else ():
             watch.note(note)
-        now = Pass(one.number, one.first_unknowns or 2 * mesh.nodes)
+        now = replace(one, first_unknowns=one.first_unknowns or 2 * mesh.nodes)
         try:
             decision = _solve(model, mesh, target, options, watch, signals, now, kept)
         except ConvergenceError as error:
+            if one.spare:
+                watch.note(f"There the contacts did not settle ({error.reason}): the results are those before.")
+                return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
             finer = None if target.resume or kept else plan_finer(
                 first, model, 2 * mesh.nodes, tries, error, watch.iterations)
@@ -184,19 +188,17 @@ def _refine_and_solve(
             watch.note(finer.note)
             model, target, tries = finer.model, Target(target.path, False, True), tries + 1
             continue
-        if decision.marked is None:
-            return
         # The next pass takes the place of this one in the file.
-        one = Pass(one.number + 1, now.first_unknowns)
-        model, target = bisect_elements(model, decision.marked, decision.gently), Target(target.path, False, True)
-
-
-@dataclass(frozen=True)
-class _Output:
-    """The open result file, on the first rank; nothing on the others. former: the pass whose place it takes."""
-
-    writer: ResultWriter | None = None
-    former: KeptPass | None = None
+        target = Target(target.path, False, True)
+        one = Pass(one.number + 1, now.first_unknowns, spare=decision.marked is None)
+        if decision.marked is not None:
+            model = bisect_elements(model, decision.marked, decision.gently)
+            continue
+        planned = plan_graded(model, decision.ends, graded)
+        watch.note(planned.note) if planned else None
+        if planned is None or planned.model is model:
+            return
+        model, graded, kept = planned.model, graded + 1, None
 
 
 def _solve(
@@ -213,13 +215,13 @@ def _solve(
         output = do_on_first(
             watch.comm, PbemError,
             lambda: _open(model, mesh, target, options, region, one, watch.comm.size), share=False,
-        ) or _Output()
+        ) or PassOutput()
     try:  # from here on whatever happens has to leave a closed file
         decision = _fill(output.writer, model, mesh, interior, watch, signals, one, kept)
     except BaseException as error:
-        told = blame_pass(error, one, 2 * mesh.nodes) if one.number > 1 and not target.resume else error
+        told = error if one.number == 1 or one.spare or target.resume else blame_pass(error, one, 2 * mesh.nodes)
         if output.writer:
-            _end_badly(output.writer, told, output.former)
+            _end_badly(output.writer, told, output.former, one.spare)
         if told is error:
             raise
         raise told from error
@@ -233,21 +235,16 @@ def _solve(
 def _open(
     model: Model, mesh: Mesh, target: Target, options: Mapping[str, str], region: Integer | None, one: Pass,
     ranks: int,
-) -> _Output:
+) -> PassOutput:
     """The result file to go on with, or a new one beside which the former pass is kept."""
     flat = [f"{name}={value}" for name, value in options.items()]
     if target.resume:
-        return _Output(ResultWriter.resume(target.path, model, mesh, ranks, petsc_version(), flat, region))
-    former = keep_pass(target.path) if one.number > 1 else None
-    try:
-        writer = ResultWriter(target.path, model, mesh, ranks, petsc_version(), flat, region, force=target.force)
-    except BaseException:
-        if former:
-            former.drop()
-        raise
-    if former:
-        former.hold()
-    return _Output(writer, former)
+        return PassOutput(ResultWriter.resume(target.path, model, mesh, ranks, petsc_version(), flat, region))
+
+    def create() -> ResultWriter:
+        return ResultWriter(target.path, model, mesh, ranks, petsc_version(), flat, region, force=target.force)
+
+    return open_beside(target.path, create) if one.number > 1 else PassOutput(create())
 
 
 def _fill(
@@ -256,7 +253,7 @@ def _fill(
 ) -> Decision:
     """Assemble, march, store the steps as they come, and judge their errors."""
     comm = watch.comm
-    if model.analysis.accuracy is not None:
+    if model.analysis.accuracy is not None or one.number > 1:
         do_on_first(comm, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
     last: Step | None = broadcast(comm, writer.last_step if writer else None)
     unfinished: Unfinished | None = broadcast(comm, writer.unfinished if writer else None)
@@ -279,18 +276,19 @@ def _fill(
     try:
         steps = clock.each("steps", march(problem, watch, start, tangent, unfinished=unfinished))
         steps = steps if kept else free_at_last(problem, steps)
-        store_steps(steps, model.output_every, interior, writer, watch, estimator, comm)
+        last = store_steps(steps, model.output_every, interior, writer, watch, estimator, comm) or last
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
         raise
     estimator.destroy()
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
-    return _conclude(writer, model, mesh, estimator, watch, one)
+    return _conclude(writer, model, mesh, estimator, watch, one, last)
 
 
 def _conclude(
-    writer: ResultWriter | None, model: Model, mesh: Mesh, estimator: Estimator, watch: Watch, one: Pass
+    writer: ResultWriter | None, model: Model, mesh: Mesh, estimator: Estimator, watch: Watch, one: Pass,
+    last: Step | None,
 ) -> Decision:
     """What follows from the errors; the file is finished, or another pass is to take its place.
 
@@ -298,8 +296,9 @@ def _conclude(
     """
     with clock.piece("estimate"):
         decision: Decision = do_on_first(
-            watch.comm, PbemError, lambda: decide(model, mesh, _check(writer).relative_errors, estimator, one)
-        )
+            watch.comm, PbemError,
+            lambda: decide(
+                model, mesh, _check(writer).relative_errors, estimator, one, None if last is None else last.contact))
     for note in decision.notes:
         watch.note(note)
     if decision.failure:
@@ -309,7 +308,7 @@ def _conclude(
     return decision
 
 
-def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | None) -> None:
+def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | None, spare: bool) -> None:
     """Close the file. A pass that was stopped can be gone on with, one that has failed gives way to the former one."""
     reached = isinstance(error, ConvergenceError) and error.reason == "accuracy"
     stopped = isinstance(error, StopError | KeyboardInterrupt) and writer.steps_stored > 0
@@ -319,7 +318,7 @@ def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | No
         former.drop()
     elif former:
         with suppress(PbemError, OSError):  # what ended the run must be what the user hears of
-            former.restore(reasons)
+            former.restore({} if spare and isinstance(error, ConvergenceError) else reasons)
 
 
 def _check(writer: ResultWriter | None) -> ResultWriter:
@@ -369,13 +368,14 @@ def store_steps(
     listener: Reporter | None = None,
     estimator: Estimator | None = None,
     comm: Comm = world,
-) -> None:
-    """Write the steps as they come, those that are stored with the field at the interior points."""
+) -> Step | None:
+    """Write the steps as they come, those that are stored with the field at the interior points; returns the last."""
     waiting: Step | None = None
+    last: Step | None = None
     try:
         for step in steps:
             stored = interior is not None and step.is_due(every)
-            waiting = None if stored else step
+            waiting, last = None if stored else step, step
             if interior is not None and stored:
                 with clock.piece("evaluation"):
                     step = replace(step, interior=interior.evaluate(step))
@@ -397,3 +397,4 @@ def store_steps(
             if writer:
                 writer.complete(field)
         raise
+    return last

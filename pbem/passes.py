@@ -9,6 +9,7 @@ from pathlib import Path
 from pbem.errors import ConvergenceError, PbemError
 from pbem.geometry.junction import format_point
 from pbem.mesh.generate import generate_mesh
+from pbem.model.end_grading import ContactEnd, grade_ends
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions, bisect_elements, count_elements, impose_fractions, mark_near
 from pbem.results.accuracy import Pass
@@ -22,6 +23,12 @@ MOST_UNKNOWNS = 5_000
 # A pass of so many iterations went on for long before it came to what failed: all of that would be done again, as often
 # as there are tries.
 MOST_ITERATIONS = 400
+# Elements are graded towards the ends of contact so many times, with so many times the elements at most; the second
+# time only where the pressure still falls by more than STILL_COARSE of the largest over the element of an end, which
+# then was not where it was looked for.
+MOST_GRADED = 2
+MOST_GROWN = 4
+STILL_COARSE = 0.1
 # So many places are named.
 MOST_NAMED = 3
 
@@ -37,7 +44,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Finer:
-    """A model with shorter elements where contacts did not settle, and a sentence that says so."""
+    """A model with shorter elements where contacts did not settle, or end, and a sentence that says so."""
 
     model: Model
     note: str
@@ -64,6 +71,31 @@ def plan_finer(
     note = (
         f"Contacts did not settle ({error.reason}) near {_list_places(model, error.places)}. Elements there are "
         f"halved, {count(after, 'element')} in place of {before}, and the run starts again from rest."
+    )
+    return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
+
+
+def plan_graded(model: Model, ends: Sequence[ContactEnd], graded: int) -> Finer | None:
+    """The model with elements graded towards the ends of contact, or as it is with the reason in the note; None if
+    there is nothing to be graded. graded: how often that was done."""
+    ends = [end for end in ends if end.fall > STILL_COARSE or not graded]
+    if not ends or graded >= MOST_GRADED:
+        return None
+    names = ", ".join(f"'{name}'" for name in {end.contact: None for end in ends})
+    where = f"Contact of {names} ends near {_list_places(model, [end.place for end in ends])}"
+    finer = grade_ends(model, ends)
+    before, after = _count_all(model), _count_all(finer)
+    if after == before:
+        return None
+    if after > MOST_GROWN * before:
+        return Finer(model, f"{where}; grading towards these ends would take {after} elements in place of {before}.")
+    try:
+        generate_mesh(finer)
+    except PbemError as error:
+        return Finer(model, f"{where}; with elements graded towards these ends there is no mesh: {error}")
+    note = (
+        f"{where}, where the pressure falls like a root. Elements are graded towards these ends, "
+        f"{after} in place of {before}, and the run starts again from rest."
     )
     return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
 

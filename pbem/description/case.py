@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
+from pbem.description.analysis_table import AnalysisTable
 from pbem.description.conflicts import find_conflicts
 from pbem.description.controls import DEEPEST, find_controls, find_depth
 from pbem.description.families import find_families, list_named, spread_conditions, spread_laws, spread_stage
@@ -25,7 +26,6 @@ from pbem.description.plain import make_plain
 from pbem.description.repair import repair
 from pbem.description.rigid_tables import ToolTable
 from pbem.description.schema import (
-    AnalysisTable,
     CaseFile,
     ConditionTable,
     ContactTable,

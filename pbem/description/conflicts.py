@@ -43,6 +43,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
     findings += _check_stages(raw)
     findings += _check_solver(raw)
     findings += _check_options(raw)
+    findings += _check_passes(raw)
     for name in ("materials", "curves", "regions", "contacts", "tools", "point_loads", "point_supports"):
         findings += [_check for loc, _ in _tables(raw, (name,)) for _check in _check_name(loc, str(loc[-1]))]
     return findings
@@ -286,6 +287,14 @@ def _check_options(raw: Mapping[str, Any]) -> list[Finding]:
         elif name in OPTION_BOUNDS and isinstance(value, str | int | float):
             findings += _check_bounds(name, value)
     return findings
+
+
+def _check_passes(raw: Mapping[str, Any]) -> list[Finding]:
+    """Refinement to an accuracy shortens the elements that need it by itself, also at ends of contact."""
+    analysis = raw.get("analysis")
+    if not isinstance(analysis, dict) or "accuracy" not in analysis or analysis.get("grade_contact_ends") is not True:
+        return []
+    return [Finding(("analysis", "grade_contact_ends"), "true beside accuracy", "one of both")]
 
 
 def _check_bounds(name: str, value: str | int | float) -> list[Finding]:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from pbem.description import law_keys
+from pbem.description.analysis_table import AnalysisTable
 from pbem.description.construction import ConstructionTable, FitTable
 from pbem.description.field_tables import (
     EigenstrainTable,
@@ -255,27 +256,6 @@ class GenerateTable(LawTable):
     )
     seed: Annotated[int, Field(strict=True, ge=0, le=2**53)] = Field(
         1, description="seed of the random numbers: the same table gives the same model on every machine"
-    )
-
-
-class AnalysisTable(Table):
-    """Choice of equations, elements and load steps."""
-
-    scheme: Literal["SST", "DBEM", "HST", "THST"] = Field(
-        "SST",
-        description='the integral equation collocated on each face. `"SST"`: displacement everywhere; `"DBEM"`: '
-        'traction on the second side of contacts; `"HST"`: traction on both sides; `"THST"`: traction everywhere. '
-        "Elements at corners and ends of contact keep the displacement equation; so do, with DBEM and HST, parts of a "
-        "contact's curves without an opposite face. Cracks always have the dual pair; narrow slots keep the "
-        "displacement equation on one face",
-    )
-    order: Annotated[int, Field(strict=True, ge=0, le=3)] = Field(2, description="polynomial order of an element")
-    tips: Flag = Field(True, description="crack-tip elements with square-root shapes")
-    steps: Count = Field(10, description="number of load steps; without effect if there are `[[stages]]`")
-    accuracy: Part | None = Field(
-        None,
-        description="refine and solve again until twice the estimated relative errors of reactions, of slips and "
-        "openings, and of K are below this value at every stored step; see `pbem help accuracy`",
     )
 
 

@@ -40,7 +40,7 @@ class Forecast:
     """Of a run on some ranks.
 
     memory: bytes of all ranks together, by what they are for; rank_memory: of the rank that has most. seconds: of wall
-    time on a core for each rank, by piece; disk: bytes of the result file. passes: whether `analysis.accuracy` asks for
+    time on a core for each rank, by piece; disk: bytes of the result file. passes: whether `[analysis]` asks for
     further solutions on finer meshes, which are not forecast. speed: None where it was not measured, and there are no
     seconds. cores_here: of the machine at hand, None where they were not counted.
     """
@@ -108,7 +108,7 @@ def make_forecast(
     return Forecast(
         ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
         memory=memory, rank_memory=_find_largest(memory, ranks, work), seconds=seconds, disk=count_disk(model, mesh),
-        passes=model.analysis.accuracy is not None, speed=speed, cores_here=cores,
+        passes=model.analysis.accuracy is not None or model.analysis.grade_contact_ends, speed=speed, cores_here=cores,
     )  # fmt: skip
 
 

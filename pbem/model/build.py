@@ -254,7 +254,8 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
         regions=(*regions, *tools), curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,
         crack_tips=topology.tips, stages=loading.stages,
         analysis=Analysis(
-            case.analysis.scheme, case.analysis.order, case.analysis.tips, case.analysis.accuracy
+            case.analysis.scheme, case.analysis.order, case.analysis.tips, case.analysis.accuracy,
+            case.analysis.grade_contact_ends,
         ),
         solver=SolverOptions(
             linear=case.solver.linear, operator=case.solver.operator, tolerance=case.solver.tolerance,
@@ -264,6 +265,8 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
         output_every=case.output.every, size=topology.size,
         interior_grid=case.output.interior.shape if case.output.interior else None,
         notes=(*topology.notes, *grading, *fitted.notes, *_note_choices(case)),
+        given_gradings=frozenset(
+            name for name, table in case.curves.items() if table.grading != "auto" or table.expression),
         initial_stress=loading.initial_stress,
         rest_gravity=loading.rest_gravity,
         contacts={name: replace(each, overlap=topology.overlaps.get(name, 0.0))

@@ -195,12 +195,14 @@ class Analysis:
     """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements.
 
     accuracy: the mesh is refined until the estimated relative error is below it; None: it is taken as it is.
+    grade_contact_ends: whether elements are graded towards the ends of contact that were found.
     """
 
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: int = 2
     tips: bool = True
     accuracy: float | None = None
+    grade_contact_ends: bool = False
 
 
 # How the operator of the integral equations is stored.
@@ -241,7 +243,8 @@ class Model:
     were when the case was read. overrides: the values that were set beside `source`, a line KEY = VALUE each.
     point_loads: where forces act at single points. point_supports: where points of free bodies are.
     notes: what the program chose for the user (grading, split legs, ...), one sentence each, for log and check.
-    refined: elements were halved after the case was read, where contacts did not settle.
+    refined: elements were halved after the case was read, where contacts did not settle or end. given_gradings: curves
+    whose grading is the user's, and those by expressions, whose elements are chords.
     """
 
     title: str
@@ -274,6 +277,7 @@ class Model:
     point_loads: Mapping[str, PointLoad] = field(default_factory=dict)
     point_supports: Mapping[str, PointSupport] = field(default_factory=dict)
     refined: bool = False
+    given_gradings: frozenset[str] = frozenset()
 
     @cached_property
     def timed(self) -> bool:

@@ -10,9 +10,12 @@ import numpy as np
 from pbem.arrays import Bool, Real
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
+from pbem.model.end_grading import ContactEnd
 from pbem.model.model import Model
 from pbem.model.refinement import count_elements
+from pbem.results.contact_ends import find_contact_ends
 from pbem.results.estimator import Estimator
+from pbem.solve.problem.step import ContactState
 
 # What `analysis.accuracy` is asked of, and how it is called.
 ASKED = {"reactions": "reactions", "jumps": "slips and openings", "factors": "K"}
@@ -74,33 +77,42 @@ def measure_reached(relative: Mapping[str, Real]) -> Reached:
 
 @dataclass(frozen=True)
 class Pass:
-    """The number of a pass, from 1 on, and the unknowns of the first one."""
+    """The number of a pass, from 1 on, and the unknowns of the first one.
+
+    spare: the former pass is finished; if this one does not converge, that one stands.
+    """
 
     number: int
     first_unknowns: int
+    spare: bool = False
 
 
 @dataclass(frozen=True)
 class Decision:
     """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`), None if
-    there is no further pass; why the accuracy cannot be reached, empty if it was or was not asked for."""
+    there is no further pass for the accuracy; why that cannot be reached, empty if it was or was not asked for; where
+    contacts end within elements that are too long, if that is asked for."""
 
     notes: tuple[str, ...] = ()
     marked: Mapping[str, Bool] | None = None
     gently: bool = False
     failure: str = ""
+    ends: tuple[ContactEnd, ...] = ()
 
 
 def decide(
-    model: Model, mesh: Mesh, relative: Mapping[str, Real], estimator: Estimator, one: Pass
+    model: Model, mesh: Mesh, relative: Mapping[str, Real], estimator: Estimator, one: Pass,
+    contact: ContactState | None = None,
 ) -> Decision:
-    """Whether a pass has met `analysis.accuracy`; decided on one rank for all.
+    """Whether a pass has met `analysis.accuracy`, and where its contacts end; decided on one rank for all.
 
-    relative: the estimated relative errors (k,) of all stored steps, NaN where unknown.
+    relative: the estimated relative errors (k,) of all stored steps, NaN where unknown. contact: of the last step.
     """
     accuracy = model.analysis.accuracy
     if accuracy is None:
-        return Decision()
+        if contact is None or not model.analysis.grade_contact_ends:
+            return Decision()
+        return Decision(ends=find_contact_ends(model, mesh, contact))
     reached = measure_reached(relative)
     unknowns = 2 * mesh.nodes
     head = f"accuracy, pass {one.number}: {unknowns} unknowns"

@@ -15,7 +15,7 @@ from pbem.wording import show
 
 def dump_configuration(model: Model) -> str:
     """JSON text of the model without the texts that it was read from and how it was made; complex points as [x, y]."""
-    texts = ("source", "notes", "law_texts", "overrides", "refined")
+    texts = ("source", "notes", "law_texts", "overrides", "refined", "given_gradings")
     return json.dumps({key: value for key, value in to_plain(model).items() if key not in texts})
 
 

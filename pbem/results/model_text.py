@@ -260,7 +260,7 @@ def describe_forecast(forecast: Forecast) -> list[str]:
         f"disk {format_bytes(forecast.disk)}",
     ]
     if forecast.passes:
-        lines.append("of the first pass: analysis.accuracy may ask for further ones, on finer meshes")
+        lines.append("of the first pass: [analysis] may ask for further ones, on finer meshes")
     return lines
 
 

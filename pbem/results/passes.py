@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from pbem.results.layout import read_fractions
 from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
 from pbem.results.trial import check_contents
+from pbem.results.writer import ResultWriter
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,26 @@ def read_refinement(path: Path) -> Refinement | None:
             return Refinement(fractions, Pass(int(attributes.get("pass", 1)), int(attributes.get("first_unknowns", 0))))
     except (OSError, KeyError, ValueError) as error:
         raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
+
+
+@dataclass(frozen=True)
+class PassOutput:
+    """The open result file, on the first rank; nothing on the others. former: the pass whose place it takes."""
+
+    writer: ResultWriter | None = None
+    former: KeptPass | None = None
+
+
+def open_beside(target: Path, create: Callable[[], ResultWriter]) -> PassOutput:
+    """A new file in the place of that of the former pass, which is kept beside it. Raises ResultFileError."""
+    former = keep_pass(target)
+    try:
+        writer = create()
+    except BaseException:
+        former.drop()
+        raise
+    former.hold()
+    return PassOutput(writer, former)
 
 
 def keep_pass(target: Path) -> KeptPass:

@@ -316,7 +316,7 @@ def compute_case(
     try:
         with clock.piece("reading"):
             model = do_on_first(comm, PbemError, lambda: _make_model(setting, values))
-        if setting.keep is not None or model.analysis.accuracy is not None:
+        if setting.keep is not None or model.analysis.accuracy is not None or model.analysis.grade_contact_ends:
             _run_with_file(setting, values, outcome, kept)
         else:
             _solve(model, setting, outcome, columns, kept, signals, place)

@@ -116,10 +116,18 @@ def lay_pin(
     clearance: float, force: float, direction: float, elements: int, operator: str = "auto", scheme: str = "SST",
     place: Place = UNMOVED,
 ) -> Model:  # fmt: skip
+    """The model of `write_pin`."""
+    return parse_model(write_pin(clearance, force, direction, elements, place, operator, scheme=scheme))[1]
+
+
+def write_pin(
+    clearance: float, force: float, direction: float, elements: int, place: Place = UNMOVED, operator: str = "auto",
+    **analysis: Any,
+) -> str:  # fmt: skip
     """A pin in the middle of a wider hole, pressed by a force on its hub towards a direction (degrees)."""
     push = cmath.rect(force, math.radians(direction))
     around = {"hole": (RADIUS + clearance, elements), "rim": (RADIUS, elements), "hub": (HUB, 12), "edge": (EDGE, 16)}
-    return parse_model(write_case({
+    return write_case({
         "materials": {"m": {"young": YOUNG * place.stress, "poisson": POISSON}},
         "curves": {name: {"center": place.point(0j), "radius": radius * place.size, "elements": count}
                    for name, (radius, count) in around.items()},
@@ -128,8 +136,8 @@ def lay_pin(
         "boundary": {"edge": {"ux": 0.0, "uy": 0.0},
                      "hub": {"rigid": {**place.force(push.real, push.imag), "rotation": 0.0}}},
         "contacts": {"seat": {"between": ["rim", "hole"]}},
-        "analysis": {"steps": 1, "scheme": scheme}, "solver": {"operator": operator},
-    }))[1]  # fmt: skip
+        "analysis": {"steps": 1, **analysis}, "solver": {"operator": operator},
+    })  # fmt: skip
 
 
 def evaluate_persson(angle: Real, half_width: float) -> Real:

@@ -1,0 +1,157 @@
+"""Where contacts end within elements that are too long for the pressure there.
+
+At the end of a contact between rounded bodies the pressure falls like the root of the distance, and beyond it the faces
+part like the distance to the power 3/2: theory, (124).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pbem.arrays import Bool, Integer, Real
+from pbem.contact.laws import OPEN, find_joint
+from pbem.mesh.mesh import Mesh, sort_pairs
+from pbem.model.end_grading import ContactEnd
+from pbem.model.model import Contact, Model
+from pbem.solve.problem.step import ContactState
+
+# Of the largest pressure of the contact: what the root falls by over the element in which contact ends, whose nodes are
+# off by at most 0.2 of it. Elements that are made for an end are so long that it falls by TOLERANCE.
+COARSE = 0.055
+TOLERANCE = 0.06
+# By so much of an element's length the ends that were found were off at most, in pins with 32 to 96 elements a circle.
+UNCERTAIN = 0.035
+# Shorter elements than by this factor are not asked for.
+MOST_SHORTENED = 2.0**-10
+# Curves turn by less where two elements meet smoothly (radians).
+SMOOTH = 1e-6
+
+
+@dataclass(frozen=True)
+class _Side:
+    """An element of a contact seen from one of its ends: distance (p,) of its pairs from there, their numbers."""
+
+    element: int
+    length: float
+    pairs: Integer
+    distance: Real
+
+
+def find_contact_ends(
+    model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
+    """The ends of contacts between rounded bodies over whose element the pressure falls by more than COARSE of the
+    contact's largest; curves whose grading is the user's are left out.
+
+    Elements are looked at on the curve that the pairs belong to. Contacts between straight curves without a gap, and
+    laws under which faces carry something before they touch or after they part, are left out.
+    """
+    found = []
+    for name, pairs in sort_pairs(mesh).items():
+        joint = find_joint(model, name)
+        if mesh.order and isinstance(joint, Contact) and _is_plain(joint):
+            curves = _list_free_curves(model, joint)
+            found += [end for end in _Pressed(mesh, contact, pairs).find(name, curves) if curves]
+    return tuple(found)
+
+
+def _is_plain(joint: Contact) -> bool:
+    law = joint.law
+    held = isinstance(law.tensile_strength, float | int) and law.tensile_strength == 0
+    return law.kind == "coulomb" and held and law.normal_stiffness is None
+
+
+def _list_free_curves(model: Model, joint: Contact) -> tuple[str, ...]:
+    """Those of both curves whose elements the program may choose; none if it is one of a body and may not."""
+    tools = {side.curve for region in model.regions if region.rigid for loop in region.loops for side in loop.sides}
+    names = (joint.first, joint.second)
+    if any(name in model.given_gradings and name not in tools for name in names):
+        return ()
+    return tuple(name for name in names if name not in tools)
+
+
+class _Pressed:
+    """The elements of one contact with their pairs, and how they are pressed."""
+
+    def __init__(self, mesh: Mesh, contact: ContactState, pairs: Integer) -> None:
+        """pairs (m,): of the contact."""
+        self._mesh = mesh
+        self._pressure = -contact.traction_n
+        self._opening = contact.opening
+        self._open: Bool = contact.mode == OPEN
+        elements = mesh.pairs.slave[pairs] // (mesh.order + 1)
+        local = mesh.node_local[mesh.pairs.slave[pairs]]
+        fraction = mesh.geometry.select(elements).fractions(local[:, None])[:, 0]
+        self._largest = float(self._pressure[pairs].max(initial=0.0))
+        self._own = {int(e): (pairs[elements == e], fraction[elements == e]) for e in np.unique(elements)}
+        self._after = {complex(mesh.start[e]): e for e in self._own}
+        self._before = {complex(mesh.end[e]): e for e in self._own}
+
+    def find(self, name: str, curves: tuple[str, ...]) -> Iterator[ContactEnd]:
+        """Its ends, those on elements that are short enough left out."""
+        for element, (pairs, _) in self._own.items():
+            if self._largest <= 0 or self._open[pairs].all():
+                continue
+            for forward in (True, False):
+                beyond = self._find_beside(element, forward)
+                if beyond is not None and self._open[self._own[beyond][0]].all():
+                    end = self._locate(name, curves, element, beyond, forward)
+                    if end is not None:
+                        yield end
+
+    def _find_beside(self, element: int, forward: bool) -> int | None:
+        """The element that goes on smoothly from one, with as many pairs as it has nodes; None if there is none."""
+        mesh = self._mesh
+        point = complex((mesh.end if forward else mesh.start)[element])
+        beside = (self._after if forward else self._before).get(point)
+        if beside is None or len(self._own[beside][0]) <= mesh.order:
+            return None
+        leaving, arriving = mesh.geometry.select(np.array([element, beside])).directions()
+        turn = leaving[1] / arriving[0] if forward else leaving[0] / arriving[1]
+        return beside if abs(np.angle(turn)) < SMOOTH else None
+
+    def _see(self, element: int, at_end: bool) -> _Side:
+        """An element from its end or its start."""
+        pairs, fraction = self._own[element]
+        length = float(self._mesh.geometry.select(np.array([element])).lengths[0])
+        return _Side(element, length, pairs, length * (1 - fraction if at_end else fraction))
+
+    def _locate(
+        self, name: str, curves: tuple[str, ...], element: int, beyond: int, forward: bool
+    ) -> ContactEnd | None:
+        """The end of contact near the point between a pressed element and an open one beyond."""
+        mesh, last, free = self._mesh, self._see(element, forward), self._see(beyond, not forward)
+        if not self._is_rounded(free):
+            return None
+        # The opening grows like the distance from the end to the power 3/2.
+        slope, start = np.polyfit(free.distance, np.maximum(self._opening[free.pairs], 0.0) ** (2 / 3), 1)
+        if not slope > 0 or not -last.length <= -start / slope <= 0.5 * free.length:
+            return None
+        at = -start / slope
+        over = self._measure_fall(last, at, forward) * np.sqrt(last.length)
+        if over <= COARSE * self._largest:
+            return None
+        shortest = last.length * max((TOLERANCE * self._largest / over) ** 2, MOST_SHORTENED)
+        inside, along = (last, 1 + at / last.length) if at <= 0 else (free, at / free.length)
+        of = mesh.geometry.select(np.array([inside.element]))
+        place = complex(of.place_fractions(np.array([[along if forward else 1 - along]]))[0, 0])
+        return ContactEnd(
+            name, place, curves, shortest, UNCERTAIN * max(last.length, free.length), over / self._largest)
+
+    def _is_rounded(self, side: _Side) -> bool:
+        """Whether the faces part as they are rounded: what straight ones do as they bend needs no more than it has."""
+        mesh, distance = self._mesh, self._mesh.pairs.distance[side.pairs]
+        sides = np.concatenate([mesh.pairs.first[side.pairs], mesh.pairs.second[side.pairs]]) // (mesh.order + 1)
+        return bool(mesh.sweep[sides].any() or np.ptp(distance) > SMOOTH * side.length)
+
+    def _measure_fall(self, last: _Side, at: float, forward: bool) -> float:
+        """What the pressure falls by per root of the distance to the end at `at`, in closed pairs of the last two
+        elements."""
+        inner = self._find_beside(last.element, not forward)
+        sides = [(last, 0.0)] if inner is None else [(last, 0.0), (self._see(inner, forward), last.length)]
+        pairs = np.concatenate([side.pairs for side, _ in sides])
+        distance = np.concatenate([side.distance + offset for side, offset in sides]) + at
+        held = ~self._open[pairs] & (distance > 0)
+        return float(self._pressure[pairs[held]].sum() / np.sqrt(distance[held]).sum()) if held.any() else 0.0

@@ -24,8 +24,8 @@ MOST_UNKNOWNS = 5_000
 # as there are tries.
 MOST_ITERATIONS = 400
 # Elements are graded towards the ends of contact so many times, with so many times the elements at most; the second
-# time only where the pressure still falls by more than STILL_COARSE of the largest over the element of an end, which
-# then was not where it was looked for.
+# time only where the pressure still falls by more than STILL_COARSE of the largest over the element of an end: it was
+# not where it was looked for, or not known well enough for shorter elements.
 MOST_GRADED = 2
 MOST_GROWN = 4
 STILL_COARSE = 0.1

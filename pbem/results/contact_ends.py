@@ -24,8 +24,8 @@ COARSE = 0.055
 TOLERANCE = 0.06
 # By so much of an element's length the ends that were found were off at most, in pins with 32 to 96 elements a circle.
 UNCERTAIN = 0.035
-# Shorter elements than by this factor are not asked for.
-MOST_SHORTENED = 2.0**-10
+# At least so long are elements, by the length in which the end is looked for.
+PER_WINDOW = 4.0
 # Curves turn by less where two elements meet smoothly (radians).
 SMOOTH = 1e-6
 
@@ -133,12 +133,14 @@ class _Pressed:
         over = self._measure_fall(last, at, forward) * np.sqrt(last.length)
         if over <= COARSE * self._largest:
             return None
-        shortest = last.length * max((TOLERANCE * self._largest / over) ** 2, MOST_SHORTENED)
+        window = UNCERTAIN * max(last.length, free.length)
+        # Where the place is not known well enough for shorter ones, it will be after them.
+        shortest = max(last.length * (TOLERANCE * self._largest / over) ** 2, window / PER_WINDOW)
         inside, along = (last, 1 + at / last.length) if at <= 0 else (free, at / free.length)
         of = mesh.geometry.select(np.array([inside.element]))
         place = complex(of.place_fractions(np.array([[along if forward else 1 - along]]))[0, 0])
         return ContactEnd(
-            name, place, curves, shortest, UNCERTAIN * max(last.length, free.length), over / self._largest)
+            name, place, curves, shortest, window, over / self._largest)
 
     def _is_rounded(self, side: _Side) -> bool:
         """Whether the faces part as they are rounded: what straight ones do as they bend needs no more than it has."""

@@ -122,11 +122,11 @@ def lay_pin(
 
 def write_pin(
     clearance: float, force: float, direction: float, elements: int, place: Place = UNMOVED, operator: str = "auto",
-    **analysis: Any,
+    *, hub: float = HUB, edge: float = EDGE, **analysis: Any,
 ) -> str:  # fmt: skip
     """A pin in the middle of a wider hole, pressed by a force on its hub towards a direction (degrees)."""
     push = cmath.rect(force, math.radians(direction))
-    around = {"hole": (RADIUS + clearance, elements), "rim": (RADIUS, elements), "hub": (HUB, 12), "edge": (EDGE, 16)}
+    around = {"hole": (RADIUS + clearance, elements), "rim": (RADIUS, elements), "hub": (hub, 12), "edge": (edge, 16)}
     return write_case({
         "materials": {"m": {"young": YOUNG * place.stress, "poisson": POISSON}},
         "curves": {name: {"center": place.point(0j), "radius": radius * place.size, "elements": count}

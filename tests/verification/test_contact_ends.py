@@ -1,0 +1,195 @@
+"""Elements graded towards the ends of contact: pressures of the pairs there, and what runs make of it."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem import driver
+from pbem.arrays import Real
+from pbem.case.build import parse_model
+from pbem.errors import CaseError, ConvergenceError
+from pbem.mesh.generate import generate_mesh
+from pbem.model.end_grading import ContactEnd, grade_ends
+from pbem.passes import MOST_GRADED, plan_graded
+from tests.verification.rigid_sample import UNMOVED, Place, evaluate_persson, find_persson_force, write_pin
+
+
+def write(path: Path, *given: Any, **analysis: Any) -> Path:
+    """A case file of a pin; see `write_pin`."""
+    path.write_text(write_pin(*given, hub=0.02, edge=300.0, **analysis))
+    return path
+
+
+def compare_pressures(results: pbem.Results, force: float, half_width: float, direction: float, place: Place) -> Real:
+    """Pressures of all pairs less those of Persson, by the largest; half_width in radians, direction in degrees."""
+    contact = results.contact["seat"]
+    at = (contact.position @ (1, 1j) - place.shift) / place.size
+    angle = np.angle(at * cmath.exp(-1j * (math.radians(direction) + place.turn)))
+    radius = float(np.abs(at).mean())
+    inside = np.abs(angle) < half_width
+    exact = np.where(inside, evaluate_persson(np.where(inside, angle, 0.0), half_width), 0.0)
+    largest = float(evaluate_persson(np.zeros(1), half_width)[0])
+    found = -np.asarray(contact.traction_n[-1]) * radius / (force * place.stress)
+    return np.asarray((found - exact) / largest)
+
+
+@pytest.mark.parametrize(
+    ("clearance", "elements", "half_width", "direction", "scheme", "place"),
+    [
+        (1e-3, 64, 50.0, 20.0, "SST", UNMOVED),
+        (1e-5, 32, 37.0, -80.0, "DBEM", Place(0.4, 3 + 1j, 1e3, 1e-3)),
+        (1e-6, 96, 66.0, 130.0, "THST", UNMOVED),
+        (1e-4, 48, 46.2, 77.0, "HST", Place(0.0, 0j, 1e-4, 2e8)),
+    ],
+)
+def test_pressures_of_a_pin_at_all_pairs(
+    tmp_path: Path, clearance: float, elements: int, half_width: float, direction: float, scheme: str, place: Place
+) -> None:
+    width = math.radians(half_width)
+    force = find_persson_force(width, clearance)
+    worst = []
+    for graded in (False, True):
+        case = write(tmp_path / "pin.toml", clearance, force, direction, elements, place, scheme=scheme,
+                     grade_contact_ends=graded)
+        results = pbem.run(case, tmp_path / "pin.h5", force=True)
+        worst.append(np.abs(compare_pressures(results, force, width, direction, place)).max())
+    assert worst[1] < 1e-2 < worst[0]
+
+
+def test_pressures_of_round_bodies_at_all_pairs(tmp_path: Path) -> None:
+    """Two rounds pressed together by P: p = p0 sqrt(1 - (x/a)^2) with P = pi a p0 / 2 (Hertz). As bodies are no
+    half-planes, a and p0 are those of the line through p^2 over x^2."""
+    load, side = 4.0, math.sqrt(0.5)
+    case = pbem.Case(**{
+        "materials": {"m": {"young": 1000.0, "poisson": 0.3}},
+        "curves": {
+            "ball": {"center": [0.0, 1.0], "radius": 1.0, "angles": [225.0, 315.0], "elements": 64},
+            "right": {"points": [[side, 1 - side], [side, 1.3]], "elements": 4},
+            "roof": {"points": [[side, 1.3], [-side, 1.3]], "elements": 6},
+            "left": {"points": [[-side, 1.3], [-side, 1 - side]], "elements": 4},
+            "bed": {"center": [0.0, -1.0], "radius": 1.0, "angles": [45.0, 135.0], "elements": 64},
+            "sides": {"points": [[-side, side - 1], [-side, -1.3]], "elements": 4},
+            "floor": {"points": [[-side, -1.3], [side, -1.3]], "elements": 6},
+            "other": {"points": [[side, -1.3], [side, side - 1]], "elements": 4},
+        },
+        "regions": {"top": {"material": "m", "boundary": ["ball", "right", "roof", "left"]},
+                    "bottom": {"material": "m", "boundary": ["bed", "sides", "floor", "other"]}},
+        "boundary": {"roof": {"rigid": {"fy": -load, "ux": 0.0, "rotation": 0.0}},
+                     "floor": {"ux": 0.0, "uy": 0.0}},
+        "contacts": {"touch": {"between": ["ball", "bed"]}},
+        "analysis": {"steps": 1, "grade_contact_ends": True},
+    })  # fmt: skip
+    results = pbem.run(case, tmp_path / "rounds.h5")
+    contact = results.contact["touch"]
+    x, pressure = contact.position[:, 0], -np.asarray(contact.traction_n[-1])
+    held = pressure > 0.2 * pressure.max()
+    slope, top = np.polyfit(x[held] ** 2, pressure[held] ** 2, 1)
+    assert math.pi * top / math.sqrt(-slope) / 2 == pytest.approx(load, rel=3e-3)
+    exact = np.sqrt(np.maximum(top + slope * x**2, 0.0))
+    assert np.abs(pressure - exact).max() < 1e-2 * math.sqrt(top)
+
+
+FORCE = find_persson_force(math.radians(50.0), 1e-3)
+
+
+def write_small(path: Path, graded: bool = True) -> Path:
+    return write(path, 1e-3, FORCE, 20.0, 32, steps=2, grade_contact_ends=graded)
+
+
+def test_a_run_that_was_stopped_on_the_graded_mesh_goes_on_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = write_small(tmp_path / "pin.toml")
+    results = pbem.run(case, tmp_path / "whole.h5")
+    whole, passes = np.asarray(results.contact["seat"].traction_n), results.fractions
+    assert passes is not None
+    march, marches = driver.march, []
+
+    def stop(*given: Any, **named: Any) -> Iterator[Any]:
+        marches.append(given)
+        for number, step in enumerate(march(*given, **named)):
+            if len(marches) == 2 and number == 1:
+                raise KeyboardInterrupt
+            yield step
+
+    with monkeypatch.context() as patch:
+        patch.setattr(driver, "march", stop)
+        with pytest.raises(KeyboardInterrupt):
+            pbem.run(case, tmp_path / "part.h5")
+    assert len(marches) == 2
+    results = pbem.run(case, tmp_path / "part.h5", resume=True)
+    assert results.status == "finished"
+    np.testing.assert_allclose(np.asarray(results.contact["seat"].traction_n), whole, rtol=0,
+                               atol=1e-9 * np.abs(whole).max())
+
+
+def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
+    plain = np.asarray(results.contact["seat"].traction_n)
+    march, marches = driver.march, []
+
+    def fail(*given: Any, **named: Any) -> Iterator[Any]:
+        marches.append(given)
+        if len(marches) > 1:
+            raise ConvergenceError("mode cycle", "pairs that still change")
+        yield from march(*given, **named)
+
+    monkeypatch.setattr(driver, "march", fail)
+    results = pbem.run(write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5")
+    assert len(marches) == 2 and results.status == "finished"
+    np.testing.assert_array_equal(np.asarray(results.contact["seat"].traction_n), plain)
+    assert not list(tmp_path.glob("pin.h5?*"))
+
+
+def test_rows_of_a_sweep_are_those_of_single_runs(tmp_path: Path) -> None:
+    case = write_small(tmp_path / "pin.toml")
+    table = pbem.sweep(case, {"boundary.hub.rigid.fx": [0.8 * FORCE, FORCE]}, ["contact.seat.traction_n.min"])
+    for found, push in zip(table["contact.seat.traction_n.min"], (0.8 * FORCE, FORCE), strict=True):
+        results = pbem.run(case, tmp_path / "one.h5", force=True, set={"boundary.hub.rigid.fx": push})
+        least = float(np.asarray(results.contact["seat"].traction_n)[-1].min())
+        assert found == pytest.approx(least, rel=1e-9)
+
+
+def test_curves_whose_grading_is_given_are_left_alone(tmp_path: Path) -> None:
+    text = write_small(tmp_path / "own.toml").read_text().replace("elements = 32", 'elements = 32, grading = "none"')
+    (tmp_path / "own.toml").write_text(text)
+    assert 'grading = "none"' in text
+    results = pbem.run(tmp_path / "own.toml", tmp_path / "own.h5")
+    assert results.fractions is None
+
+
+def test_elements_grow_with_the_distance_from_an_end() -> None:
+    model = parse_model(write_pin(1e-3, FORCE, 20.0, 32))[1]
+    place = cmath.rect(1.0, 6.2)  # beside the joint of the circle's both ends
+    long = 2 * math.pi / 32
+    end = ContactEnd("seat", place - model.origin, ("rim",), long / 50, 0.05 * long)
+    finer = grade_ends(model, [end])
+    assert finer.curves["hole"] == model.curves["hole"]
+    mesh = generate_mesh(finer)
+    rim = np.abs(np.abs(mesh.start + model.origin) - 1.0) < 1e-6
+    angle = np.mod(np.angle(mesh.start[rim] + model.origin), 2 * math.pi)
+    lengths = mesh.geometry.lengths[rim]
+    apart = np.minimum(np.abs(angle + 0.5 * lengths - 6.2), 2 * math.pi - np.abs(angle + 0.5 * lengths - 6.2))
+    assert lengths[apart.argmin()] <= long / 50 and lengths.max() == pytest.approx(long)
+    assert (lengths <= long / 50 + 3 * np.maximum(apart - 0.5 * lengths, 0.0) + 1e-9).all()
+    assert lengths.sum() == pytest.approx(2 * math.pi)
+    assert plan_graded(model, [end], MOST_GRADED) is None and plan_graded(model, [], 0) is None
+    assert plan_graded(finer, [end], 0) is None  # short enough
+    crowd = [ContactEnd("seat", cmath.rect(1.0, 0.2 * k) - model.origin, ("rim",), long / 500, 0.0) for k in range(31)]
+    many = plan_graded(model, crowd, 0)
+    assert many is not None and many.model is model and "in place of" in many.note
+
+
+def test_grading_is_refused_beside_accuracy() -> None:
+    with pytest.raises(CaseError, match=r"grade_contact_ends.*true beside accuracy"):
+        parse_model(write_pin(1e-3, FORCE, 20.0, 32, grade_contact_ends=True, accuracy=1e-2))

@@ -40,10 +40,9 @@ class _Side:
     distance: Real
 
 
-def find_contact_ends(
-    model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
+def find_contact_ends(model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
     """The ends of contacts between rounded bodies over whose element the pressure falls by more than COARSE of the
-    contact's largest; curves whose grading is the user's are left out.
+    contact's largest (theory, 124); curves whose grading is the user's are left out.
 
     Elements are looked at on the curve that the pairs belong to. Contacts between straight curves without a gap, and
     laws under which faces carry something before they touch or after they part, are left out.
@@ -146,7 +145,9 @@ class _Pressed:
         """Whether the faces part as they are rounded: what straight ones do as they bend needs no more than it has."""
         mesh, distance = self._mesh, self._mesh.pairs.distance[side.pairs]
         sides = np.concatenate([mesh.pairs.first[side.pairs], mesh.pairs.second[side.pairs]]) // (mesh.order + 1)
-        return bool(mesh.sweep[sides].any() or np.ptp(distance) > SMOOTH * side.length)
+        leaving, arriving = mesh.geometry.select(sides).directions()
+        turns = np.abs(np.angle(arriving / leaving))
+        return bool(turns.max() > SMOOTH or np.ptp(distance) > SMOOTH * side.length)
 
     def _measure_fall(self, last: _Side, at: float, forward: bool) -> float:
         """What the pressure falls by per root of the distance to the end at `at`, in closed pairs of the last two

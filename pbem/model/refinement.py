@@ -234,7 +234,10 @@ def _divide_marked(leg: Leg, marked: Bool, gently: bool, tips: tuple[bool, bool]
         return leg
     parts = np.full(leg.elements, 0.5)
     if leg.elements > 1 or not all(tips):
-        parts[0], parts[-1] = (TIP_PART if tips[0] else parts[0]), (1 - TIP_PART if tips[1] else parts[-1])
+        if tips[0]:
+            parts[0] = TIP_PART
+        if tips[1]:
+            parts[-1] = 1 - TIP_PART
     at: list[float] = [0.0]  # new ends, in numbers of elements
     number = 0
     while number < leg.elements:

@@ -15,6 +15,7 @@ from pbem.mesh.interpolation import locate_nodes
 from pbem.model.model import Model
 from pbem.model.refinement import (
     TIP_PART,
+    _divide_marked,
     bisect_elements,
     coarsen_model,
     count_elements,
@@ -172,3 +173,11 @@ def test_chains_are_listed_in_the_direction_of_their_curves(plate: Model) -> Non
         middle = 0.5 * (mesh.start + mesh.end)[elements]
         assert (np.diff(np.abs(middle - leg.start)) > 0).all()
     assert locate_nodes(mesh).shape == (mesh.elements, mesh.order + 1)
+
+
+@pytest.mark.parametrize("at_end", [False, True])
+def test_a_single_element_at_a_tip_is_divided_alike_from_either_end(at_end: bool) -> None:
+    leg = Leg(0j, 1 + 0j, 1)
+    divided = _divide_marked(leg, np.ones(1, dtype=bool), False, (not at_end, at_end))
+    longest = 1 - divided.element_fractions()[1] if at_end else divided.element_fractions()[1]
+    assert longest == pytest.approx(TIP_PART)

@@ -80,13 +80,12 @@ class Checkpoint:
 
     def take(self, course: Course) -> None:
         """Note that an iteration begins with this."""
-        self._course, self._count = course, len(self._iterations)
-        self._of_tangent = self._tangent.remember(self._load)
+        self._course = course
         self.follow()
 
     def follow(self) -> None:
         """Note what the parts remember by now, with the same course: between iterations that only they know of."""
-        self._count = len(self._iterations)
+        self._count, self._of_tangent = len(self._iterations), self._tangent.remember(self._load)
         self._memories = {
             name: {key: copy.copy(value) for key, value in vars(part).items() if key not in GIVEN[name]}
             for name, part in self._parts.items()

@@ -237,8 +237,10 @@ class KrylovTangent(TangentOperator):
         self._left.set(0.0)
         usual = self._solver.getTolerances()
         self._solver.setTolerances(rtol=0.0, atol=max(goal, self._least))
-        self._run_gmres()
-        self._solver.setTolerances(*usual)
+        try:
+            self._run_gmres()
+        finally:
+            self._solver.setTolerances(*usual)
         self.iterations.append(int(self._solver.getIterationNumber()))
         return replace(now, part=now.part + np.array(self._left.getArray()), residual=-self._space.residual)
 

@@ -108,7 +108,7 @@ def _leave(rank: int) -> None:
     """End this process of several where runs do not yet, or no longer, stop together.
 
     Others may be anywhere, also within the start of MPI: its end, which Python asks for at its own, would wait for them
-    for ever. A launcher that sees a process leave without it ends the others.
+    for ever. A launcher that sees a process leave without it ends the others (srun: with --kill-on-bad-exit).
     """
     if rank > 0:
         time.sleep(1.0)

@@ -178,7 +178,9 @@ def _refine_and_solve(
             decision = _solve(model, mesh, target, options, watch, signals, now, kept)
         except ConvergenceError as error:
             if one.spare:
-                watch.note(f"There the contacts did not settle ({error.reason}): the results are those before.")
+                watch.note(
+                    f"The run on these elements did not converge ({error.reason}): the results are those before."
+                )
                 return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
             finer = None if target.resume or kept else plan_finer(
@@ -195,8 +197,10 @@ def _refine_and_solve(
             model = bisect_elements(model, decision.marked, decision.gently)
             continue
         planned = plan_graded(model, decision.ends, graded)
-        watch.note(planned.note) if planned else None
-        if planned is None or planned.model is model:
+        if planned is None:
+            return
+        watch.note(planned.note)
+        if planned.model is model:
             return
         model, graded, kept = planned.model, graded + 1, None
 

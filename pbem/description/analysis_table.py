@@ -32,6 +32,6 @@ class AnalysisTable(Table):
     grade_contact_ends: Flag = Field(
         False,
         description="where contact of rounded faces ends within an element that is too long for the fall of the "
-        "pressure there, shorten the elements of both curves towards that end and solve again from rest; curves with "
-        'a `grading` other than `"auto"` are left as they are; see `pbem help accuracy`',
+        "pressure there, shorten the elements of both curves towards that end and solve again from rest; contacts one "
+        'of whose curves has a `grading` other than `"auto"` are left as they are; see `pbem help accuracy`',
     )

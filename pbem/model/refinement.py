@@ -24,8 +24,8 @@ COARSE = 0.8
 KEPT = 0.05
 # Of elements that meet the longer is at most so many times as long, where elements are halved.
 WIDEST_RATIO = 2.0
-# The jump follows the root of the distance over the elements next to a tip, which are halved together: with unequal
-# ones K and the jumps are off by far more.
+# The jump follows the root of the distance over the elements next to a tip, which are divided together: where one of
+# them is left as it is, K and the jumps are off by far more.
 EQUAL_AT_TIPS = 3
 # That on a tip is divided at this part of its length, so that it stays twice as long as the next one: beyond it the
 # root is a polynomial, which follows it the better the farther from the tip. With equal elements the error of the jump

@@ -37,6 +37,8 @@ FAR = 8.0
 ALIKE = 0.1
 # And those with nearly the energy of the last one that is: what is symmetrical stays so.
 AS_LAST = 0.9
+# And those whose jumps are off by more than this part of the error that the estimates may have.
+LOCAL = 0.5
 # Elements shorter by this factor bring the error below the accuracy if it falls with the power order + 1: then there is
 # no need to halve.
 NEAR = 1.5
@@ -153,7 +155,7 @@ def mark_elements(
         by_curve[name][2] = np.maximum(by_curve[name][2], jumps[elements])
     *kinds, local = np.concatenate(list(by_curve.values()), axis=1)
     part = LARGE_PART if worst > FAR * accuracy else PART
-    chosen = local > max(0.5 * accuracy / SAFETY, NEAR_WORST * local.max(initial=0.0))
+    chosen = local > max(LOCAL * accuracy / SAFETY, NEAR_WORST * local.max(initial=0.0))
     for each in kinds:
         if each.sum() >= SMALL_KIND * energy.sum():
             order = np.argsort(-each, kind="stable")

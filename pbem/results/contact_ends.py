@@ -42,7 +42,7 @@ class _Side:
 
 def find_contact_ends(model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
     """The ends of contacts between rounded bodies over whose element the pressure falls by more than COARSE of the
-    contact's largest (theory, 124); curves whose grading is the user's are left out.
+    contact's largest (theory, 124); contacts one of whose curves has a grading of the user's are left out.
 
     Elements are looked at on the curve that the pairs belong to. Contacts between straight curves without a gap, and
     laws under which faces carry something before they touch or after they part, are left out.
@@ -138,8 +138,7 @@ class _Pressed:
         inside, along = (last, 1 + at / last.length) if at <= 0 else (free, at / free.length)
         of = mesh.geometry.select(np.array([inside.element]))
         place = complex(of.place_fractions(np.array([[along if forward else 1 - along]]))[0, 0])
-        return ContactEnd(
-            name, place, curves, shortest, window, over / self._largest)
+        return ContactEnd(name, place, curves, shortest, window, over / self._largest)
 
     def _is_rounded(self, side: _Side) -> bool:
         """Whether the faces part as they are rounded: what straight ones do as they bend needs no more than it has."""

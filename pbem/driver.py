@@ -178,9 +178,7 @@ def _refine_and_solve(
             decision = _solve(model, mesh, target, options, watch, signals, now, kept)
         except ConvergenceError as error:
             if one.spare:
-                watch.note(
-                    f"The run on these elements did not converge ({error.reason}): the results are those before."
-                )
+                watch.note(f"The run on that mesh did not converge ({error.reason}): the results are those before.")
                 return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
             finer = None if target.resume or kept else plan_finer(

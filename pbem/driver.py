@@ -109,8 +109,7 @@ def run(
             with clock.piece("reading"):
                 model = do_on_first(comm, PbemError, lambda: _make_model(
                     case, name, operator, choose_overrides(target, set) if resume else set, label))
-            inputs = [*([path] if path else []), *map(Path, model.law_texts)]
-            with clock.piece("reading"):
+                inputs = [*([path] if path else []), *map(Path, model.law_texts)]
                 do_on_first(comm, PbemError, lambda: check_output_path(
                     target, resume=resume, force=force, source=model.source, overrides=model.overrides, inputs=inputs))
                 do_on_first(comm, PbemError, lambda: check_options(name, model.solver.petsc, petsc or {}))
@@ -160,8 +159,8 @@ def _refine_and_solve(
         read = do_on_first(watch.comm, PbemError, lambda: read_refinement(target.path))
         model, one = (model, one) if read is None else (recall_mesh(model, read.fractions), read.one)
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
-    first, tries, begun = model, 0, one.number
-    graded = one.number - 1  # accuracy, whose passes count as well, is not asked for beside
+    # Passes for an accuracy count as graded ones, but never are both asked for.
+    first, tries, begun, graded = model, 0, one.number, one.number - 1
     while True:
         with clock.piece("reading"):
             mesh = generate_mesh(model)
@@ -181,8 +180,8 @@ def _refine_and_solve(
                 watch.note(f"The run on that mesh did not converge ({error.reason}): the results are those before.")
                 return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
-            finer = None if target.resume or kept else plan_finer(
-                first, model, 2 * mesh.nodes, tries, error, watch.iterations)
+            once = target.resume or kept
+            finer = None if once else plan_finer(first, model, 2 * mesh.nodes, tries, error, watch.iterations)
             if finer is None:
                 raise blame_tries(error, tries, 2 * mesh.nodes) from error
             watch.note(finer.note)
@@ -195,10 +194,9 @@ def _refine_and_solve(
             model = bisect_elements(model, decision.marked, decision.gently)
             continue
         planned = plan_graded(model, decision.ends, graded)
-        if planned is None:
-            return
-        watch.note(planned.note)
-        if planned.model is model:
+        if planned:
+            watch.note(planned.note)
+        if planned is None or planned.model is model:
             return
         model, graded, kept = planned.model, graded + 1, None
 

@@ -221,3 +221,31 @@ def test_a_body_is_free_to_move_only_if_nothing_could_hold_it(
     assert find_reason(problem, start_memory(problem.laws), 1, 1.0, error).reason == expected
     settled = ConvergenceError("free motion", "nothing prevents a translation")
     assert find_reason(problem, start_memory(problem.laws), 1, 1.0, settled) is settled
+
+
+@pytest.mark.parametrize(("unit", "shift"), [(1.0, 0.0), (1e3, 1e3)])
+@pytest.mark.parametrize("forced", [False, True], ids=["held", "forced"])
+def test_rigid_tools_bear_what_holds_them_and_no_more_than_forces_give(
+    forced: bool, unit: float, shift: float
+) -> None:
+    """A block of 2 x 1 pressed and pushed on a rigid floor, or the floor, by forces, along the block that is held."""
+    curves = {"bottom": (0, 2), "right": (2, 2 + 1j), "top": (2 + 1j, 1j), "left": (1j, 0), "floor": (0, 2)}
+    tools, tops = [], []
+    for push in (0.0, 0.7):
+        tools.append({"fx": 2 * unit * push, "fy": 2 * unit, "moment": 0.0} if forced else
+                     {"ux": 0.0, "uy": 0.0, "rotation": 0.0})
+        tops.append({"ux": 0.0, "uy": 0.0} if forced else {"tx": push, "ty": -1.0})
+    text = write_case(
+        {
+            "materials": BLOCKS["materials"],
+            "curves": {name: {"points": [(z + shift * (1 + 1j)) * unit for z in ends], "elements": 4}
+                       for name, ends in curves.items()},
+            "regions": {"block": {"material": "m", "boundary": ["bottom", "right", "top", "left"]}},
+            "boundary": {"top": tops[0]},
+            "tools": {"floor": tools[0]},
+            "contacts": {"joint": {"between": ["bottom", "floor"], "friction": 0.25}},
+            "stages": [{"name": name, "steps": 1, "boundary": {"top": tops[k]}, "tools": {"floor": tools[k]}}
+                       for k, name in enumerate(("press", "push"))],
+        }
+    )  # fmt: skip
+    assert find(text) == pytest.approx(0.25 / 0.7, rel=1e-2)

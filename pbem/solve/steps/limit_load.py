@@ -54,16 +54,21 @@ def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -
 
 def is_driven(problem: Problem, stage: int, fraction: float, motions: Sequence[RigidBodyMode]) -> bool:
     """Whether the loads at a fraction of a stage do work on one of these motions of bodies."""
-    mesh = problem.mesh
-    _, given = _collect_given(problem, problem.evaluate_load(stage, fraction))
+    mesh, load = problem.mesh, problem.evaluate_load(stage, fraction)
+    _, given = _collect_given(problem, load)
     force = np.where(mesh.node_crack, 0.0, mesh.weight) * (given[::2] + 1j * given[1::2])
     for motion in motions:
-        work = np.zeros(mesh.nodes)
+        work = np.zeros(mesh.nodes + 3 * len(mesh.region_names))
         for number, name in enumerate(mesh.region_names):
             if name in motion.velocities:
-                own = mesh.node_region == number
+                own = np.flatnonzero(mesh.node_region == number)
                 shift, spin = motion.velocities[name]
                 work[own] = (np.conj(shift + 1j * spin * mesh.position[own]) * force[own]).real
+                support = problem.model.regions[number].material.rigid
+                if support is not None:
+                    moved = shift + 1j * spin * support.about
+                    work[mesh.nodes + 3 * number + np.arange(3)] = (
+                        _find_push(problem, number, load) * [moved.real, moved.imag, spin])
         if abs(work.sum()) > BALANCED * np.abs(work).sum():
             return True
     return False
@@ -100,15 +105,24 @@ def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target:
 def _sum_up(
     problem: Problem, loads: list[Load], regions: Integer
 ) -> tuple[sparse.csr_matrix, Real, Real]:
-    """Force and moment over length of every region (3 k,): what unknown tractions add (3 k, 2 nodes), and loads."""
+    """Force and moment over length of every region (3 k,): what unknown tractions add (3 k, 2 nodes), and loads.
+
+    Of rigid tools those that are given; what holds a given motion bears anything.
+    """
     mesh = problem.mesh
     maps, known = zip(*(_collect_given(problem, load) for load in loads), strict=True)
     weight = np.where(mesh.node_crack, 0.0, mesh.weight)
     rows, columns, values = [], [], []
+    pushes, balances = np.zeros((2, 3 * len(regions))), np.ones(3 * len(regions), dtype=bool)
     for row, region in enumerate(regions):
         own = np.flatnonzero(mesh.node_region == region)
-        lever = mesh.position[own] - mesh.position[own].mean()
-        lever = lever / np.abs(lever).max()
+        support = problem.model.regions[region].material.rigid
+        lever = mesh.position[own] - (mesh.position[own].mean() if support is None else support.about)
+        reach = np.abs(lever).max()
+        lever = lever / reach
+        if support is not None:
+            balances[3 * row : 3 * row + 3] = support.forced
+            pushes[:, 3 * row : 3 * row + 3] = [_find_push(problem, region, load) / [1, 1, reach] for load in loads]
         for part, along in enumerate((np.ones_like(lever), np.full_like(lever, 1j), 1j * lever)):
             for component, value in enumerate((along.real, along.imag)):
                 rows.append(np.full(len(own), 3 * row + part))
@@ -116,8 +130,16 @@ def _sum_up(
                 values.append(weight[own] * value)
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     resultant = sparse.csr_matrix(entries, shape=(3 * len(regions), 2 * mesh.nodes))
-    before, after = (resultant @ each for each in known)
-    return resultant @ maps[0].matrix[2 * mesh.nodes :], before, after
+    before, after = (resultant @ each + push for each, push in zip(known, pushes, strict=True))
+    matrix = resultant @ maps[0].matrix[2 * mesh.nodes :]
+    return matrix[balances], before[balances], after[balances]
+
+
+def _find_push(problem: Problem, region: int, load: Load) -> Real:
+    """The forces along x and y and the moment (3,) that are given of a rigid tool, about its point; else 0."""
+    name, support = problem.mesh.region_names[region], problem.model.regions[region].material.rigid
+    assert support is not None
+    return np.where(support.forced, load.rigid[list(problem.model.rigid).index(name)], 0.0)
 
 
 def _collect_given(problem: Problem, load: Load) -> tuple[ConstraintMap, Real]:

@@ -6,7 +6,11 @@ keeps what went wrong and answers with no strength, until all ranks ask together
 
 from __future__ import annotations
 
+import math
+import os
+import sys
 import types
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,8 +21,13 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.contact.declaration import FrictionLaw, Slide
 from pbem.contact.friction_bound import Strength
+from pbem.errors import StopError
 
 PARTS = ("bound", "by_traction", "by_slip")
+# Products of two parts have to be numbers.
+LARGEST = math.sqrt(sys.float_info.max)
+# So many characters are told of what a law says itself when it fails.
+MOST_TOLD = 300
 EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays with the shape of p_n"
 
 
@@ -31,13 +40,15 @@ class CustomLaw(FrictionLaw):
     """
 
     def __init__(self, file: str, text: str) -> None:
-        """Raises ValueError if the file does not run or has no such function."""
+        """A file that does not run, or has no such function, is a fault from the beginning."""
         self.file = file
         self.fault = ""
         self.sums = np.zeros(6)
-        self._function = _run(file, text).get("strength")
-        if not callable(self._function):
-            raise ValueError(f"{file} defines no function named strength")
+        self._function: Any = None
+        with self._noting_what_fails(), _kept_surroundings():
+            self._function = _run(file, text).get("strength")
+        if not self.fault and not callable(self._function):
+            self.fault = f"the law {file} defines no function named strength; expected {EXPECTED}"
 
     def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:
         """As of any law, at the slip path so far; of one that fails, zeros (see `fault`)."""
@@ -55,12 +66,12 @@ class CustomLaw(FrictionLaw):
         return answer
 
     def _ask(self, p_n: Real, slip: Real, parameters: Mapping[str, Real]) -> Strength | None:
-        try:
-            answer = self._function(_protect(p_n), _protect(slip),  # type: ignore[misc]
+        parts: dict[str, Real] = {}
+        with self._noting_what_fails(), _kept_surroundings():
+            answer = self._function(_protect(p_n), _protect(slip),
                                     **{name: _protect(values) for name, values in parameters.items()})
             parts = {name: _read_part(getattr(answer, name)) for name in PARTS}
-        except (Exception, SystemExit) as error:  # a user's file may raise anything
-            self.fault = f"the law {self.file} fails ({type(error).__name__}: {error}); expected {EXPECTED}"
+        if self.fault:
             return None
         for name, values in parts.items():
             wrong = _judge(name, values, p_n, slip)
@@ -69,14 +80,42 @@ class CustomLaw(FrictionLaw):
                 return None
         return Strength(**parts)
 
+    @contextmanager
+    def _noting_what_fails(self) -> Iterator[None]:
+        """A user's file may raise anything; what stops the run is none of its faults."""
+        try:
+            yield
+        except (StopError, KeyboardInterrupt):
+            raise
+        except BaseException as error:
+            self.fault = f"the law {self.file} fails ({_describe(error)}); expected {EXPECTED}"
+
+
+def _describe(error: BaseException) -> str:
+    try:
+        text = " ".join(str(error).split())
+    except Exception:  # errors of one's own may fail to say what they are
+        text = "it cannot be told"
+    return f"{type(error).__name__}: {text if len(text) <= MOST_TOLD else text[:MOST_TOLD].rstrip() + ' ...'}"
+
+
+@contextmanager
+def _kept_surroundings() -> Iterator[None]:
+    """What a file may change for the whole program is set back: NumPy's errors, filters of warnings, the directory."""
+    folder, filters = os.getcwd(), list(warnings.filters)
+    try:
+        with np.errstate():
+            yield
+    finally:
+        os.chdir(folder)
+        if warnings.filters != filters:  # `catch_warnings` would make each warning be told again at each call
+            warnings.filters[:] = filters  # type: ignore[index]
+
 
 def _run(file: str, text: str) -> dict[str, Any]:
     module = types.ModuleType(Path(file).stem)
     module.__file__ = file
-    try:
-        exec(compile(text, file, "exec"), module.__dict__)
-    except SystemExit as error:
-        raise ValueError(f"{file} ends the program (SystemExit: {error})") from error
+    exec(compile(text, file, "exec"), module.__dict__)
     return module.__dict__
 
 
@@ -96,7 +135,7 @@ def _read_part(values: Any) -> Real:
 def _judge(name: str, values: Real, p_n: Real, slip: Real) -> str:
     if values.shape != p_n.shape:
         return f"gives a {name} of shape {values.shape} for a p_n of shape {p_n.shape}"
-    wrong = np.flatnonzero(~np.isfinite(values))
+    wrong = np.flatnonzero(~(np.abs(values) < LARGEST))
     if len(wrong):
         first = wrong[0]
         return f"gives {name} = {values[first]:g} at p_n = {p_n[first]:.6g} and slip = {slip[first]:.6g}"

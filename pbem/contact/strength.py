@@ -17,7 +17,7 @@ import numpy as np
 from pbem.arrays import Bool, Real
 from pbem.contact.barton_bandis import BartonBandis, DilatingJoint
 from pbem.contact.cohesive import COHESIVE
-from pbem.contact.custom import CustomLaw, read_law_texts
+from pbem.contact.custom import EXPECTED, CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
 from pbem.contact.dilating import ConstantDilation
 from pbem.contact.friction_bound import Strength
@@ -165,8 +165,9 @@ def _try(law: Law) -> str:
     """What goes wrong when the law is asked for its strength at two pairs; "" if nothing does."""
     try:
         function, parameters = choose_strength(law)
-        assert isinstance(function, CustomLaw)
+    except (OSError, ValueError) as error:
+        return f"a file that cannot be read ({type(error).__name__}: {error})"
+    assert isinstance(function, CustomLaw)
+    if not function.fault:
         function(-np.ones(2), np.zeros(2), **{name: np.full(2, value) for name, value in parameters.items()})
-        return function.fault.partition("; expected")[0]
-    except Exception as error:  # a user's file may raise anything
-        return f"a law that fails ({type(error).__name__}: {error})"
+    return function.fault.removesuffix(f"; expected {EXPECTED}")

@@ -42,6 +42,7 @@ WRONG = {
     "exits": ("if calls > 3: sys.exit(0)", "law.py fails (SystemExit: 0)"),
     "exits on one rank": ("if calls > 3 and rank == 1: sys.exit(0)", "law.py fails (SystemExit: 0)"),
     "other shape": ("if calls > 3: friction = 0.2; p_n = p_n[:1]", "law.py gives a bound of shape (1,)"),
+    "leaves on one rank": ("if calls > 3 and rank == 1: raise GeneratorExit", "law.py fails (GeneratorExit: )"),
     "other ranks": ("friction = friction * (1 + 0.1 * rank)", "law.py answers differently on different ranks"),
 }
 
@@ -65,6 +66,14 @@ def test_a_law_that_goes_wrong_ends_all_ranks(what: str, ranks: int, folder: Pat
     results = open_results(folder / "case.h5")
     assert results.status == "failed" and said in results.failure
     assert np.isfinite(results.traction).all()
+
+
+def test_a_file_that_fails_on_one_rank_ends_all(folder: Path) -> None:
+    (folder / "law.py").write_text(LAW.replace("CHANGE", "pass").replace("\ndef ", "\nassert rank == 0\ndef "))
+    done = launch(2, "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 1, done.stderr
+    said = "law.py fails (AssertionError: )"
+    assert done.stderr.count(said) == 1 and "Traceback" not in done.stderr, done.stderr
 
 
 def test_the_text_of_a_law_is_stored_and_compared(folder: Path) -> None:

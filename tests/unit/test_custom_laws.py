@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 from pbem.case.build import read_checked_model
 from pbem.contact.custom import CustomLaw, find_fault
 from pbem.contact.strength import coulomb
-from pbem.errors import CaseError
+from pbem.errors import CaseError, StopError
 from tests.unit.case_sample import BLOCKS, change
 
 GOOD = """
@@ -76,6 +78,10 @@ ARGUMENTS = {"p_n": np.array([-2.0, -1.0, 0.0]), "slip": np.array([0.0, 0.1, 0.2
         ("p_n = np.where(p_n < -1.5, np.nan, p_n)", "bound = nan at p_n = -2 and slip = 0"),
         ("friction = friction / 0", "bound = inf"), ("friction = 'much'", "TypeError: bad operand"),
         ("return Strength(p_n > -1, p_n * 1j, p_n)", "complex numbers"),
+        ("raise GeneratorExit('x')", "GeneratorExit: x"),
+        ("raise type('Odd', (BaseException,), {})('x')", "Odd: x"), ("friction = friction * 1e200", "bound = 1e+200"),
+        ("raise type('Mute', (ValueError,), {'__str__': lambda _: 1 / 0})", "Mute: it cannot be told"),
+        ("raise ValueError('y\\n' * 10**6)", "y y y ...); expected"),
     ],
 )
 def test_what_a_law_does_wrong_is_kept_with_its_file(change: str, said: str) -> None:
@@ -88,6 +94,32 @@ def test_what_a_law_does_wrong_is_kept_with_its_file(change: str, said: str) -> 
     for name, values in ARGUMENTS.items():
         np.testing.assert_array_equal(given[name], values)
     assert find_fault([coulomb, law]) == law.fault
+
+
+def test_a_file_that_fails_later_is_a_fault_of_the_law() -> None:
+    # On another rank, or when the file has changed: what others wait for must not be left by an exception.
+    for text in ("1 / 0", "exit()", "raise GeneratorExit", "def (", "strength = 3"):
+        law = make_law(text)
+        assert law.fault.startswith("the law my_law.py "), law.fault
+        np.testing.assert_array_equal(law(**ARGUMENTS).bound, np.zeros(3))
+
+
+def test_a_signal_within_a_law_stops_the_run() -> None:
+    for stop in ("KeyboardInterrupt", "StopError('SIGTERM', 'stopped')"):
+        text = GOOD.replace("    return", f"    raise {stop}\n    return")
+        law = make_law("from pbem.errors import StopError" + text)
+        with pytest.raises((KeyboardInterrupt, StopError)):
+            law(**ARGUMENTS)
+        assert law.fault == ""
+
+
+def test_what_a_law_sets_for_the_whole_program_is_set_back(tmp_path: Path) -> None:
+    folder, filters, treatment = os.getcwd(), list(warnings.filters), np.geterr()
+    setting = f"import os, warnings; os.chdir({str(tmp_path)!r}); np.seterr(all='raise')"
+    setting += "; warnings.simplefilter('error')"
+    law = make_law(setting + GOOD.replace("    return", f"    {setting}\n    return"))
+    np.testing.assert_array_equal(law(**ARGUMENTS).bound, [1.0, 0.5, 0.0])
+    assert (os.getcwd(), list(warnings.filters), np.geterr(), law.fault) == (folder, filters, treatment, "")
 
 
 def test_what_a_law_keeps_of_its_answers_does_not_change_them() -> None:

@@ -113,6 +113,23 @@ def test_no_iteration_is_made_twice(operator: str, tmp_path: Path) -> None:
             np.testing.assert_array_equal(results.convergence[name], whole.convergence[name])
 
 
+@pytest.mark.parametrize(("one", "other"), [("dense", "hierarchical"), ("hierarchical", "dense")])
+def test_a_search_goes_on_with_another_operator(one: str, other: str, tmp_path: Path, whole: Results) -> None:
+    """Of the search only the modes are of use then: the step begins with them."""
+    make_case(tmp_path)
+    case, path = tmp_path / "case.toml", tmp_path / "case.h5"
+    with pytest.raises(StopError):
+        pbem.run(case, path, operator=one, reporter=Stopping(count_iterations(whole.path) - 1))
+    results = pbem.run(case, path, operator=other, resume=True)
+    assert count_iterations(path) < count_iterations(whole.path)
+    assert (results.status, len(results.steps)) == ("finished", len(whole.steps))
+    for name in whole.contact:
+        np.testing.assert_array_equal(results.contact[name].mode, whole.contact[name].mode)
+        # The hierarchical operator's products are as accurate as solver.tolerance asks for.
+        slip = whole.contact[name].slip
+        np.testing.assert_allclose(results.contact[name].slip, slip, rtol=0, atol=1e-6 * np.abs(slip).max())
+
+
 def test_a_run_that_is_stopped_during_the_estimate_does_not_lose_the_step(tmp_path: Path, whole: Results) -> None:
     """The estimate is made before the step is stored: that of the resumed run is that of the whole one."""
     make_case(tmp_path)

@@ -49,24 +49,31 @@ class Attempt:
             raise
 
     @contextmanager
-    def note_try(self, stage: int, reached: float, before: ModeState) -> Iterator[None]:
-        """Where the run is stopped, say in which step, and which try it was; before: the modes that it began with."""
+    def note_try(self, stage: int, reached: float, before: ModeState, solver: str) -> Iterator[None]:
+        """Where the run is stopped, say in which step, and which try it was; before: the modes that it began with,
+        solver: the kind of its tangent operator."""
         try:
             yield
         except StopError as stop:
             known = stop.unfinished or Unfinished(stage, 0.0, before.mode, before.sign)
             ceiling = {**vars(self.ceiling), "error": self.ceiling.error and describe_error(self.ceiling.error)}
             stop.unfinished = replace(known, stage=stage, factor=self.target).within(
-                reached=reached, tries=self.tries, ceiling=ceiling)
+                reached=reached, tries=self.tries, ceiling=ceiling, solver=solver)
             raise
 
 
-def take_up(unfinished: Unfinished | None, stage: int, reached: float, planned: float) -> Attempt | None:
-    """The try in which a run was stopped, if it is for the step from a fraction of a stage to a planned one."""
+def take_up(
+    unfinished: Unfinished | None, stage: int, reached: float, planned: float, solver: str
+) -> Attempt | None:
+    """The try in which a run was stopped, if it is for the step from a fraction of a stage to a planned one.
+
+    solver: the kind of the tangent operator, which may have been another one: what a search knows is of one kind.
+    """
     if unfinished is None or unfinished.stage != stage or not reached < unfinished.factor <= planned + SAME:
         return None
     search, target = unfinished.search, unfinished.factor
-    if not search:  # it was stopped after the search, or with an earlier version
+    # It was stopped after the search, with an earlier version, or with another operator.
+    if search.get("solver") != solver:
         return Attempt(Ceiling(), 0, target, ModeState(unfinished.mode, unfinished.sign))
     if abs(search["reached"] - reached) > SAME:
         return None

@@ -96,7 +96,7 @@ def march(
             ceiling = Ceiling()
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
-                attempt = take_up(unfinished, stage, reached, planned) or Attempt(ceiling)
+                attempt = take_up(unfinished, stage, reached, planned, type(tangent).__name__) or Attempt(ceiling)
                 solution, reached, ceiling = _advance(
                     problem, tangent, memory, stage, reached, planned, attempt, reporter, guess
                 )
@@ -136,7 +136,7 @@ def _advance(
 
     Raises ConvergenceError: of the last try, or "limit load".
     """
-    least, ceiling = problem.model.solver.min_step, attempt.ceiling
+    least, ceiling, kind = problem.model.solver.min_step, attempt.ceiling, type(tangent).__name__
     if attempt.target is None and ceiling.error is not None and ceiling.is_reached(reached, planned, least):
         raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
     attempt = attempt.aim(ceiling.choose(reached, planned, least))
@@ -144,13 +144,13 @@ def _advance(
     while True:
         ceiling, target = attempt.ceiling, attempt.target
         assert target is not None
-        with attempt.note_try(stage, reached, memory.modes):
+        with attempt.note_try(stage, reached, memory.modes, kind):
             reporter.start_step(stage, reached, target)
         refuse_without_value(problem, stage, reached, target)
         load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
         begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
         try:
-            with attempt.note_try(stage, reached, memory.modes):
+            with attempt.note_try(stage, reached, memory.modes, kind):
                 guessed = attempt.guess or (guess and guess(stage, target, begin, load.pressure))
                 solution = _solve_guessed(problem, tangent, begin, load, reporter, guessed, attempt)
                 if solution is None:
@@ -164,7 +164,7 @@ def _advance(
             if balanced >= target and not hurried:
                 softly = attempt.find_phase("softly")
                 with (
-                    attempt.note_try(stage, reached, memory.modes),
+                    attempt.note_try(stage, reached, memory.modes, kind),
                     attempt.note_phase("softly", error=describe_error(error)),
                 ):
                     solution = solve_softly(

@@ -159,6 +159,11 @@ class FrictionLaw(ABC):
         dilation in the slip, but for ends of that."""
         return self.linear
 
+    @property
+    def pivots_at_slip(self) -> bool:
+        """Whether that is so of the bound at a given slip."""
+        return self.pivots
+
     @abstractmethod
     def strength(self, p_n: Real, slide: Slide, /, **parameters: Real) -> Strength:
         """Friction bound (k,) at the normal traction (compression negative; less the fluid pressure inside)."""

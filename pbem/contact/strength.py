@@ -48,6 +48,8 @@ class Coulomb(FrictionLaw):
 class SlipWeakening(FrictionLaw):
     """Coulomb's law with friction falling linearly to friction_dynamic over the slip distance."""
 
+    pivots_at_slip = True
+
     def strength(  # type: ignore[override]
         self, p_n: Real, slide: Slide, /, friction: Real, cohesion: Real, friction_dynamic: Real, slip_distance: Real
     ) -> Strength:

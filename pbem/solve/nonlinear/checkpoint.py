@@ -38,6 +38,7 @@ GIVEN = {
     "fixed_point": (),
     "hold": ("problem", "memory", "settled", "floating"),
     "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "proposal"),
+    "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "_smooth"),
 }
 

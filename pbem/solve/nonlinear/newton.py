@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Bool, Real
+from pbem.arrays import Real
 from pbem.contact.closure import choose_traction
 from pbem.contact.complementarity import take_subset
-from pbem.contact.constraints import ConstraintMap, evaluate_pairs
+from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import (
     SLIP,
     Memory,
@@ -26,11 +26,8 @@ from pbem.contact.modes import (
     Linearisation,
     Proposal,
     choose_slip,
-    find_failures,
     limit_changes,
     linearise,
-    measure_law_error,
-    update_active_set,
 )
 from pbem.contact.seat import find_seat
 from pbem.contact.separating import choose_bond_slip, choose_jump
@@ -42,12 +39,13 @@ from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain, begin_cou
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.judging import find_floor, judge_solution, make_judge
 from pbem.solve.nonlinear.recorded import Record
+from pbem.solve.nonlinear.running_group import RunningGroup, find_rest
 from pbem.solve.nonlinear.search import (
     PLAIN,
     PLAIN_FROM_SMOOTHED,
     PLAIN_IF_LOOSE,
-    Globalisation,
     Search,
     go_on_warily,
     list_searches,
@@ -77,9 +75,6 @@ class Solution:
     iterations: tuple[Iteration, ...]
     pressure: Real
 
-
-# Tractions are known to rounding of modulus times strain, also where they nearly vanish; this part of it counts.
-STRAIN_FLOOR = 0.1
 
 # After so many iterations, and so many more, it is asked whether anything could balance the loads.
 PATIENCE = 8
@@ -140,7 +135,7 @@ def _search_modes(
     """See solve_step; by one search, whose iterations join those before. resumed: see Checkpoint."""
     parts = {
         "hold": Hold(problem, memory), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
-        "smoothing": SmoothSearch(problem, memory, load, search.sweeps),
+        "smoothing": SmoothSearch(problem, memory, load, search.sweeps), "running": RunningGroup(problem, tangent),
     }
     checkpoint = Checkpoint(tangent, load, iterations, parts)
     course = checkpoint.resume(resumed) if resumed else None
@@ -156,7 +151,7 @@ def _run_search(
     problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
     refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
     checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
-    fixed_point: FixedPoint, smoothing: SmoothSearch,
+    fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup,
 ) -> Solution:
     """See _search_modes; course: with which it begins, None at its first iteration."""
     laws = problem.laws
@@ -197,10 +192,10 @@ def _run_search(
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN
-            outcome = _judge(hold, modes, memory, load, law, solved, search.globalisation)
+            outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)
-                outcome = _judge(hold, modes, memory, load, law, solved, search.globalisation)
+                outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation)
                 if loosely and not outcome.settled:
                     forcing.tighten()
         except ConvergenceError:
@@ -210,13 +205,13 @@ def _run_search(
         hold.state = pairs
         fails, cascade = outcome.settled and bool(outcome.failing.any()), None
         if fails:
-            floor = _find_floor(problem, solved)
+            floor = find_floor(problem, solved)
             cascade = run_cascade(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
                 min(search.most_pivoted, MOST_PIVOTED),
             )
             memory = memory.lose(cascade.broken)
-            proposal = _judge(hold, modes, memory, load, law, solved, search.globalisation).proposal
+            proposal = judge_solution(hold, modes, memory, load, law, solved, search.globalisation).proposal
             search.restart()
         record.add(solved, modes, proposal.changed, begin)
         driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
@@ -239,6 +234,7 @@ def _run_search(
             raise ConvergenceError(refused.reason, refused.detail + moves)
         frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(proposal, outcome.law_error)
+        running.note(search, proposal, outcome.law_error)
         if search.taken >= most or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)
         if left:
@@ -249,13 +245,16 @@ def _run_search(
             search.go_on_from_smoothed()
             smoothing.begun = True
             continue
-        chosen = cascade.modes if cascade else None
+        rest = None if cascade else find_rest(
+            running, hold, tangent, constraints, modes, memory, load, law, solved, search)
+        chosen = cascade.modes if cascade else rest.modes if rest else None
         # The first rank alone knows which pairs hold a body.
         share = broadcast(problem.comm, max(search.globalisation.share, hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
-        if not cascade and not (share > search.globalisation.share):
+        if not cascade and not rest and not (share > search.globalisation.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
-        if chosen is not None and search.returns(chosen.fingerprint()) and not go_on_warily(forcing, search):
+        back = chosen is not None and not rest and search.returns(chosen.fingerprint())
+        if back and not go_on_warily(forcing, search):
             raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
             chosen = limit_changes(modes, proposal, share)
@@ -275,6 +274,9 @@ def _run_search(
         slip = choose_slip(laws, modes, memory, slip, found, former)
         slip = choose_bond_slip(laws, modes, memory, pairs, load.pressure, slip)
         jump = choose_jump(laws, former, memory, pairs, load.pressure)
+        if rest:
+            normal_traction = np.where(np.isnan(rest.normal_traction), normal_traction, rest.normal_traction)
+            slip = np.where(np.isnan(rest.slip), slip, rest.slip)
         if search.just_returned:
             kept = (modes, normal_traction, slip, jump)
 
@@ -303,7 +305,7 @@ def _pivot(
     Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
     """
     problem = hold.problem
-    judge = _make_judge(problem, solved, search.globalisation)
+    judge = make_judge(problem, solved, search.globalisation)
     if search.may_sweep():
         swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
         if swept.fingerprint() != modes.fingerprint():
@@ -348,45 +350,3 @@ def _pivot(
     if tangent.settling.nearby and settled.fingerprint() == modes.fingerprint():
         return None  # what is near says otherwise than the whole model did
     return settled
-
-
-def _make_judge(problem: Problem, solved: Solved, globalisation: Globalisation) -> Callable[..., Proposal]:
-    """The choice of modes, with what it takes for rounding."""
-    floor = _find_floor(problem, solved)
-    return lambda laws, modes, state, memory, pressure: update_active_set(
-        laws, modes, state, memory, pressure, globalisation.softening, floor
-    )
-
-
-def _find_floor(problem: Problem, solved: Solved) -> float:
-    return STRAIN_FLOOR * problem.traction_scale * float(np.abs(solved.unknowns).max())
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    """What a solution says of the modes that led to it; settled: none changes, and the laws of slipping pairs hold."""
-
-    pairs: PairState
-    proposal: Proposal
-    settled: bool
-    failing: Bool
-    law_error: float
-
-
-def _judge(
-    hold: Hold, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved,
-    globalisation: Globalisation,
-) -> _Outcome:
-    problem, laws = hold.problem, hold.problem.laws
-
-    def judge() -> _Outcome:
-        pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
-        floor = _find_floor(problem, solved)
-        proposal = _make_judge(problem, solved, globalisation)(laws, modes, pairs, memory, load.pressure)
-        proposal = hold.excuse(modes, pairs, proposal, load.pressure)
-        law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
-        failing = find_failures(laws, pairs, memory, load.pressure, floor)
-        settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-        return _Outcome(pairs, proposal, settled, failing, law_error)
-
-    return problem.decide(judge)

@@ -48,7 +48,7 @@ def run_on(
 ) -> Rest | None:
     """Where the pairs of a subset come to rest that begin the step as its memory says; None if that is not found.
 
-    judge, holds: see settle_subset. Errors of the laws are related to the largest traction of the model.
+    judge, holds: see settle_subset. Errors of the laws are related to the largest traction of the model. (theory, 56)
     """
     laws, memory = subset.laws, subset.memory
     # Slips of the step so far count for pairs that slip: at first none does that could stick.

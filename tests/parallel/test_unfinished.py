@@ -31,7 +31,7 @@ import pbem.solve.nonlinear.newton as newton
 from pbem.parallel import world
 
 name, number, rank, *arguments = sys.argv[1:]
-whole = newton._judge
+whole = newton.judge_solution
 done = 0
 
 def judge(*given):
@@ -41,7 +41,7 @@ def judge(*given):
         os.kill(os.getpid(), getattr(signal, name))
     return whole(*given)
 
-newton._judge = judge
+newton.judge_solution = judge
 sys.exit(main(arguments))
 """
 

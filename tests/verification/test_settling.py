@@ -263,12 +263,12 @@ steps = 1
 ).replace("JOINT", "normal_stiffness = 1.087, tangential_stiffness = 0.653")
 
 
-def test_steep_weakening_on_loose_bodies_settles_with_frozen_bounds() -> None:
-    """Friction that falls by half in a fifth of the slip: Newton's steps do not end, nor do their states come back; a
-    second search, with more caution, ends in half as many."""
+def test_steep_weakening_on_loose_bodies_settles_in_few_iterations() -> None:
+    """Friction that falls by half in a fifth of the slip: Newton's steps do not end, nor do their states come back; the
+    pairs that run on by themselves come to rest."""
     listener = Listener()
     (step,) = run(WEAKENING_INCLUSIONS, listener)
-    assert not listener.rejected and len(step.iterations) <= 50 + 25
+    assert not listener.rejected and len(step.iterations) <= 12
     contact = step.contact
     slips = contact.mode == SLIP
     slid = np.abs(contact.slip - contact.traction_s / 0.653)

@@ -9,7 +9,8 @@ the Newton step of all. Pairs that change next join those that are solved for, s
 disturb each other is found in a few rounds. Of crack networks, where thousands of pairs change, every group of
 neighbouring elements settles by itself before each Newton step (pbem.solve.tangent.sweeps), as long as that helps.
 
-What is left for models whose law is not linear in a mode (friction that weakens with slip) or whose group is too large:
+Pairs whose friction weakens with slip run on to where they come to rest (pbem.solve.nonlinear.running_group). What is
+left for models whose law is not linear in a mode, or whose group is too large:
 the friction bound is kept in each iteration at what it was after the last (a fixed point of Tresca's law; J. Haslinger
 et al., Numerical methods for unilateral problems in solid mechanics, 1996). Once no mode changes under it the full
 tangent comes back at once, as the fixed point itself closes in slowly.

@@ -17,6 +17,7 @@ from pbem.errors import StopError
 from pbem.results.reader import Results, open_results
 from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.parallel.launch import launch_snippet
+from tests.verification.test_settling import WEAKENING_INCLUSIONS
 
 # Cracks in one load step: their statuses take a number of iterations.
 MAKE = ("make", "cracks", "-o", "case.toml", "--count", "40", "--density", "0.15", "--orientation", "30",
@@ -99,8 +100,18 @@ class Stopping(SilentReporter):
 def test_no_iteration_is_made_twice(operator: str, tmp_path: Path) -> None:
     """The resumed search is where it was: the iterations in the file are those of a run left alone, one by one."""
     make_case(tmp_path)
-    case, path = tmp_path / "case.toml", tmp_path / "case.h5"
-    whole = pbem.run(case, tmp_path / "whole.h5", operator=operator)
+    expect_no_iteration_twice(tmp_path, operator)
+
+
+def test_pairs_that_run_on_know_what_they_were(tmp_path: Path) -> None:
+    """Friction that weakens: groups that ran on grow by those that changed before the run was stopped."""
+    (tmp_path / "case.toml").write_text(WEAKENING_INCLUSIONS)
+    expect_no_iteration_twice(tmp_path, "dense")
+
+
+def expect_no_iteration_twice(folder: Path, operator: str) -> None:
+    case, path = folder / "case.toml", folder / "case.h5"
+    whole = pbem.run(case, folder / "whole.h5", operator=operator)
     count = count_iterations(whole.path)
     for number in range(1, count):
         with pytest.raises(StopError):

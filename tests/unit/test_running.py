@@ -1,4 +1,4 @@
-"""Sliders whose friction weakens, pressed with 1 each: where they come to rest, against formulas and plain iteration."""
+"""Sliders whose friction weakens, pressed with 1 each: where they come to rest, by formulas and plain iteration."""
 
 from __future__ import annotations
 

@@ -7,7 +7,10 @@ the finer one; the largest difference of the slips from those of the finer mesh,
 to a last bit, from those with half that bit, both as parts of the largest slip; what did not settle.
 
 usage: .venv/bin/python -m scripts.study_junctions [--kinds crossing,t,edge] [--angles 90,5] [--friction 0.2,0.6]
-    [--elements 8] [--finer 2]
+    [--elements 8] [--finer 2] [--seed 1]
+
+With a seed the directions, lengths, stresses and units are drawn anew for each kind and angle, and so is the friction
+where none is given.
 """
 
 from __future__ import annotations
@@ -15,7 +18,8 @@ from __future__ import annotations
 import argparse
 import cmath
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from unittest import mock
 
 import numpy as np
@@ -46,12 +50,39 @@ LOADS = {
     "biaxial compression": (-0.3, -1.0, 0.0),
     "mixed opening": (-1.0, 0.5, 0.5),
 }
-# Cracks lie askew to the loads.
-TURN = cmath.exp(0.2j)
-LENGTHS = (1.0, 0.9, 0.8, 0.7)
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is drawn: direction of the first branch (radians; cracks lie askew to the loads), lengths of the four
+    branches, position of the mouth along the side of a plate of 4, in parts of which `size` is the unit; stresses by
+    name of the load, in parts of which `stress` is the unit, Young's modulus being 1e3 of them; frictions."""
+
+    turn: float = 0.2
+    lengths: tuple[float, ...] = (1.0, 0.9, 0.8, 0.7)
+    mouth: float = -0.2
+    size: float = 1.0
+    stress: float = 1.0
+    loads: Mapping[str, tuple[float, float, float]] = field(default_factory=lambda: LOADS)
+    frictions: tuple[float, ...] = FRICTIONS
+
+
+def draw_setting(seed: int, kind: str, angle: float) -> Setting:
+    """A setting that depends on all of these alone."""
+    draw = np.random.default_rng([seed, KINDS.index(kind), round(1000 * angle)])
+    top, side = draw.uniform(0.5, 1.5, 3), draw.uniform(0.1, 0.9, 3)
+    loads = {
+        "compression with shear": (-side[0] * top[0], -top[0], draw.choice([-1, 1]) * draw.uniform(0.2, 0.6)),
+        "biaxial compression": (-top[1], -side[1] * top[1], 0.0),
+        "mixed opening": (-top[2], side[2], draw.uniform(-0.6, 0.6)),
+    }
+    return Setting(
+        draw.uniform(-math.pi, math.pi), tuple(draw.uniform(0.5, 1.2, 4)), draw.uniform(-0.6, 0.0),
+        10.0 ** draw.integers(-3, 4), 10.0 ** draw.integers(-3, 7), loads, tuple(draw.uniform(0.0, 1.0, 2).round(2)),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,16 +93,19 @@ class Junction:
     angle: float
     elements: int = 8
     order: int = 2
+    setting: Setting = field(default_factory=Setting)
 
     def write(self, friction: float, load: tuple[float, float, float]) -> str:
         """The case."""
         turn = cmath.exp(1j * math.radians(self.angle))
         if self.kind == "edge":
             return self._write_plate(turn, friction, load)
-        ends = [TURN, TURN * turn, -TURN, -TURN * turn]
-        branches = {f"b{k}": (0j, length * end) for k, (length, end) in enumerate(zip(LENGTHS, ends, strict=True))}
+        setting, askew = self.setting, cmath.exp(1j * self.setting.turn)
+        lengths = [setting.size * length for length in setting.lengths]
+        ends = [askew, askew * turn, -askew, -askew * turn]
+        branches = {f"b{k}": (0j, length * end) for k, (length, end) in enumerate(zip(lengths, ends, strict=True))}
         if self.kind == "t":
-            branches = {"through": (-LENGTHS[2] * TURN, LENGTHS[0] * TURN), "branch": branches["b1"]}
+            branches = {"through": (-lengths[2] * askew, lengths[0] * askew), "branch": branches["b1"]}
         curves = {name: line(start, end, self.elements, "none") for name, (start, end) in branches.items()}
         for curve in curves.values():
             del curve["grading"]
@@ -79,30 +113,32 @@ class Junction:
             curves["through"]["elements"] *= 2
         return write_case(
             {
-                "materials": {"rock": {"young": 1e3, "poisson": 0.25}},
+                "materials": {"rock": {"young": 1e3 * setting.stress, "poisson": 0.25}},
                 "curves": curves,
                 "regions": {"plane": {"material": "rock", "infinite": True, "cracks": list(curves)}},
                 "interfaces": {name: {"law": "coulomb", "friction": friction} for name in curves},
-                "remote": dict(zip(("sxx", "syy", "sxy"), load, strict=True)),
+                "remote": {name: setting.stress * part for name, part in zip(("sxx", "syy", "sxy"), load, strict=True)},
                 "analysis": {"steps": 1, "order": self.order},
                 "solver": {"operator": "dense"},
             }
         )
 
     def _write_plate(self, turn: complex, friction: float, load: tuple[float, float, float]) -> str:
-        mouth = -2 - 0.2j
-        corners = [-2 - 2j, 2 - 2j, 2 + 2j, -2 + 2j, mouth]
+        setting, size = self.setting, self.setting.size
+        mouth = size * complex(-2, setting.mouth)
+        corners = [*(size * corner for corner in (-2 - 2j, 2 - 2j, 2 + 2j, -2 + 2j)), mouth]
         names = ["bottom", "right", "top", "above", "below"]
         curves = {
             name: {"points": [corners[k], corners[(k + 1) % 5]], "elements": self.elements}
             for k, name in enumerate(names)
         }
-        curves["crack"] = {"points": [mouth, mouth + 1.4j / turn], "elements": self.elements}
-        sxx, syy, sxy = load
+        tip = mouth + 1.4j * size * setting.lengths[0] / turn
+        curves["crack"] = {"points": [mouth, tip], "elements": self.elements}
+        sxx, syy, sxy = (setting.stress * part for part in load)
         left = {"tx": -sxx, "ty": -sxy}
         return write_case(
             {
-                "materials": {"rock": {"young": 1e3, "poisson": 0.25}},
+                "materials": {"rock": {"young": 1e3 * setting.stress, "poisson": 0.25}},
                 "curves": curves,
                 "regions": {"plate": {"material": "rock", "boundary": names, "cracks": ["crack"]}},
                 "interfaces": {"crack": {"law": "coulomb", "friction": friction}},
@@ -134,7 +170,7 @@ class Solver:
         usual = sliver.measure_last_bit
         with mock.patch.object(sliver, "measure_last_bit", lambda *corner: bit * usual(*corner)):
             # Columns of tractions that are zero are not assembled: none is under this load.
-            self.model = parse_model(junction.write(0.5, LOADS["mixed opening"]))[1]
+            self.model = parse_model(junction.write(0.5, junction.setting.loads["mixed opening"]))[1]
             self.mesh = generate_mesh(self.model)
         self.problem = assemble_problem(self.model, self.mesh, world)
 
@@ -187,14 +223,15 @@ def compare(given: Outcome, finer: Outcome) -> float:
     return float(max(differences)) / largest if largest else 0.0
 
 
-def study(kind: str, angle: float, frictions: tuple[float, ...], elements: int, finer: int) -> None:
+def study(junction: Junction, finer: int) -> None:
     """Print the rows of a kind and an angle."""
-    given = Solver(Junction(kind, angle, elements))
-    fine = Solver(Junction(kind, angle, finer * elements))
-    half = Solver(Junction(kind, angle, elements), 0.5) if angle < WEDGE or kind == "t" else None
-    for friction in frictions:
+    kind, angle = junction.kind, junction.angle
+    given = Solver(junction)
+    fine = Solver(replace(junction, elements=finer * junction.elements))
+    half = Solver(junction, 0.5) if angle < WEDGE or kind == "t" else None
+    for friction in junction.setting.frictions:
         rows = []
-        for name, load in LOADS.items():
+        for name, load in junction.setting.loads.items():
             usual, other = given.solve(friction, load), fine.solve(friction, load)
             bit = half.solve(friction, load) if half else None
             rows.append((name, usual, other, bit))
@@ -220,18 +257,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--angles", default=",".join(f"{angle:g}" for angle in ANGLES))
-    parser.add_argument("--friction", default=",".join(f"{each:g}" for each in FRICTIONS))
+    parser.add_argument("--friction", help="default 0.2,0.6, or drawn")
     parser.add_argument("--elements", type=int, default=8, help="on each branch (default 8)")
     parser.add_argument("--finer", type=int, default=2, help="times as many elements for comparison (default 2)")
+    parser.add_argument("--seed", type=int, help="draw all but kinds and angles")
     options = parser.parse_args()
-    frictions = tuple(map(float, options.friction.split(",")))
     print(
         f"{'kind':9s}{'angle':>6s}{'frict.':>7s}{'unknowns':>9s}{'finer':>9s}{'iter.':>7s}{'finer':>7s}{'slip':>11s}"
         f"{'half bit':>11s}  worst load"
     )
     for kind in options.kinds.split(","):
         for angle in map(float, options.angles.split(",")):
-            study(kind, angle, frictions, options.elements, options.finer)
+            setting = Setting() if options.seed is None else draw_setting(options.seed, kind, angle)
+            if options.friction:
+                setting = replace(setting, frictions=tuple(map(float, options.friction.split(","))))
+            study(Junction(kind, angle, options.elements, setting=setting), options.finer)
 
 
 if __name__ == "__main__":

@@ -23,14 +23,16 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from pbem.case.build import parse_model
 from pbem.contact.laws import collect_laws
 from pbem.driver import make_estimator
 from pbem.errors import ConvergenceError
@@ -43,6 +45,7 @@ from pbem.model.refinement import bisect_elements, count_elements
 from pbem.results.accuracy import Pass, decide
 from pbem.results.estimates import Comparison, Relative
 from pbem.solve.estimate.coarser_mesh import relate_meshes
+from scripts.refined_models import list_models
 from tests.verification.proofs import PROOFS, Proof, proof
 from tests.verification.proofs.proof import Solved
 
@@ -310,16 +313,28 @@ def find_best(model: Model, reference: Solved) -> dict[float, int]:
     return best
 
 
+def list_refined() -> dict[str, tuple[Callable[[], Model], int]]:
+    """By name what makes a model that is refined, and the elements on each leg that it begins with."""
+    proofs = [(next(one for one in PROOFS if one.name.startswith(name)), first) for name, first in REFINED.items()]
+    others = {name: (partial(make_model, text), first) for name, (text, first) in list_models().items()}
+    return {one.name: (partial(take_model, one), first) for one, first in proofs} | others
+
+
+def make_model(text: str) -> Model:
+    """The model of a case file's text."""
+    return parse_model(text)[1]
+
+
 def print_refinements(only: Sequence[str]) -> int:
     """The second table; the number of accuracies that were not met with twice the best mesh's unknowns."""
-    chosen = [(next(one for one in PROOFS if one.name.startswith(name)), first) for name, first in REFINED.items()]
-    chosen = [(one, first) for one, first in chosen if not only or any(part in one.name for part in only)]
-    width = max(len(one.name) for one, _ in chosen)
+    chosen = {name: model for name, model in list_refined().items()
+              if not only or any(part in name for part in only)}
+    width = max(map(len, chosen))
     print(f"{'model of the problem':{width}s}  accuracy  true error  unknowns  best by hand  ratio")
     failures = whole = 0
-    for one, elements in chosen:
+    for name, (make, elements) in chosen.items():
         before = failures
-        model = take_model(one)
+        model = make()
         refined: dict[float, Solved | ConvergenceError] = {}
         for accuracy in ACCURACIES:
             try:
@@ -331,13 +346,13 @@ def print_refinements(only: Sequence[str]) -> int:
         for accuracy, solved in refined.items():
             if isinstance(solved, ConvergenceError):
                 failures += 1
-                print(f"{one.name:{width}s}  {accuracy:8.0e}  {str(solved)[:150]}", flush=True)
+                print(f"{name:{width}s}  {accuracy:8.0e}  {str(solved)[:150]}", flush=True)
                 continue
             error = measure_error(solved, reference)
             ratio = solved.unknowns / best[accuracy] if accuracy in best else 0.0
             good = error <= accuracy and ratio <= 2
             failures += not good
-            print(f"{one.name:{width}s}  {accuracy:8.0e}  {error:10.1e}  {solved.unknowns:8d}  "
+            print(f"{name:{width}s}  {accuracy:8.0e}  {error:10.1e}  {solved.unknowns:8d}  "
                   f"{best.get(accuracy, 'none'):>12}  {ratio:5.2f}{'' if good else ' *'}", flush=True)
         whole += failures == before
     print(f"{whole} of {len(chosen)} models meet all, {failures} of {len(ACCURACIES) * len(chosen)} missed (*)")

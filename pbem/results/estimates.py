@@ -14,7 +14,7 @@ from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
-from pbem.results.rates import EndFinder, choose_jump_divisors
+from pbem.results.rates import EndFinder, choose_force_divisor, choose_jump_divisors
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
@@ -163,8 +163,9 @@ class Comparison:
         if second is None or self._beside is None:
             estimates = self._know_nothing()
         else:
-            estimates = self._subtract(step, second, self._beside)
-            self.energy = np.maximum(self.energy, measure_energy(self._model, self._mesh, self._beside, step, second))
+            energy = measure_energy(self._model, self._mesh, self._beside, step, second)
+            estimates = self._subtract(step, second, self._beside, energy)
+            self.energy = np.maximum(self.energy, energy)
             self.jumps = np.maximum(self.jumps, self._locate_jumps(step.contact, second.contact, self._beside))
         return estimates, self._relate(estimates)
 
@@ -173,10 +174,13 @@ class Comparison:
         return Estimates(**{each.name: nothing[each.name] for each in fields(Estimates) if nothing[each.name].ndim},
                          displacement=np.nan)
 
-    def _subtract(self, step: Step, second: Step, beside: Beside) -> Estimates:
+    def _subtract(self, step: Step, second: Step, beside: Beside, energy: Real) -> Estimates:
         """What the two solutions differ by, over the divisors (theory, 77)."""
-        by = 1.0 / self._divisor
-        forces = by * (sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second))
+        by, of_forces = 1.0 / self._divisor, 1.0
+        if self._divisor > 1:
+            of_forces = choose_force_divisor(self._model, beside, energy.sum(axis=0), self._divisor)
+        forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
+        forces = forces / of_forces
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
         cracks = len(self._model.crack_tips)  # the two meshes need not see the same cracks along interfaces

@@ -111,7 +111,7 @@ class Comparison:
             self._divisor = 1.0 if as_they_are else smooth
             self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
             self._ends = EndFinder(mesh, beside)
-            self._jump_divisor = choose_jump_divisors(beside, model.crack_tips, self._divisor)
+            self._jump_divisor = choose_jump_divisors(model, beside, self._divisor)
 
     @cached_property
     def _rules(self) -> TipRules:

@@ -6,8 +6,8 @@ There tractions or jumps follow a root of the distance, which meshes resolve mor
 from __future__ import annotations
 
 import cmath
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from pbem.contact.laws import SLIP
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.model.refinement import count_elements
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState
 
@@ -28,7 +27,8 @@ FIXED, MOVING = 1.0, 2.0
 # would give 1.8, and smooth fields (scripts/bench_estimate.py --accuracy).
 TIP, AT_TIP = 4.0, 2
 # That of jumps on the element next to a corner, or to the mouth of a crack, where they follow other powers: over the
-# same problems 1.5 to 2.5. Legs that turn by more (radians) have a corner.
+# same problems 1.5 to 2.5, but less where a crack turns sharply: see `find_corner_power`. Legs that turn by more
+# (radians) have a corner.
 CORNER, TURN = 2.0, 0.1
 # Forces err with the power 2 lambda of the length of the element next to a corner, near which the displacement follows
 # the power lambda of the distance: 0.545 in a re-entrant right angle, 0.6 to 0.8 between a side that is held and a free
@@ -83,18 +83,30 @@ class EndFinder:
         return np.asarray(np.interp(self._at, self._nodes[order], values[order]))
 
 
-def choose_jump_divisors(beside: Beside, tips: Mapping[str, tuple[bool, bool]], smooth: float) -> Real:
+def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
     """What differences of jumps at the pairs of the second solution (c,) are to be divided by.
 
-    tips: of each crack, whether its start and its end is a tip; smooth: elsewhere.
+    model: of the run; smooth: away from tips and corners.
     """
     coarse, result = beside.mesh, np.full(beside.mesh.elements, smooth)
-    at_corner = _mark_corners(beside.model)
-    for name, own in list_curve_elements(beside.model, coarse) if beside.kind == "merged" else ():
-        at_start, at_end = tips.get(name, (False, False))
-        result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
-        result[own[at_corner[name]]] = min(CORNER, smooth)
+    if beside.kind == "merged":
+        at_corner = _list_merged_ends(model, beside.model)
+        for name, own in list_curve_elements(beside.model, coarse):
+            at_start, at_end = model.crack_tips.get(name, (False, False))
+            result[own[: AT_TIP * at_start]] = result[own[len(own) - AT_TIP * at_end :]] = min(TIP, smooth)
+            for element, ratio, power in at_corner.get(name, ()):
+                result[own[element]] = min(result[own[element]], CORNER, ratio**power - 1)
     return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
+
+
+def find_corner_power(turn: float) -> float:
+    """The power lambda of the distance that the displacement follows outside a corner by which a free face turns
+    (radians, 0 to pi): of sin(lambda w) = -lambda sin(w) with w = pi + turn that from 1/2 to 1 (Williams 1952)."""
+    wide, low, high = math.pi + turn, 0.5, 1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if math.sin(middle * wide) + middle * math.sin(wide) > 0 else (low, middle)
+    return low
 
 
 def choose_force_divisor(model: Model, beside: Beside, energy: Real, smooth: float) -> float:
@@ -107,25 +119,36 @@ def choose_force_divisor(model: Model, beside: Beside, energy: Real, smooth: flo
     if beside.kind != "merged" or not total > 0:
         return smooth
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
-    times: dict[str, list[tuple[int, float]]] = {}
-    for mine, other in zip(_list_corner_ends(model), _list_corner_ends(beside.model), strict=True):
-        # Where nothing was merged nothing is known: as if it were.
-        times.setdefault(other.curve, []).append((other.element, max(other.length / mine.length, 2.0)))
+    at_corner = _list_merged_ends(model, beside.model)
     by = np.full(len(energy), 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
-        for element, ratio in times.get(name, ()):
+        for element, ratio, _ in at_corner.get(name, ()):
             at = fine[own[element]]
             by[at] = np.maximum(by[at], 1 / (ratio**FORCE_RATE - 1))
     return float(total / (energy @ by))
 
 
+def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int, float, float]]]:
+    """Of each curve with corners, the coarser model's elements there (along all legs), how many times as long they are
+    as the model's, and the power of the distance that jumps follow there.
+
+    Where nothing was merged nothing is known: as if they were twice as long.
+    """
+    found: dict[str, list[tuple[int, float, float]]] = {}
+    for mine, other in zip(_list_corner_ends(model), _list_corner_ends(coarser), strict=True):
+        found.setdefault(other.curve, []).append((other.element, max(other.length / mine.length, 2.0), other.power))
+    return found
+
+
 @dataclass(frozen=True)
 class _LegEnd:
-    """An end of a leg at a corner: curve, its element there (along all legs) and that element's length."""
+    """An end of a leg at a corner: curve, its element there (along all legs) and that element's length; the power of
+    the distance that jumps follow there, infinite where it is not known."""
 
     curve: str
     element: int
     length: float
+    power: float = math.inf
 
 
 def _list_corner_ends(model: Model) -> list[_LegEnd]:
@@ -139,20 +162,14 @@ def _list_corner_ends(model: Model) -> list[_LegEnd]:
             meeting.setdefault(leg.start, []).append((first, leg.tangent(False)))
             meeting.setdefault(leg.end, []).append((last, -leg.tangent(True)))
             number += leg.elements
-    found = []
+    found: list[_LegEnd] = []
     for ends in meeting.values():
-        # The tip of a crack meets nothing.
-        smooth = len(ends) == 2 and abs(cmath.phase(-ends[0][1] / ends[1][1])) < TURN
-        found += [end for end, _ in ends if len(ends) > 1 and not smooth]
+        if len(ends) == 2:
+            turn = abs(cmath.phase(-ends[0][1] / ends[1][1]))
+            found += [replace(end, power=find_corner_power(turn)) for end, _ in ends if turn >= TURN]
+        elif len(ends) > 2:  # the tip of a crack meets nothing
+            found += [end for end, _ in ends]
     return found
-
-
-def _mark_corners(model: Model) -> dict[str, Bool]:
-    """Per curve, whether an element (along all legs) ends where it meets another one at an angle, or several."""
-    marks = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in model.curves.items()}
-    for end in _list_corner_ends(model):
-        marks[end.curve][end.element] = True
-    return marks
 
 
 class _Chain:

@@ -321,8 +321,9 @@ def list_refined() -> dict[str, tuple[Callable[[], Model], int]]:
 
 
 def make_model(text: str) -> Model:
-    """The model of a case file's text."""
-    return parse_model(text)[1]
+    """The model of a case file's text; pairs of contacts lie on the first curve on all of its meshes."""
+    model = parse_model(text)[1]
+    return replace(model, contacts={name: replace(one, slave=one.first) for name, one in model.contacts.items()})
 
 
 def print_refinements(only: Sequence[str]) -> int:

@@ -51,6 +51,10 @@ SMALL_KIND = 1e-3
 NEAR_WORST = 0.3
 
 
+# Why errors are not known that will be on a finer mesh.
+UNSEEN = "those of some quantities, as faces in contact meet nowhere on the coarser mesh"
+
+
 @dataclass(frozen=True)
 class Reached:
     """The largest estimated relative errors over the steps, by the names in ASKED (or "displacements")."""
@@ -123,8 +127,9 @@ def decide(
         return Decision((says,))
     over = ", ".join(f"{name} {error:.1e}" for name, error in reached.errors.items() if not error * SAFETY <= accuracy)
     failure = ""
-    if np.isnan(reached.worst):
-        why = estimator.missing or "those of some quantities, as faces in contact meet nowhere on the coarser mesh"
+    unknown = bool(np.isnan(reached.worst))
+    if unknown and (estimator.missing or one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns):
+        why = estimator.missing or UNSEEN
         failure = f"errors cannot be estimated ({why}): whether {accuracy:g} is reached is not known"
     elif one.number >= MOST_PASSES or unknowns > MOST_GROWTH * one.first_unknowns:
         limit = f"{one.number} passes" if one.number >= MOST_PASSES else f"{MOST_GROWTH:g} times the first unknowns"
@@ -133,11 +138,20 @@ def decide(
         )
     if failure:
         return Decision((says,), failure=failure)
+    if unknown:
+        halved = f"errors cannot be estimated ({UNSEEN}): all elements of contacts are halved"
+        return Decision((says, halved), mark_contacts(model))
     comparison = estimator.comparison
     if not comparison.energy.any():  # gone on with after its last step: where errors are is not in the file
         return Decision((says,), {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()})
     marked = mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst)
     return Decision((says,), marked, gently=reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy)
+
+
+def mark_contacts(model: Model) -> dict[str, Bool]:
+    """Per curve its elements (along all legs): all those of curves in a contact."""
+    in_contact = {name for each in model.contacts.values() for name in (each.first, each.second)}
+    return {name: np.full(count_elements(curve), name in in_contact) for name, curve in model.curves.items()}
 
 
 def mark_elements(

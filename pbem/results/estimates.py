@@ -101,6 +101,8 @@ class Comparison:
         self._model, self._mesh, self._beside = model, mesh, beside
         self._interfaces = list(sort_pairs(mesh).values())
         self._known = rules
+        # A stiff region goes along with a soft one: the energy of that is none of its own.
+        self._modulus = np.array([region.material.plane_modulus for region in model.regions])[mesh.region]
         self._gap = collect_laws(model, mesh).gap
         self.energy, self.jumps = np.zeros((2, mesh.elements)), np.zeros(mesh.elements)
         self.scales = Scales()
@@ -178,7 +180,7 @@ class Comparison:
         """What the two solutions differ by, over the divisors (theory, 77)."""
         by, of_forces = 1.0 / self._divisor, 1.0
         if self._divisor > 1:
-            of_forces = choose_force_divisor(self._model, beside, energy.sum(axis=0), self._divisor)
+            of_forces = choose_force_divisor(self._model, beside, energy.sum(axis=0) / self._modulus, self._divisor)
         forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
         forces = forces / of_forces
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)

@@ -109,23 +109,24 @@ def find_corner_power(turn: float) -> float:
     return low
 
 
-def choose_force_divisor(model: Model, beside: Beside, energy: Real, smooth: float) -> float:
+def choose_force_divisor(model: Model, beside: Beside, square: Real, smooth: float) -> float:
     """What differences of forces are to be divided by.
 
-    energy (e,): of the difference, on the elements of the run's mesh, `model` being that of the run. The part of it at
-    corners falls by r^FORCE_RATE where the second solution's elements are r times as long. smooth: elsewhere.
+    square (e,): of the difference, on the elements of the run's mesh, as its energy over the modulus; `model` is that
+    of the run. The part of it at corners falls by r^FORCE_RATE where the second solution's elements are r times as
+    long. smooth: elsewhere.
     """
-    total = float(energy.sum())
+    total = float(square.sum())
     if beside.kind != "merged" or not total > 0:
         return smooth
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
-    by = np.full(len(energy), 1 / smooth)
+    by = np.full(len(square), 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, _ in at_corner.get(name, ()):
             at = fine[own[element]]
             by[at] = np.maximum(by[at], 1 / (ratio**FORCE_RATE - 1))
-    return float(total / (energy @ by))
+    return float(total / (square @ by))
 
 
 def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int, float, float]]]:

@@ -1,0 +1,155 @@
+"""What differences from the second solution are divided by: beside tips and corners, and which elements are refined."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbem.case.build import parse_model
+from pbem.geometry.curve import Curve
+from pbem.mesh.carry import list_curve_elements
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.results.accuracy import mark_contacts, mark_elements
+from pbem.results.rates import (
+    CORNER,
+    FORCE_RATE,
+    TIP,
+    choose_force_divisor,
+    choose_jump_divisors,
+    find_corner_power,
+)
+from pbem.solve.estimate.coarser_mesh import Beside, put_beside
+
+SMOOTH = 5.0
+# A crack of two curves that turns by 60 degrees, one of an arc that goes on smoothly, and one from the plate's side.
+PLATE = """
+[materials.rock]
+young = 1000.0
+poisson = 0.2
+[curves]
+bottom = { points = [[-4, -4], [4, -4]], elements = 4, grading = "none" }
+right = { points = [[4, -4], [4, 0]], elements = 4, grading = "none" }
+upper = { points = [[4, 0], [4, 4]], elements = 4, grading = "none" }
+top = { points = [[4, 4], [-4, 4]], elements = 4, grading = "none" }
+left = { points = [[-4, 4], [-4, -4]], elements = 4, grading = "none" }
+leg = { points = [[-2, 0], [0, 0]], elements = 8, grading = "none" }
+wing = { points = [[0, 0], [0.5, 0.8660254037844386]], elements = 8, grading = "none" }
+before = { points = [[-2, -2], [0, -2]], elements = 8, grading = "none" }
+after = { points = [[0, -2], [1, -2]], elements = 8, grading = "none" }
+branch = { points = [[4, 0], [2, 0]], elements = 8, grading = "none" }
+[regions.plate]
+material = "rock"
+boundary = ["bottom", "right", "upper", "top", "left"]
+cracks = ["leg", "wing", "before", "after", "branch"]
+[boundary]
+bottom = { ux = 0.0, uy = 0.0 }
+top = { ty = 1.0 }
+"""
+
+
+@pytest.fixture(scope="module")
+def plate() -> Model:
+    return parse_model(PLATE)[1]
+
+
+def put(model: Model) -> Beside:
+    beside = put_beside(model, generate_mesh(model))
+    assert beside is not None and beside.kind == "merged"
+    return beside
+
+
+def read_elements(beside: Beside, name: str, values: np.ndarray) -> np.ndarray:
+    """Values of the pairs on a crack's elements, in the direction of its curve."""
+    own = next(elements for curve, elements in list_curve_elements(beside.model, beside.mesh)
+               if curve == name and np.isin(elements * (beside.mesh.order + 1), beside.mesh.pairs.slave).all())
+    of = {int(e): value for e, value in zip(beside.mesh.pairs.slave // (beside.mesh.order + 1), values, strict=True)}
+    return np.array([of[int(e)] for e in own])
+
+
+@pytest.mark.parametrize(("turn", "power"), [(90.0, 0.544484), (60.0, 0.615731), (120.0, 0.512221), (180.0, 0.5)])
+def test_powers_outside_corners_are_those_of_williams(turn: float, power: float) -> None:
+    # Of free wedges of 270, 240, 300 and 360 degrees.
+    assert find_corner_power(math.radians(turn)) == pytest.approx(power, abs=2e-6)
+
+
+def test_differences_of_jumps_are_divided_by_what_the_place_is(plate: Model) -> None:
+    beside = put(plate)
+    divisors = choose_jump_divisors(plate, beside, SMOOTH)
+    kink = 2 ** find_corner_power(math.radians(60)) - 1
+    # From two at a tip to the one at a corner; where the crack turns its elements are shorter, and more.
+    leg, wing = (read_elements(beside, name, divisors) for name in ("leg", "wing"))
+    np.testing.assert_allclose([*leg[:3], *leg[-2:]], [TIP, TIP, SMOOTH, SMOOTH, kink])
+    np.testing.assert_allclose([*wing[:2], *wing[-3:]], [kink, SMOOTH, SMOOTH, TIP, TIP])
+    np.testing.assert_allclose(read_elements(beside, "before", divisors), [TIP, TIP, SMOOTH, SMOOTH])
+    np.testing.assert_allclose(read_elements(beside, "after", divisors), [SMOOTH, SMOOTH, TIP, TIP])
+    np.testing.assert_allclose(read_elements(beside, "branch", divisors), [CORNER, SMOOTH, TIP, TIP])
+
+
+def test_differences_at_a_corner_say_more_where_its_elements_were_much_shorter(plate: Model) -> None:
+    fractions = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.975, 1.0)
+    leg = replace(plate.curves["leg"].legs[0], elements=7, fractions=fractions)
+    graded = replace(plate, curves=plate.curves | {"leg": Curve("leg", (leg,))})
+    beside = put(graded)
+    # From 0.9 on: four times as long as its last one.
+    divisor = 4 ** find_corner_power(math.radians(60)) - 1
+    assert read_elements(beside, "leg", choose_jump_divisors(graded, beside, SMOOTH))[-1] == pytest.approx(divisor)
+    assert read_elements(beside, "leg", choose_jump_divisors(graded, beside, 1.0))[-1] == 1.0
+
+
+def test_differences_of_forces_are_divided_by_where_they_come_from(plate: Model) -> None:
+    beside = put(plate)
+    square = np.zeros(beside.fine.elements)
+    at_corner, between = take_element(plate, beside.fine, "bottom", 0), take_element(plate, beside.fine, "leg", 3)
+    square[between] = 2.0
+    assert choose_force_divisor(plate, beside, square, SMOOTH) == pytest.approx(SMOOTH)
+    square[at_corner] = 2.0
+    corner = 2**FORCE_RATE - 1
+    assert choose_force_divisor(plate, beside, square, SMOOTH) == pytest.approx(2 / (1 / corner + 1 / SMOOTH))
+    square[between] = 0.0
+    assert choose_force_divisor(plate, beside, square, SMOOTH) == pytest.approx(corner)
+    assert choose_force_divisor(plate, beside, np.zeros_like(square), SMOOTH) == SMOOTH
+
+
+def take_element(model: Model, mesh: Mesh, name: str, number: int) -> int:
+    """An element of a curve, on its first face."""
+    return int(next(own for curve, own in list_curve_elements(model, mesh) if curve == name)[number])
+
+
+def test_elements_whose_energies_differ_by_rounding_are_marked_alike(plate: Model) -> None:
+    # The plate as it would be in a mirror: the first and last elements of a curve are alike but for rounding. Those in
+    # the middle have all but nothing.
+    mesh = generate_mesh(plate)
+    draw = np.random.default_rng(5)
+    energy = np.full((2, mesh.elements), 1e-9)
+    for name in ("bottom", "top"):
+        first, last = (take_element(plate, mesh, name, number) for number in (0, 3))
+        energy[:, [first, last]] = 1.0 + 1e-13 * draw.standard_normal((2, 2))
+    for accuracy in (1e-1, 1e-2, 1e-3):
+        marked = mark_elements(plate, mesh, energy, np.zeros(mesh.elements), accuracy, 0.2)
+        assert all(marked[name][0] == marked[name][3] for name in ("bottom", "top"))
+        assert np.array_equal(marked["bottom"], marked["top"]) and marked["bottom"][0]
+        assert not marked["leg"].any()
+
+
+def test_contacts_are_halved_where_they_were_not_seen() -> None:
+    model = parse_model(PLATE.split("[regions")[0] + """
+floor = { points = [[-5, -6], [5, -6]], elements = 3 }
+[regions.plate]
+material = "rock"
+boundary = ["bottom", "right", "upper", "top", "left"]
+cracks = ["leg", "wing", "before", "after", "branch"]
+[tools.floor]
+uy = 2.5
+[contacts.seat]
+between = ["bottom", "floor"]
+[boundary]
+top = { ux = 0.0, uy = 0.0 }
+""")[1]
+    marked = mark_contacts(model)
+    assert {name for name, each in marked.items() if each.any()} == {"bottom", "floor"}
+    assert marked["floor"].all() and marked["bottom"].all()

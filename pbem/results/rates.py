@@ -84,7 +84,8 @@ class EndFinder:
 
 
 def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
-    """What differences of jumps at the pairs of the second solution (c,) are to be divided by.
+    """What differences of jumps at the pairs of the second solution (c,) are to be divided by (theory,
+    126).
 
     model: of the run; smooth: away from tips and corners.
     """
@@ -101,7 +102,7 @@ def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
 
 def find_corner_power(turn: float) -> float:
     """The power lambda of the distance that the displacement follows outside a corner by which a free face turns
-    (radians, 0 to pi): of sin(lambda w) = -lambda sin(w) with w = pi + turn that from 1/2 to 1 (Williams 1952)."""
+    (radians, 0 to pi): of sin(lambda w) = -lambda sin(w) with w = pi + turn that from 1/2 to 1 (theory, 125)."""
     wide, low, high = math.pi + turn, 0.5, 1.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -110,7 +111,7 @@ def find_corner_power(turn: float) -> float:
 
 
 def choose_force_divisor(model: Model, beside: Beside, square: Real, smooth: float) -> float:
-    """What differences of forces are to be divided by.
+    """What differences of forces are to be divided by (theory, 126).
 
     square (e,): of the difference, on the elements of the run's mesh, as its energy over the modulus; `model` is that
     of the run. The part of it at corners falls by r^FORCE_RATE where the second solution's elements are r times as

@@ -84,8 +84,7 @@ class EndFinder:
 
 
 def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
-    """What differences of jumps at the pairs of the second solution (c,) are to be divided by (theory,
-    126).
+    """What differences of jumps at the pairs of the second solution (c,) are divided by (theory, 126).
 
     model: of the run; smooth: away from tips and corners.
     """

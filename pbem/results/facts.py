@@ -19,7 +19,7 @@ from pbem.results.traces import list_traces
 
 def count_outer_curves(results: Results) -> int:
     """The curves that have a reaction; point supports have one besides."""
-    return len(results.reactions) - len(json.loads(results.configuration).get("point_supports", {}))
+    return len(results.reactions) - len(json.loads(results.configuration or "{}").get("point_supports", {}))
 
 
 def collect_facts(results: Results, traces: int | None = None) -> dict[str, Any]:

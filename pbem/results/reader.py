@@ -273,7 +273,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         path=path,
         **{name: str(attributes[name]) for name in ("title", "case", "pbem_version", "petsc_version")},
         status=_read_status(path, attributes), failure=str(attributes.get("failure", "")),
-        configuration=str(attributes.get("configuration", "")), overrides=str(attributes.get("overrides", "")),
+        configuration=_read_configuration(attributes), overrides=str(attributes.get("overrides", "")),
         ranks=int(attributes["ranks"]),
         units=Units(str(attributes["units_length"]), str(attributes["units_stress"])),
         nodes=Nodes(
@@ -291,7 +291,7 @@ def _read(path: Path, file: h5py.File) -> Results:
         steps=steps,
         reactions=read_reactions(file, k),
         contact=Interfaces(path, read_names(file["contact"]), k),
-        pairs=AllPairs(path, read_names(file["contact"]), k),
+        pairs=_read_pairs(path, file["contact"], k),
         groups=tuple(GeneratedGroup(**each) for each in json.loads(str(file["contact"].attrs["groups"]))),
         tips=read_tips(file, k),
         energy=Energies(*(freeze(read_energy(file, kind, k)) for kind in ENERGIES)),
@@ -301,6 +301,21 @@ def _read(path: Path, file: h5py.File) -> Results:
         convergence=freeze(file["convergence"][...]),
         rigid=read_rigid(file, k),
     )
+
+
+def _read_configuration(attributes: Mapping[str, Any]) -> str:
+    """The text of the configuration, which has to be what it was written as; "" in files of earlier versions."""
+    text = str(attributes.get("configuration", ""))
+    if text and not isinstance(json.loads(text), dict):
+        raise ValueError("the configuration is no table")
+    return text
+
+
+def _read_pairs(path: Path, group: h5py.Group, steps: int) -> AllPairs:
+    pairs = AllPairs(path, read_names(group), steps)
+    if len(group.attrs["laws"]) != len(pairs.names):
+        raise ValueError(f"{len(group.attrs['laws'])} laws of {len(pairs.names)} interfaces")
+    return pairs
 
 
 def _read_status(path: Path, attributes: Mapping[str, Any]) -> str:

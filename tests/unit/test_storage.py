@@ -289,6 +289,21 @@ def test_files_that_others_have_changed_are_read_without_checksums(tmp_path: Pat
     expect_steps(path, 3)
 
 
+@pytest.mark.parametrize(("what", "value"), [
+    ("configuration", "no JSON"), ("configuration", "[]"), ("laws", ["coulomb"]), ("names", ["joint"]),
+])  # fmt: skip
+def test_files_that_others_have_spoilt_are_refused_before_they_are_used(
+    what: str, value: object, tmp_path: Path
+) -> None:
+    path = tmp_path / "case.h5"
+    write(path, 1).finish()
+    assert len(open_results(path).pairs.names) > 1
+    with h5py.File(path, "r+") as file:
+        (file if what == "configuration" else file["contact"]).attrs[what] = value
+    with pytest.raises(ResultFileError, match="is not a complete result file"):
+        open_results(path)
+
+
 def test_output_is_refused_where_it_would_destroy_something(tmp_path: Path) -> None:
     results, case, link = tmp_path / "a.h5", tmp_path / "case.toml", tmp_path / "link.toml"
     write(results, 1).finish()

@@ -79,25 +79,39 @@ def plan_graded(model: Model, ends: Sequence[ContactEnd], graded: int) -> Finer 
     """The model with elements graded towards the ends of contact, or as it is with the reason in the note; None if
     there is nothing to be graded. graded: how often that was done."""
     ends = [end for end in ends if end.fall > STILL_COARSE or not graded]
-    if not ends or graded >= MOST_GRADED:
+    if not ends:
         return None
-    names = ", ".join(f"'{name}'" for name in {end.contact: None for end in ends})
-    where = f"Contact of {names} ends near {_list_places(model, [end.place for end in ends])}"
+    where = _name_ends(model, ends)
+    if graded >= MOST_GRADED:
+        fall = f"{max(end.fall for end in ends):.0%} of the largest pressure"
+        return Finer(model, f"{where}, within elements over which the pressure still falls by {fall}: they were graded "
+                            f"{count(MOST_GRADED, 'time')}.")  # fmt: skip
+    lost = [end for end in ends if not end.located]
+    left = f" {_name_ends(model, lost)}: where in the elements there is not known, they are left as they are."
+    left = left if lost else ""
     finer = grade_ends(model, ends)
     before, after = _count_all(model), _count_all(finer)
     if after == before:
-        return None
+        return Finer(model, left.strip()) if lost else None
+    where = _name_ends(model, [end for end in ends if end.located])
     if after > MOST_GROWN * before:
-        return Finer(model, f"{where}; grading towards these ends would take {after} elements in place of {before}.")
+        return Finer(
+            model, f"{where}; grading towards these ends would take {after} elements in place of {before}.{left}"
+        )
     try:
         generate_mesh(finer)
     except PbemError as error:
         return Finer(model, f"{where}; with elements graded towards these ends there is no mesh: {error}")
     note = (
         f"{where}, where the pressure falls like a root. Elements are graded towards these ends, "
-        f"{after} in place of {before}, and the run starts again from rest."
+        f"{after} in place of {before}, and the run starts again from rest.{left}"
     )
     return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
+
+
+def _name_ends(model: Model, ends: Sequence[ContactEnd]) -> str:
+    names = ", ".join(f"'{name}'" for name in {end.contact: None for end in ends})
+    return f"Contact of {names} ends near {_list_places(model, [end.place for end in ends])}"
 
 
 def _count_all(model: Model) -> int:

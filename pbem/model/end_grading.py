@@ -21,7 +21,8 @@ class ContactEnd:
 
     contact: its name; place: complex, in the model's own coordinates; curves: the two that meet there, but for tools.
     shortest: length of the elements there that follow the root well enough; window: how far the place may be off.
-    fall: what the pressure falls by over the element there now, by the largest of the contact.
+    fall: what the pressure falls by over the element there now, by the largest of the contact. located: false where
+    the openings do not tell the place: it lies in one of the two elements that meet at `place`, which are left alone.
     """
 
     contact: str
@@ -30,12 +31,14 @@ class ContactEnd:
     shortest: float
     window: float
     fall: float = 1.0
+    located: bool = True
 
 
 def grade_ends(model: Model, ends: Sequence[ContactEnd]) -> Model:
     """The model with the elements of these curves halved until none is longer than `shortest` within the window of an
     end, and beyond than GROWTH times the distance more."""
     curves = dict(model.curves)
+    ends = [end for end in ends if end.located]
     for name in {name: None for end in ends for name in end.curves}:
         own = [end for end in ends if name in end.curves]
         curves[name] = _divide_curve(model.curves[name], own)

@@ -42,7 +42,8 @@ class _Side:
 
 def find_contact_ends(model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
     """The ends of contacts between rounded bodies over whose element the pressure falls by more than COARSE of the
-    contact's largest (theory, 124); contacts one of whose curves has a grading of the user's are left out.
+    contact's largest (theory, 124), those that cannot be located among them; contacts one of whose curves has a grading
+    of the user's are left out.
 
     Elements are looked at on the curve that the pairs belong to. Contacts between straight curves without a gap, and
     laws under which faces carry something before they touch or after they part, are left out.
@@ -127,7 +128,9 @@ class _Pressed:
         # The opening grows like the distance from the end to the power 3/2.
         slope, start = np.polyfit(free.distance, np.maximum(self._opening[free.pairs], 0.0) ** (2 / 3), 1)
         if not slope > 0 or not -last.length <= -start / slope <= 0.5 * free.length:
-            return None
+            pressed = float(self._pressure[last.pairs].max()) / self._largest
+            between = complex((mesh.end if forward else mesh.start)[element])
+            return ContactEnd(name, between, curves, np.inf, 0.0, pressed, False) if pressed > COARSE else None
         at = -start / slope
         over = self._measure_fall(last, at, forward) * np.sqrt(last.length)
         if over <= COARSE * self._largest:

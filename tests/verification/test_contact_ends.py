@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from pbem.case.build import parse_model
 from pbem.errors import CaseError, ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.end_grading import ContactEnd, grade_ends
-from pbem.passes import MOST_GRADED, plan_graded
+from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
+from pbem.solve.problem.step import SilentReporter
 from tests.verification.rigid_sample import UNMOVED, Place, evaluate_persson, find_persson_force, write_pin
 
 
@@ -170,6 +172,20 @@ def test_curves_whose_grading_is_given_are_left_alone(tmp_path: Path) -> None:
     assert results.fractions is None
 
 
+def test_an_end_that_the_openings_do_not_tell_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # As if the faces beyond parted alike everywhere.
+    monkeypatch.setattr("pbem.results.contact_ends.np.polyfit", lambda *_: (0.0, 1.0))
+    notes = []
+
+    class Listener(SilentReporter):
+        def note(self, text: str) -> None:
+            notes.append(text)
+
+    results = pbem.run(write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5", reporter=Listener())
+    assert results.status == "finished" and results.fractions is None
+    assert sum("is not known, they are left as they are" in note for note in notes) == 1
+
+
 def test_elements_grow_with_the_distance_from_an_end() -> None:
     model = parse_model(write_pin(1e-3, FORCE, 20.0, 32))[1]
     place = cmath.rect(1.0, 6.2)  # beside the joint of the circle's both ends
@@ -185,8 +201,16 @@ def test_elements_grow_with_the_distance_from_an_end() -> None:
     assert lengths[apart.argmin()] <= long / 50 and lengths.max() == pytest.approx(long)
     assert (lengths <= long / 50 + 3 * np.maximum(apart - 0.5 * lengths, 0.0) + 1e-9).all()
     assert lengths.sum() == pytest.approx(2 * math.pi)
-    assert plan_graded(model, [end], MOST_GRADED) is None and plan_graded(model, [], 0) is None
+    fine = replace(end, fall=0.5 * STILL_COARSE)
+    assert plan_graded(model, [fine], MOST_GRADED) is None and plan_graded(model, [], 0) is None
     assert plan_graded(finer, [end], 0) is None  # short enough
+    lost = replace(end, located=False)
+    found = plan_graded(model, [lost], 0)
+    assert found is not None and found.model is model and "is not known" in found.note
+    both = plan_graded(model, [end, lost], 0)
+    assert both is not None and both.model.curves == finer.curves and "is not known" in both.note
+    coarse = plan_graded(finer, [end], MOST_GRADED)
+    assert coarse is not None and coarse.model is finer and "graded 2 times" in coarse.note
     crowd = [ContactEnd("seat", cmath.rect(1.0, 0.2 * k) - model.origin, ("rim",), long / 500, 0.0) for k in range(31)]
     many = plan_graded(model, crowd, 0)
     assert many is not None and many.model is model and "in place of" in many.note

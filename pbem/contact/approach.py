@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from pbem.arrays import Real
@@ -13,9 +15,10 @@ from pbem.model.rigid_body_modes import find_rigid_body_modes
 
 def approach_pairs(model: Model, mesh: Mesh, gap: Real) -> Real:
     """Openings (m,) after that motion, from the initial ones; the same where no contact is closed by one."""
-    if not model.closing:
+    apart = {*model.closing, *_find_apart(model, mesh, gap)}
+    if not apart:
         return gap
-    motions = find_rigid_body_modes(model, dict.fromkeys(model.closing, "none"))
+    motions = find_rigid_body_modes(model, dict.fromkeys(apart, "none"))
     power = find_drive(model, motions) if motions else None
     if power is None:
         return gap
@@ -34,3 +37,14 @@ def approach_pairs(model: Model, mesh: Mesh, gap: Real) -> Real:
     if moved is not None:
         result[own] = np.maximum(moved, 0.0)
     return result
+
+
+def _find_apart(model: Model, mesh: Mesh, gap: Real) -> Iterator[str]:
+    """Contacts all of whose pairs are apart at the start, also by so little that their faces are taken to touch."""
+    pairs = mesh.pairs
+    least = np.full(len(mesh.interface_names), np.inf)
+    np.minimum.at(least, pairs.interface, gap)
+    for name, opening in zip(mesh.interface_names, least.tolist(), strict=True):
+        joint = model.contacts.get(name) or model.interfaces.get(name)
+        if joint is not None and 0 < opening < np.inf and joint.law.kind not in ("open", "bonded"):
+            yield name

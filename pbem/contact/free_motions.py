@@ -205,3 +205,23 @@ def stick_calmest_pairs(
         if holds(trial):
             return trial, np.array(held)
     return modes, np.zeros(0, dtype=np.int64)
+
+
+# Gaps that differ by more than this part are not those of a symmetric contact.
+UNEQUAL = 1e-3
+
+
+def open_unequal_neighbours(mesh: Mesh, laws: PairLaws, modes: ModeState) -> ModeState:
+    """Modes with the second of two neighbouring pairs open that are all that is closed on an interface, and that were
+    not equally far apart; the same modes where there are none."""
+    pairs, mode, gap = mesh.pairs, modes.mode.copy(), laws.gap
+    closed = np.flatnonzero((mode != OPEN) & ~pairs.crack)
+    count = np.bincount(pairs.interface[closed], minlength=len(mesh.interface_names))
+    for number in np.flatnonzero(count == 2):
+        along = np.flatnonzero(pairs.interface == number)
+        along = along[np.argsort(pairs.arc_length[along], kind="stable")]
+        at = np.flatnonzero(mode[along] != OPEN)
+        first, second = along[at]
+        if at[1] == at[0] + 1 and abs(gap[first] - gap[second]) > UNEQUAL * max(gap[first], gap[second]):
+            mode[second] = OPEN
+    return ModeState(mode, modes.sign) if (mode != modes.mode).any() else modes

@@ -17,6 +17,7 @@ from pbem.contact.free_motions import (
     close_nearest_beside,
     close_nearest_pairs,
     find_contacts_of,
+    open_unequal_neighbours,
     stick_calmest_pairs,
 )
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, resists_slip
@@ -28,6 +29,7 @@ from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.imbalance import DRIVEN
+from pbem.solve.nonlinear.unsettled import Unsettled
 from pbem.solve.problem.problem import Problem
 
 # A body that slips on all its contacts is held by single pairs at most so often in one step.
@@ -39,8 +41,6 @@ TRIED, BEYOND = 3, 1e-3
 # A pair that a body has rolled to until it touched may pull by this part of the largest pressure: by no more than the
 # moment of the other pairs is known to.
 SLIGHT = 1e-2
-# Gaps that differ by more than this part are not those of a symmetric contact.
-UNEQUAL = 1e-3
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
 # Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
@@ -105,7 +105,7 @@ class Hold:
         opening, slip (m,): as they are, the slip of this step alone; before: the modes that led to them.
         Raises ConvergenceError ("free motion") if the pairs that hold a body do not stay closed.
         """
-        held = self._choose(modes, opening, slip, before)
+        held = self._hold_parts(self._hold_bodies(modes, opening, slip, before), opening, slip, before)
         # Pairs that hold a body only by pulling open again each time: there is no state in which they hold it.
         same = before is not None and held is not modes and held.fingerprint() == before.fingerprint()
         self.repeated = self.repeated + 1 if same else 0
@@ -116,9 +116,16 @@ class Hold:
             self.refuse_free_motion(modes)
         return held
 
-    def _choose(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
-        held = self._hold_bodies(modes, opening, slip, before)
-        return self._hold_parts(held, opening, slip, before)
+    def doubt_free_motion(self, modes: ModeState, otherwise: ConvergenceError | None = None) -> None:
+        """Raise ConvergenceError if bodies are free in the last modes of a search that ended with an error otherwise.
+        """
+        error, motions = self.describe_free_motion(modes), self.list_free(modes)
+        if error and motions:
+            sticks = (modes.mode != OPEN) & resists_slip(self.problem.laws)
+            stuck = ModeState(np.where(sticks, STICK, modes.mode).astype(np.int8), modes.sign)
+            error.unless = Unsettled(otherwise, motions, not self.find_free(stuck))
+        if error:
+            raise error
 
     def _hold_bodies(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
         if not self.find_free(modes):
@@ -357,10 +364,13 @@ class Hold:
     ) -> None:
         """Raise ConvergenceError if a body can move freely in the present contact, where any position would do.
 
-        state: of all pairs in a solution, with the pressure of fluids on them (m,). Single blocks of a network that
-        float, where other blocks are held, are noted: all but their own displacement is determined.
+        state: of all pairs in a solution, with the pressure of fluids on them (m,); None in a search that does not
+        settle. Single blocks of a network that float, where other blocks are held, are noted: all but their own
+        displacement is determined.
         """
         self.settled = state
+        if state is None:
+            self.doubt_free_motion(modes)
         error = self.describe_free_motion(modes) or self._describe_unresolved(modes)
         self.settled, self.floating = None, ()
         if error is None and state is not None and pressure is not None:
@@ -379,18 +389,8 @@ class Hold:
         Round faces touch at a place between the pairs, which a contact shorter than an element does not show: pairs
         that were unequally far apart would turn the body until both touch.
         """
-        mesh, mode = self.problem.mesh, modes.mode.copy()
-        pairs, gap = mesh.pairs, self.problem.laws.gap
-        closed = np.flatnonzero((mode != OPEN) & ~pairs.crack)
-        count = np.bincount(pairs.interface[closed], minlength=len(mesh.interface_names))
-        for number in np.flatnonzero(count == 2):
-            along = np.flatnonzero(pairs.interface == number)
-            along = along[np.argsort(pairs.arc_length[along], kind="stable")]
-            at = np.flatnonzero(mode[along] != OPEN)
-            first, second = along[at]
-            if at[1] == at[0] + 1 and abs(gap[first] - gap[second]) > UNEQUAL * max(gap[first], gap[second]):
-                mode[second] = OPEN
-        free = self.find_free(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else None
+        alone = open_unequal_neighbours(self.problem.mesh, self.problem.laws, modes)
+        free = self.find_free(alone) if alone is not modes else None
         if not free:
             return None
         detail = (

@@ -51,7 +51,7 @@ from pbem.solve.nonlinear.search import (
     list_searches,
 )
 from pbem.solve.nonlinear.smooth_search import CLOSELY, SmoothSearch
-from pbem.solve.nonlinear.unsettled import Unsettled, describe_unsettled
+from pbem.solve.nonlinear.unsettled import describe_unsettled
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
 from pbem.solve.problem.step import Iteration, Supervisor
@@ -287,10 +287,8 @@ def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> Converg
 
     def describe() -> ConvergenceError:
         error = describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)
-        free, motions = hold.describe_free_motion(proposal.modes), hold.list_free(proposal.modes)
-        if free and motions:
-            return ConvergenceError(free.reason, free.detail, unless=Unsettled(error, motions))
-        return free or hold.describe_floating(proposal.modes) or error
+        hold.doubt_free_motion(proposal.modes, error)
+        return hold.describe_floating(proposal.modes) or error
 
     return hold.problem.decide(describe)
 

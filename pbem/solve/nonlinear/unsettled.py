@@ -25,12 +25,14 @@ MOST_PLACES = 300
 class Unsettled:
     """A search that did not settle, and the motions that are free in its last modes.
 
-    If the loads drive one of these motions, and some forces of the contacts balance them, the modes are not those of an
-    equilibrium, and the error is this one.
+    Where some forces of the contacts balance the loads, these modes need not be those of an equilibrium: see
+    pbem.solve.steps.ends. error: of the search; None if it ended as no pair held a body of those that were closed, or
+    stuck, to do so. may_stick: whether friction of the pairs that are closed could prevent the motions.
     """
 
-    error: ConvergenceError
+    error: ConvergenceError | None
     motions: tuple[RigidBodyMode, ...]
+    may_stick: bool = False
 
 
 def describe_unsettled(

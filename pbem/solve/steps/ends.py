@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.contact.cohesive import SEPARATION
-from pbem.contact.laws import Memory
+from pbem.contact.laws import Memory, resists_slip
 from pbem.contact.separating import find_bonded
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
@@ -14,6 +14,8 @@ from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction, is_
 
 # Reasons for which a step without equilibrium can fail.
 UNSETTLED = ("iteration limit", "mode cycle", "singular tangent", "no admissible modes")
+# What is said where forces could balance the loads, but no modes were found in which a body is held.
+LOOSE = "no pair holds a body of those that were closed, or stuck, to do so; use shorter elements where it touches"
 # The end of what is said of a limit load.
 BEYOND = "prescribe a displacement in place of the load to go beyond"
 
@@ -43,10 +45,15 @@ def find_reason(
     unless = error.unless
     if unless is None:
         return error
-    held = problem.decide(lambda: bool(
-        is_driven(problem, stage, target, unless.motions) and can_balance(problem, memory, stage, target)))
-    found: ConvergenceError = unless.error if held else error
-    return found
+
+    def is_doubtful() -> bool:
+        driven = is_driven(problem, stage, target, unless.motions)
+        if unless.error is None and driven and resists_slip(problem.laws).any():
+            return False  # what friction does not hold can slide away from forces that could balance it
+        return (driven or unless.may_stick) and bool(can_balance(problem, memory, stage, target))
+
+    found: ConvergenceError = unless.error or ConvergenceError("mode cycle", LOOSE)
+    return found if problem.decide(is_doubtful) else error
 
 
 def find_balanced(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> float:

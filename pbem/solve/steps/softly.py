@@ -35,7 +35,8 @@ def solve_softly(
     too, for crack networks and large models, whose groups settle by themselves, for laws that are not linear in each
     status, and for other errors. resumed: see solve_step.
     """
-    if error.reason not in UNSETTLED or tangent.settling.nearby or not find_linear(problem.laws).all():
+    unsettled = error.reason in UNSETTLED or error.unless is not None or resumed is not None
+    if not unsettled or tangent.settling.nearby or not find_linear(problem.laws).all():
         return None
     iterations: list[Iteration] = from_plain(resumed["iterations"]) if resumed else []
     guess = replace(begin, modes=from_plain(resumed["modes"])) if resumed else begin

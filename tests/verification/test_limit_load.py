@@ -223,6 +223,26 @@ def test_a_body_is_free_to_move_only_if_nothing_could_hold_it(
     assert find_reason(problem, start_memory(problem.laws), 1, 1.0, settled) is settled
 
 
+@pytest.mark.parametrize(
+    ("friction", "shear", "motion", "sticks", "expected"),
+    [
+        (0.25, 0.2, 1.0, True, "free motion"),  # what friction does not hold can slide, though forces could balance it
+        (0.25, 0.0, 1.0, True, "mode cycle"),  # pushed by nothing, and friction can hold it
+        (0.25, 0.0, 1.0, False, "free motion"),
+        (0.0, 0.0, 1.0, False, "free motion"),  # pushed by nothing: any place would do
+        (0.0, 0.0, 1j, False, "mode cycle"),  # pressed on what is below
+    ],
+)
+def test_a_body_that_no_pair_was_found_to_hold(
+    friction: float, shear: float, motion: complex, sticks: bool, expected: str
+) -> None:
+    model = parse_model(write_pushed_block(shear, {"friction": friction}))[1]
+    problem = assemble_problem(model, generate_mesh(model), world)
+    upper = RigidBodyMode(("upper",), {"upper": (motion, 0.0)}, "translation of 'upper'")
+    error = ConvergenceError("free motion", "nothing prevents a translation", unless=Unsettled(None, (upper,), sticks))
+    assert find_reason(problem, start_memory(problem.laws), 1, 1.0, error).reason == expected
+
+
 @pytest.mark.parametrize(("unit", "shift"), [(1.0, 0.0), (1e3, 1e3)])
 @pytest.mark.parametrize("forced", [False, True], ids=["held", "forced"])
 def test_rigid_tools_bear_what_holds_them_and_no_more_than_forces_give(

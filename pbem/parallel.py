@@ -271,7 +271,7 @@ def add_up(comm: MPI.Intracomm, part: Real) -> Real:
     """The sum over the ranks of arrays of the same shape, on every rank."""
     if comm.size == 1:
         return part
-    whole = np.empty_like(part)
+    whole = np.empty(part.shape, part.dtype)  # in C's order, as what is sent
     comm.Allreduce(np.ascontiguousarray(part), whole)
     return whole
 

@@ -126,11 +126,13 @@ class DenseSystem:
         tangent: TangentOperator
         # Options of the Krylov solver are heeded where it does the work.
         asked = any(name.startswith(("ksp_", "pc_type")) for name in list_options())
+        # Those of PETSc's factors, too.
+        panels = problem.comm.size > 1 and not any(name.startswith(("pc_", "mat_")) for name in list_options())
         if problem.model.solver.linear == "gmres" or asked:
             tangent = FactoredTangent(problem, rows)
         else:
             few = 2 * np.count_nonzero(varying) <= FEW * problem.unknowns
-            tangent = CondensedTangent(problem, rows, varying, few)
+            tangent = CondensedTangent(problem, rows, varying, few, panels)
         return ReleasedTangent(problem, tangent) if problem.anchors else tangent
 
     def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> InteriorRows:

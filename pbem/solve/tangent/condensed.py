@@ -78,13 +78,14 @@ class CondensedTangent(TangentOperator):
     known: None while nothing is factorised.
     """
 
-    def __init__(self, problem: Problem, rows: TangentRows, varying: Bool, few: bool) -> None:
+    def __init__(self, problem: Problem, rows: TangentRows, varying: Bool, few: bool, panels: bool = False) -> None:
+        """panels: see Reference."""
         self.problem, self.few = problem, few
         self.varying = np.flatnonzero(varying)
         self.fixed = np.flatnonzero(~varying)
         pairs = problem.mesh.pairs
         self.eliminated = pairs.crack & varying & few
-        self.reference = Reference(problem, rows, np.flatnonzero(self.eliminated))
+        self.reference = Reference(problem, rows, np.flatnonzero(self.eliminated), panels)
         self.unknowns = number_components(pairs.slave[self.varying])
         self.known: Known | None = None
 
@@ -159,7 +160,7 @@ class CondensedTangent(TangentOperator):
         columns = start_columns(self.reference, states[:, self.unknowns], self.unknowns)
         if self.few:
             columns = columns.extend(np.arange(len(self.varying)))
-        effort = Effort(problem.comm.size, self.reference.solver.work, limited=not self.few)
+        effort = Effort(problem.comm.size, self.reference.factors.work, limited=not self.few)
         self.known = Known(tangent, bases, columns, effort, loads.renew(self._solve_load))
 
     def _refer(self, law: Linearisation) -> Real:

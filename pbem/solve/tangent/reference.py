@@ -23,9 +23,12 @@ from pbem.clock import clock
 from pbem.parallel import gather_parts
 from pbem.solve.petsc.linear import LinearSolver, choose_method
 from pbem.solve.problem.problem import Problem
+from pbem.solve.tangent.panel_factors import PanelFactors
 
 # Columns that are formed at a time: little beside the matrix, much beside the cost of a call.
 COLUMNS_AT_ONCE = 512
+# Products with so many vectors take longer than to form the matrix for them.
+FORMED = 64
 
 
 def form_columns(
@@ -90,9 +93,10 @@ class Reference:
     every M0 holds them in stick without joints.
     """
 
-    def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer) -> None:
+    def __init__(self, problem: Problem, rows: TangentRows, eliminated: Integer, panels: bool = False) -> None:
+        """panels: dense factors are held in panels of columns, with which nothing but columns can be solved."""
         self.problem, self.operator, self.block_unknowns = problem, rows.operator, rows.block_unknowns
-        method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
+        self.method = choose_method(problem.model.solver.linear, len(problem.mesh.region_names))
         nodes = problem.mesh.pairs.slave[eliminated]
         kept = np.ones(problem.unknowns, dtype=bool)
         kept.reshape(-1, 2)[nodes] = False
@@ -101,9 +105,19 @@ class Reference:
         self.own = slice(first, last)
         self.kept_rows = np.flatnonzero(kept[self.own])
         self.crack_rows = np.flatnonzero(~kept[self.own])
-        self.solver = LinearSolver(problem.comm, method, len(self.kept_rows), int(kept.sum()), self._multiply)
+        here, count = len(self.kept_rows), int(kept.sum())
+        self.factors: LinearSolver | PanelFactors = (
+            PanelFactors(problem.comm, here, count) if panels and self.method == "lu"
+            else LinearSolver(problem.comm, self.method, here, count, self._multiply)
+        )
         self.present: sparse.csr_matrix | None = None
         self.free_blocks = np.zeros((0, 2, 2))
+
+    @property
+    def solver(self) -> LinearSolver:
+        """The factors as preconditioner of GMRES; not if they are held in panels."""
+        assert isinstance(self.factors, LinearSolver)
+        return self.factors
 
     @property
     def rows(self) -> int:
@@ -120,19 +134,19 @@ class Reference:
         chosen = [columns[kept[columns]] for columns in self.block_unknowns]
         wanted = [np.flatnonzero(kept[self.own][block.rows]) for block in self.operator.blocks]
         with clock.piece("matrix"):
-            if self.solver.method == "lu":
+            if self.method == "lu":
                 self._fill_dense(constraints, wanted)
             else:
                 self._fill_sparse(constraints, chosen, wanted)
             self.free_blocks = self._invert_free_blocks(constraints)
         with clock.piece("factors", 8.0 * len(self.kept_rows) * int(kept.sum())):
-            self.solver.factorise()
+            self.factors.factorise()
 
     def _fill_dense(self, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
         """Columns of all rows at a time, as they may have to change ranks."""
         operator, numbers = self.operator, np.flatnonzero(self.kept)
         local = np.cumsum(self.kept[self.own]) - 1
-        self.solver.begin_filling()
+        self.factors.begin_filling()
         for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
             columns = numbers[begin : begin + COLUMNS_AT_ONCE]
             values = np.zeros((len(self.kept_rows), len(columns)))
@@ -143,7 +157,7 @@ class Reference:
                         values = part
                     else:
                         values[local[block.rows[rows]]] = part
-            self.solver.fill_columns(begin, values)
+            self.factors.fill_columns(begin, values)
 
     def _fill_sparse(self, constraints: sparse.csr_matrix, chosen: list[Integer], wanted: list[Integer]) -> None:
         """Dense blocks of the regions."""
@@ -187,7 +201,7 @@ class Reference:
     def solve_columns(self, rhs: Real) -> Real:
         """This rank's rows (rows, k) of the solutions for many right-hand sides, by the factors alone."""
         with clock.piece("columns", rhs.nbytes):
-            return self._complete(rhs, self.solver.solve_columns(rhs[self.kept_rows]))
+            return self._complete(rhs, self.factors.solve_columns(rhs[self.kept_rows]))
 
     def _complete(self, rhs: Real, kept: Real) -> Real:
         """Add the eliminated unknowns (rows, k) to the solution for the others (theory, 60)."""
@@ -201,13 +215,29 @@ class Reference:
         for block in self.operator.blocks:
             at = np.flatnonzero(~self.kept[self.own][block.rows])
             if len(at):
-                product = take_rows(block.matrix, at) @ (self.present[block.columns] @ whole)
+                product = self._multiply_rows(block, at, whole)
                 left[np.searchsorted(self.crack_rows, block.rows[at])] -= product
         result = np.empty((self.rows, rhs.shape[1]))
         result[self.kept_rows] = kept
         result[self.crack_rows] = np.matmul(self.free_blocks, left.reshape(-1, 2, rhs.shape[1])).reshape(left.shape)
         return result
 
+    def _multiply_rows(self, block: RegionRows, rows: Integer, whole: Real) -> Real:
+        """Rows of eliminated unknowns in a block of B M x, for many x (unknowns, c) without these unknowns.
+
+        For so many that it pays B M is formed first, which is half as wide as B.
+        """
+        assert self.present is not None
+        if whole.shape[1] < FORMED:
+            result: Real = take_rows(block.matrix, rows) @ (self.present[block.columns] @ whole)
+            return result
+        numbers = np.flatnonzero(self.kept)
+        result = np.zeros((len(rows), whole.shape[1]))
+        for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
+            columns = numbers[begin : begin + COLUMNS_AT_ONCE]
+            result += form_columns(self.operator, block, self.present, columns, rows) @ whole[columns]
+        return result
+
     def destroy(self) -> None:
         """Free PETSc's storage."""
-        self.solver.destroy()
+        self.factors.destroy()

@@ -1,0 +1,212 @@
+"""LU factors of a dense matrix whose columns are dealt to several ranks in panels, in the place of the matrix.
+
+Panel by panel the rank that has it eliminates with row interchanges and passes it on, and every rank brings its own
+columns up to date (G. H. Golub, C. F. Van Loan, Matrix Computations, fourth edition, 2013, section 3.6). Almost all is
+products of matrices, as wide as the processor likes them; ScaLAPACK's triangular solutions for many right-hand sides
+multiply by 32 columns at a time and take four times as long.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import blas, lapack
+
+from pbem.arrays import Integer, Real
+from pbem.errors import ConvergenceError
+from pbem.parallel import add_up, gather_rows
+from pbem.solve.petsc.linear import OPERATIONS_OF_A_CALL, OPERATIONS_OF_AN_ENTRY, SINGLE
+from pbem.solve.petsc.refactoring import FactorWork
+
+# Columns of a panel: each rank has at least so many panels, as it idles with the last one.
+WIDEST, LEAST, PANELS = 192, 16, 8
+# Products are taken from a matrix by blocks of so many rows and columns, which the processor's cache holds.
+ROWS_AT_ONCE, COLUMNS_AT_ONCE = 384, 512
+# Of so many right-hand sides it pays that each rank solves for some of them, to which all panels have to come.
+MANY = 16
+
+
+class PanelFactors:
+    """Factors of a matrix (rows, rows) of which each rank gives some neighbouring rows; solved with for any columns.
+
+    All methods are called by all ranks together. work: of the last factorisation, counted.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, local_rows: int, rows: int) -> None:
+        self.comm, self.rows = comm, rows
+        ends = np.concatenate([[0], np.cumsum(comm.allgather(local_rows))])
+        self._rows_of = [slice(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False)]
+        width = int(np.clip(rows // (PANELS * comm.size), LEAST, WIDEST))
+        self._cuts = [*range(0, rows, width), rows]
+        self._panel_of = np.arange(rows) // width
+        # Transposed: of this rank's columns, one after the other; every column is contiguous.
+        self._columns = np.zeros((0, rows))
+        self._pivots, self._order = np.zeros(rows, dtype=np.int32), np.arange(rows)
+        self._spare = np.empty(ROWS_AT_ONCE * COLUMNS_AT_ONCE)
+        self.work = FactorWork(0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def stored(self) -> int:
+        """Bytes of this rank's columns."""
+        return self._columns.nbytes
+
+    def begin_filling(self) -> None:
+        """Make an empty matrix in place of the former and its factors."""
+        own = np.count_nonzero(self._panel_of % self.comm.size == self.comm.rank)
+        self._columns = np.zeros((0, 0))  # the former first
+        self._columns = np.empty((own, self.rows))
+
+    def fill_columns(self, first: int, values: Real) -> None:
+        """Set some columns (local_rows, k), from the first on, of this rank's rows."""
+        number = np.arange(first, first + values.shape[1])
+        owner = self._panel_of[number] % self.comm.size
+        given = [values[:, owner == rank].T for rank in range(self.comm.size)]
+        at = self._place(number[owner == self.comm.rank])
+        shapes = [(len(at), rows.stop - rows.start) for rows in self._rows_of]
+        for rows, part in zip(self._rows_of, self._exchange(given, shapes), strict=True):
+            self._columns[at, rows] = part
+
+    def factorise(self) -> None:
+        """Factorise the filled matrix. Raises ConvergenceError ("singular tangent") on all ranks alike."""
+        for panel in range(len(self._cuts) - 1):
+            first, last = self._cuts[panel], self._cuts[panel + 1]
+            lower = self._eliminate(panel)
+            right, own = self._count_before(panel + 1), self._count_before(panel)
+            for part in (self._columns[:own], self._columns[right:]):
+                if len(part):
+                    lapack.dlaswp(part.T, self._pivots, k1=first, k2=last - 1, overwrite_a=1)
+            if right < len(self._columns):
+                solved = _divide(self._columns[right:, first:last], lower[:, : last - first], lower=True)
+                self._columns[right:, first:last] = solved
+                self._take_off(self._columns[right:, last:], solved, lower[:, last - first :])
+        order = list(range(self.rows))
+        for row, pivot in enumerate(self._pivots.tolist()):
+            order[row], order[pivot] = order[pivot], order[row]
+        self._order = np.array(order)
+        entries = float(self.rows) ** 2
+        call = OPERATIONS_OF_A_CALL + SINGLE * 2.0 * entries
+        self.work = FactorWork(
+            2 / 3 * entries * self.rows + OPERATIONS_OF_AN_ENTRY * entries, call, 2.0 * entries, call
+        )
+
+    def _eliminate(self, panel: int) -> Real:
+        """Factors of a panel (w, rows from its first on), transposed, on every rank; and its pivots."""
+        first, last = self._cuts[panel], self._cuts[panel + 1]
+        root, own = panel % self.comm.size, self._count_before(panel)
+        found, failed = np.empty((last - first, self.rows - first)), 0
+        if root == self.comm.rank:
+            taken = np.ascontiguousarray(self._columns[own : own + len(found), first:])
+            factors, pivots, failed = lapack.dgetrf(taken.T, overwrite_a=1)
+            found[:] = factors.T
+            self._columns[own : own + len(found), first:] = found
+            self._pivots[first:last] = pivots + first
+        if self.comm.bcast(failed, root=root):
+            self._columns = np.zeros((0, self.rows))
+            raise ConvergenceError(
+                "singular tangent", "the tangent operator has no LU factors; a body is probably free to move"
+            )
+        self.comm.Bcast(self._pivots[first:last], root=root)
+        self.comm.Bcast(found, root=root)
+        return found
+
+    def solve_columns(self, rhs: Real) -> Real:
+        """This rank's rows (local_rows, k) of the solutions for its rows of many right-hand sides."""
+        if rhs.shape[1] < MANY:
+            whole = self._solve_few(gather_rows(self.comm, rhs)[self._order].T)
+            return np.ascontiguousarray(whole[:, self._rows_of[self.comm.rank]].T)
+        share = np.linspace(0, rhs.shape[1], self.comm.size + 1).astype(int)
+        cuts = [slice(a, b) for a, b in zip(share, share[1:], strict=False)]
+        mine = cuts[self.comm.rank].stop - cuts[self.comm.rank].start
+        lengths = [rows.stop - rows.start for rows in self._rows_of]
+        parts = self._exchange([rhs[:, cut].T for cut in cuts], [(mine, length) for length in lengths])
+        values = np.concatenate(parts, axis=1)[:, self._order]
+        self._solve_many(values)
+        here = lengths[self.comm.rank]
+        found = self._exchange([values[:, rows] for rows in self._rows_of],
+                               [(cut.stop - cut.start, here) for cut in cuts])
+        return np.ascontiguousarray(np.concatenate(found, axis=0).T)
+
+    def _solve_many(self, values: Real) -> None:
+        """Put the solutions in the place of this rank's right-hand sides (k, rows), in the order of the pivots."""
+        panels = len(self._cuts) - 1
+        for panel in range(panels):
+            first, last = self._cuts[panel], self._cuts[panel + 1]
+            lower = self._pass_on(panel, slice(first, self.rows))
+            solved = values[:, first:last] = _divide(values[:, first:last], lower[:, : last - first], lower=True)
+            self._take_off(values[:, last:], solved, lower[:, last - first :])
+        for panel in reversed(range(panels)):
+            first, last = self._cuts[panel], self._cuts[panel + 1]
+            upper = self._pass_on(panel, slice(0, last))
+            solved = values[:, first:last] = _divide(values[:, first:last], upper[:, first:], lower=False)
+            self._take_off(values[:, :first], solved, upper[:, :first])
+
+    def _solve_few(self, values: Real) -> Real:
+        """The solutions (k, rows) for right-hand sides that all ranks know; panels stay where they are."""
+        panels, size, own = len(self._cuts) - 1, self.comm.size, self.comm.rank
+        solved = np.zeros_like(values)
+        for lower in (True, False):
+            taken = np.zeros_like(values)  # what this rank's panels take from the right-hand sides
+            for panel in range(panels) if lower else reversed(range(panels)):
+                first, last = self._cuts[panel], self._cuts[panel + 1]
+                part = np.ascontiguousarray(taken[:, first:last])
+                total = np.empty_like(part)
+                self.comm.Reduce(part, total, root=panel % size)
+                if panel % size == own:
+                    at = self._count_before(panel)
+                    columns = self._columns[at : at + last - first]
+                    given = (values if lower else solved)[:, first:last] - total
+                    solved[:, first:last] = _divide(given, columns[:, first:last], lower)
+                    rest = slice(last, self.rows) if lower else slice(0, first)
+                    taken[:, rest] += solved[:, first:last] @ columns[:, rest]
+        return add_up(self.comm, solved)
+
+    def _pass_on(self, panel: int, rows: slice) -> Real:
+        """Some rows of a panel's columns (w, rows), transposed, on every rank."""
+        root, own = panel % self.comm.size, self._count_before(panel)
+        shape = (self._cuts[panel + 1] - self._cuts[panel], rows.stop - rows.start)
+        mine = root == self.comm.rank
+        found = np.ascontiguousarray(self._columns[own : own + shape[0], rows]) if mine else np.empty(shape)
+        self.comm.Bcast(found, root=root)
+        return found
+
+    def _take_off(self, values: Real, left: Real, right: Real) -> None:
+        """values (k, r) -= left (k, w) @ right (w, r), by blocks."""
+        for begin in range(0, values.shape[1], COLUMNS_AT_ONCE):
+            some = right[:, begin : begin + COLUMNS_AT_ONCE]
+            for at in range(0, len(values), ROWS_AT_ONCE):
+                rows = left[at : at + ROWS_AT_ONCE]
+                product = self._spare[: len(rows) * some.shape[1]].reshape(len(rows), some.shape[1])
+                np.matmul(rows, some, out=product)
+                values[at : at + ROWS_AT_ONCE, begin : begin + COLUMNS_AT_ONCE] -= product
+
+    def _count_before(self, panel: int) -> int:
+        """How many of this rank's columns are in panels before this one."""
+        return int(self._place(np.array([self._cuts[panel]]))[0])
+
+    def _place(self, columns: Integer) -> Integer:
+        """How many of this rank's columns are before these (k,): where they are, if they are its own."""
+        size, rank, width = self.comm.size, self.comm.rank, self._cuts[1]
+        panel = columns // width
+        before = (panel + size - 1 - rank) // size  # own panels before
+        within = np.where((panel % size == rank), columns - panel * width, 0)
+        return np.minimum(before * width + within, len(self._columns))
+
+    def _exchange(self, given: list[Real], shapes: list[tuple[int, int]]) -> list[Real]:
+        """Arrays of these shapes from all ranks, for one given to each."""
+        sent = np.concatenate([part.ravel() for part in given])
+        counts = [rows * columns for rows, columns in shapes]
+        taken = np.empty(sum(counts))
+        self.comm.Alltoallv([sent, [part.size for part in given]], [taken, counts])
+        ends = np.cumsum(counts)[:-1]
+        return [part.reshape(shape) for part, shape in zip(np.split(taken, ends), shapes, strict=True)]
+
+    def destroy(self) -> None:
+        """Free the storage."""
+        self._columns = np.zeros((0, self.rows))
+
+
+def _divide(values: Real, panel: Real, lower: bool) -> Real:
+    """values (k, w) by the triangle (unit lower, or upper) at the top of a panel (w, w), transposed: X T = values."""
+    triangle, given = np.ascontiguousarray(panel).T, np.ascontiguousarray(values).T
+    found: Real = blas.dtrsm(1.0, triangle, given, lower=int(lower), diag=int(lower)).T
+    return found

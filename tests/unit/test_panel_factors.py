@@ -1,0 +1,55 @@
+"""Dense factors in panels of columns on several ranks, against LAPACK's on one."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+
+import pytest
+
+# Of each size a singular matrix, then a regular one whose pivots are far from its diagonal; ranks have unequal shares.
+SOLVE = """
+import numpy as np
+from pbem.errors import ConvergenceError
+from pbem.parallel import share_nodes, world
+from pbem.solve.tangent.panel_factors import PanelFactors
+
+COLUMNS = 41
+for rows in (5, 13, 129, 500):
+    random = np.random.default_rng(rows)
+    matrix = random.standard_normal((rows, rows))[:, ::-1] * np.logspace(0, 6, rows)
+    singular = matrix.copy()
+    singular[:, 3] = 0.0
+    offsets = share_nodes(random.uniform(0.1, 3.0, rows), world.size)
+    own = slice(int(offsets[world.rank]), int(offsets[world.rank + 1]))
+    given = random.standard_normal((rows, COLUMNS))
+    factors = PanelFactors(world, own.stop - own.start, rows)
+    for each in (singular, matrix):
+        factors.begin_filling()
+        for column in range(0, rows, 50):
+            factors.fill_columns(column, each[own, column:column + 50])
+        try:
+            factors.factorise()
+        except ConvergenceError as error:
+            assert each is singular and error.reason == "singular tangent"
+        else:
+            assert each is matrix
+    # At most a panel more than an equal share.
+    assert factors.stored <= 8 * rows * (rows / world.size + max(rows / (8 * world.size), 16))
+    expected = np.linalg.solve(matrix, given)
+    for count in (1, 3, 15, 16, 17, COLUMNS):
+        found = factors.solve_columns(given[own, :count])
+        assert found.shape == (own.stop - own.start, count)
+        off = np.abs(matrix[:, own] @ (found - expected[own, :count]))
+        assert off.max() < 1e-11 * np.abs(given).max(), (rows, count, off.max())
+    factors.destroy()
+print("solved")
+"""
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+def test_solutions_are_those_of_one_rank(ranks: int, mpirun_snippet: Launch) -> None:
+    done = mpirun_snippet(ranks, SOLVE, timeout=60.0)
+    assert done.stdout.split() == ranks * ["solved"], done.stderr

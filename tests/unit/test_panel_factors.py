@@ -1,4 +1,4 @@
-"""Dense factors in panels of columns on several ranks, against LAPACK's on one."""
+"""Dense factors in panels of columns: residuals are those of a stable elimination, on any number of ranks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 SOLVE = """
 import numpy as np
 from pbem.errors import ConvergenceError
-from pbem.parallel import share_nodes, world
+from pbem.parallel import gather_rows, share_nodes, world
 from pbem.solve.tangent.panel_factors import PanelFactors
 
 COLUMNS = 41
@@ -36,20 +36,21 @@ for rows in (5, 13, 129, 500):
             assert each is matrix
     # At most a panel more than an equal share.
     assert factors.stored <= 8 * rows * (rows / world.size + max(rows / (8 * world.size), 16))
-    expected = np.linalg.solve(matrix, given)
     for count in (1, 3, 15, 16, 17, COLUMNS):
         found = factors.solve_columns(given[own, :count])
         assert found.shape == (own.stop - own.start, count)
-        off = np.abs(matrix[:, own] @ (found - expected[own, :count]))
-        assert off.max() < 1e-11 * np.abs(given).max(), (rows, count, off.max())
+        solution = gather_rows(world, found)
+        size = np.abs(matrix) @ np.abs(solution)
+        assert (np.abs(matrix @ solution - given[:, :count]) < 1e-14 * rows**0.5 * size).all()
     factors.destroy()
-print("solved")
+for rank in world.gather(world.rank) or ():
+    print("solved on", rank)
 """
 
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3, 4])
-def test_solutions_are_those_of_one_rank(ranks: int, mpirun_snippet: Launch) -> None:
+def test_residuals_are_of_rounding(ranks: int, mpirun_snippet: Launch) -> None:
     done = mpirun_snippet(ranks, SOLVE, timeout=60.0)
-    assert done.stdout.split() == ranks * ["solved"], done.stderr
+    assert done.stdout.splitlines() == [f"solved on {rank}" for rank in range(ranks)], done.stderr

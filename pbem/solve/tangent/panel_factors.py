@@ -8,6 +8,8 @@ multiply by 32 columns at a time and take four times as long.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg import blas, lapack
@@ -35,7 +37,7 @@ class PanelFactors:
     def __init__(self, comm: MPI.Intracomm, local_rows: int, rows: int) -> None:
         self.comm, self.rows = comm, rows
         ends = np.concatenate([[0], np.cumsum(comm.allgather(local_rows))])
-        self._rows_of = [slice(int(a), int(b)) for a, b in zip(ends, ends[1:], strict=False)]
+        self._rows_of = [slice(int(a), int(b)) for a, b in pairwise(ends)]
         width = int(np.clip(rows // (PANELS * comm.size), LEAST, WIDEST))
         self._cuts = [*range(0, rows, width), rows]
         self._panel_of = np.arange(rows) // width
@@ -115,7 +117,7 @@ class PanelFactors:
             whole = self._solve_few(gather_rows(self.comm, rhs)[self._order].T)
             return np.ascontiguousarray(whole[:, self._rows_of[self.comm.rank]].T)
         share = np.linspace(0, rhs.shape[1], self.comm.size + 1).astype(int)
-        cuts = [slice(a, b) for a, b in zip(share, share[1:], strict=False)]
+        cuts = [slice(a, b) for a, b in pairwise(share)]
         mine = cuts[self.comm.rank].stop - cuts[self.comm.rank].start
         lengths = [rows.stop - rows.start for rows in self._rows_of]
         parts = self._exchange([rhs[:, cut].T for cut in cuts], [(mine, length) for length in lengths])

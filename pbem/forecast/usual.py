@@ -34,7 +34,7 @@ AT_ONCE, COPIES_FORMED, COPIES_SOLVED, SHARED = 512, 1.5, 4.0, 0.4
 NEAR_MEMORY, PACKED_MEMORY, INVERSES, SPARSE_FACTORS, SPARSE_FACTORS_SHARED = 1.0, 0.64, 0.4, 1.0, 1.6
 # Of all bodies' tangent operator, in PETSc's and MUMPS' copies, and of its factors beyond those.
 BODIES_FORMED, BODIES_FACTORS = 4.0, 1.3
-# Of several ranks' dense factors, which ScaLAPACK does not put in the place of the matrix.
+# Of several ranks' dense factors for GMRES, which ScaLAPACK does not put in the place of the matrix.
 SCATTERED = 1.2
 
 # Newton iterations of the first step where pairs change their status: to slip; open too; or nobody knows; of a further
@@ -161,7 +161,7 @@ def list_memory(work: Work, ranks: int, part: float, steps: int) -> dict[str, fl
                 "mesh and vectors": everywhere * ranks * work.unknowns,
                 BESIDE: max(FIRST + FIRST_UNKNOWN * work.unknowns, at_once)}
     changing = 0.0 if work.columns else 2.0 * min(part, CHANGING) * work.pairs
-    factors = (sparse if work.sparse else SCATTERED if ranks > 1 else 0.0) * work.factored
+    factors = (sparse if work.sparse else SCATTERED if work.scattered and ranks > 1 else 0.0) * work.factored
     copies = COPIES_SOLVED if part or work.columns else COPIES_FORMED
     return {
         "operator": 8 * (work.entries + work.besides),

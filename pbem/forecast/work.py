@@ -33,6 +33,7 @@ class Work:
     columns: of pairs, computed once for all. hierarchical, sparse: kind of the operator and of its factors; of the
     hierarchical one these are of all bodies together, and `besides` is of the rows that they are made of. groups: of
     bodies, in the preconditioner of the hierarchical one. settling: numbers of four bytes of networks' parts.
+    scattered: several ranks' dense factors are ScaLAPACK's.
     """
 
     unknowns: int
@@ -47,6 +48,7 @@ class Work:
     sparse: bool
     groups: Groups = NO_GROUPS
     settling: float = 0.0
+    scattered: bool = False
 
 
 def count_work(model: Model, mesh: Mesh) -> Work:
@@ -70,7 +72,7 @@ def count_work(model: Model, mesh: Mesh) -> Work:
     sparse = model.solver.linear == "mumps" or (model.solver.linear != "lu" and len(model.regions) > 1)
     if not sparse:
         return Work(unknowns, varying, entries, besides, float(kept) ** 2, float(kept) ** 2, 2 / 3 * float(kept) ** 3,
-                    columns, False, False)
+                    columns, False, False, scattered=model.solver.linear == "gmres")
     formed, factored, operations = _count_sparse(model, mesh, outer, laws)
     shrink = (kept / unknowns) ** 2
     # Of the matrix the values and the numbers of the columns are stored.

@@ -4,6 +4,11 @@ The normal law as a projection, p = max(p - r g, 0) for the contact pressure p a
 sqrt(x^2 + 4 e^2)) / 2 of the trial value x = p - r g: the hyperbola r p g = e^2 (B. Chen, P. T. Harker, SIAM J. Matrix
 Anal. Appl. 14, 1993; C. Kanzow, SIAM J. Matrix Anal. Appl. 17, 1996). The projection of friction on its bound is the
 sum of two such maxima. With e -> 0 the laws are the true ones.
+
+The tangents of these laws can cancel the stiffness of what is beside them: in the tip of a sliver, whose faces slide
+over each other, the pressure that one gains is the friction that the other bears. A proximal stiffness, which acts on
+the change of the jumps from one state to the next, makes such systems regular and has no part in where they lead (R. T.
+Rockafellar, SIAM J. Control Optim. 14, 1976; theory, 127).
 """
 
 from __future__ import annotations
@@ -55,29 +60,33 @@ def close_all(laws: PairLaws, modes: ModeState) -> ModeState:
 
 def linearise_smoothly(
     laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real, traction_scale: float,
-    width: float,
+    width: float, proximal: Real,
 ) -> Linearisation:
     """The tangents of the smoothed laws of pairs (m,) at a state; others are closed, or open for good.
 
-    width: e, a stress. (theory, 122, 123)
+    width: e, a stress. proximal (m,): stiffness against the change of the jumps, stress/length; what it bears is part
+    of the tractions, see `take_off_proximal`. (theory, 122, 123, 127)
     """
-    r, scale = laws.stiffness, traction_scale
+    r, k, scale = laws.stiffness, proximal, traction_scale
     x, y = _try(laws, state, memory, pressure)
+    opening, slip = _find_plastic(laws, state)
     held, a = _smooth_maximum(x, width)
     strength = _find_bound(laws, held, memory, pressure)
     above, by_above = _smooth_maximum(y - strength.bound, width)
     below, by_below = _smooth_maximum(-y - strength.bound, width)
     d, c = by_above + by_below, (by_above - by_below) * strength.by_traction * a
-    # In units of the traction scale: (a - 1) p_n + a r g_n = P - a x + (1 - a) pressure; with what the other gives,
-    # d p_s + (d - 1) r slip = d y - (P1 - P2) + c (x + pressure) + c (p_n + r g_n).
-    normal = np.stack([a - 1, a * r / scale], axis=1)
-    along = np.stack([d, (d - 1) * r / scale], axis=1)
+    # In units of the traction scale: (a - 1) q_n + a r g_n = P - a x + (1 - a) pressure; with what the other gives,
+    # d q_s + (d - 1) r slip = d y - (P1 - P2) + c (x + pressure) + c (q_n + r g_n). Of the tractions of the law,
+    # q = p - k (g - the last g).
+    normal = np.stack([a - 1, (a * r + (1 - a) * k) / scale], axis=1)
+    along = np.stack([d, ((d - 1) * r - d * k) / scale], axis=1)
     tangent, offset = np.zeros((laws.count, 4, 2)), np.zeros((laws.count, 4))
-    tangent[:, P_N::2, 0], offset[:, P_N::2] = _solve_row(normal, (held - a * x + (1 - a) * pressure) / scale)
-    tangent[:, P_S::2, 1], offset[:, P_S::2] = _solve_row(
-        along, (d * y - above + below + c * (x + pressure)) / scale + along[:, 1] * memory.slip)
+    tangent[:, P_N::2, 0], offset[:, P_N::2] = _solve_row(
+        normal, (held - a * x + (1 - a) * (pressure + k * opening)) / scale)
+    right = d * y - above + below + c * (x + pressure + k * opening) + (d - 1) * r * memory.slip - d * k * slip
+    tangent[:, P_S::2, 1], offset[:, P_S::2] = _solve_row(along, right / scale)
     for values in (tangent[:, :, 0], offset):
-        values[:, P_S::2] += _solve_row(along, c * (values[:, P_N] + r / scale * values[:, G_N]))[1]
+        values[:, P_S::2] += _solve_row(along, c * (values[:, P_N] + (r - k) / scale * values[:, G_N]))[1]
     tangent[:, :G_N] *= scale
     offset[:, :G_N] *= scale
     for compliance, traction, jump in ((laws.compliance_n, P_N, G_N), (laws.compliance_s, P_S, G_S)):
@@ -89,6 +98,18 @@ def linearise_smoothly(
         np.where(smooth[:, None, None], tangent, other.tangent), np.where(smooth[:, None], offset, other.offset),
         laws.leader,
     )
+
+
+def take_off_proximal(
+    laws: PairLaws, smooth: Bool, state: PairState, before: PairState, proximal: Real
+) -> PairState:
+    """The state of the laws of pairs (m,): without the tractions that the proximal stiffness adds to them, and the
+    elastic jumps of these. before: the state that they were linearised at. (theory, 127)"""
+    stiffness = np.where(smooth, proximal, 0.0)[laws.leader]
+    by_n, by_s = (stiffness * (new - old) for new, old in zip(
+        _find_plastic(laws, state), _find_plastic(laws, before), strict=True))
+    return PairState(state.p_n - by_n, state.p_s - by_s,
+                     state.g_n - laws.compliance_n * by_n, state.g_s - laws.compliance_s * by_s)
 
 
 def read_modes(
@@ -115,9 +136,13 @@ def measure_violation(laws: PairLaws, smooth: Bool, state: PairState, memory: Me
 
 def _try(laws: PairLaws, state: PairState, memory: Memory, pressure: Real) -> tuple[Real, Real]:
     """x and y (m,): contact pressure less r times the opening; traction along the faces plus r times the slip."""
-    opening = state.g_n - laws.compliance_n * state.p_n
-    slip = plastic_slip(laws, state) - memory.slip
-    return -(state.p_n + pressure) - laws.stiffness * opening, state.p_s + laws.stiffness * slip
+    opening, slip = _find_plastic(laws, state)
+    return -(state.p_n + pressure) - laws.stiffness * opening, state.p_s + laws.stiffness * (slip - memory.slip)
+
+
+def _find_plastic(laws: PairLaws, state: PairState) -> tuple[Real, Real]:
+    """Opening and slip (m,) less their elastic parts."""
+    return state.g_n - laws.compliance_n * state.p_n, plastic_slip(laws, state)
 
 
 def _find_bound(laws: PairLaws, held: Real, memory: Memory, pressure: Real) -> Strength:

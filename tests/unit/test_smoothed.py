@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip, start_memory
 from pbem.contact.modes import Linearisation, linearise
-from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, measure_violation, read_modes
+from pbem.contact.smoothed import (
+    close_all,
+    find_smooth,
+    linearise_smoothly,
+    measure_violation,
+    read_modes,
+    take_off_proximal,
+)
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import newton, smooth_search
 from pbem.solve.nonlinear.newton import solve_step
@@ -39,28 +46,30 @@ def draw_state(seed: int) -> PairState:
 
 
 def converge(
-    laws: PairLaws, memory: Memory, pressure: Real, seed: int, width: float
+    laws: PairLaws, memory: Memory, pressure: Real, seed: int, width: float, proximal: float = 0.0
 ) -> tuple[PairState, Linearisation]:
     """States that fulfil the smoothed laws, where tractions follow from jumps by a stiffness of each pair alone."""
-    everywhere = np.ones(COUNT, dtype=bool)
+    everywhere, added = np.ones(COUNT, dtype=bool), np.full(COUNT, proximal)
     random = np.random.default_rng(seed)
     root = random.normal(size=(COUNT, 2, 2))
     stiffness = root @ root.transpose(0, 2, 1) + np.eye(2)
     given = random.normal(size=(COUNT, 2)) * 3
     state = PairState(given[:, 0], given[:, 1], np.zeros(COUNT), np.zeros(COUNT))
     for _ in range(60):
-        law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, width)
+        law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, width, added)
         # p = given - stiffness g, of states that the laws leave.
         rows = np.concatenate([np.tile(np.eye(2), (COUNT, 1, 1)), stiffness], axis=2)
         right = given - np.einsum("mij,mj->mi", rows, law.offset)
-        state = law.evaluate(np.linalg.solve(rows @ law.tangent, right[..., None])[..., 0])
+        found = law.evaluate(np.linalg.solve(rows @ law.tangent, right[..., None])[..., 0])
+        state = take_off_proximal(laws, everywhere, found, state, added)
     return state, law
 
 
+@pytest.mark.parametrize("proximal", [0.0, 0.1])
 @pytest.mark.parametrize("compliance", [0.0, 0.2])
-def test_states_lie_on_the_hyperbola_and_within_the_bound(compliance: float) -> None:
+def test_states_lie_on_the_hyperbola_and_within_the_bound(compliance: float, proximal: float) -> None:
     laws, memory, pressure = make_case(compliance_n=compliance, compliance_s=2 * compliance)
-    state, _ = converge(laws, memory, pressure, 1, WIDTH)
+    state, _ = converge(laws, memory, pressure, 1, WIDTH, proximal)
     pressed, opening = -(state.p_n + pressure), state.g_n - compliance * state.p_n
     assert (pressed > 0).all() and (opening > 0).all()
     np.testing.assert_allclose(laws.stiffness * pressed * opening, WIDTH**2, rtol=1e-9)
@@ -104,22 +113,38 @@ def test_the_limit_is_the_true_law() -> None:
     assert (modes.sign[slips] * (state.g_s - memory.slip)[slips] > 0).all()
 
 
-def test_tangents_are_those_of_the_laws() -> None:
+@pytest.mark.parametrize("proximal", [0.0, 0.7])
+def test_tangents_are_those_of_the_laws(proximal: float) -> None:
     laws, memory, pressure = make_case(compliance_n=0.1, compliance_s=0.3)
     everywhere, (state, _) = np.ones(COUNT, dtype=bool), converge(laws, memory, pressure, 4, WIDTH)
-    law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, WIDTH)
+    none, added = np.zeros(COUNT), np.full(COUNT, proximal)
+    law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, WIDTH, added)
     values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
     for direction in ([1.0, 0.0], [0.0, 1.0]):
         off = []
         for step in (1e-2, 1e-3):
-            moved = values + step * law.tangent @ np.array(direction)
-            near = linearise_smoothly(laws, everywhere, PairState(*moved.T), memory, pressure, SCALE, WIDTH)
-            left = moved - near.offset
+            moved = PairState(*(values + step * law.tangent @ np.array(direction)).T)
+            # What is left without the proximal stiffness is a state of the laws without it.
+            moved = take_off_proximal(laws, everywhere, moved, state, added)
+            near = linearise_smoothly(laws, everywhere, moved, memory, pressure, SCALE, WIDTH, none)
+            left = np.stack([moved.p_n, moved.p_s, moved.g_n, moved.g_s], axis=1) - near.offset
             fitted = np.stack([near.tangent[k] @ np.linalg.lstsq(near.tangent[k], left[k], rcond=None)[0]
                                for k in range(COUNT)])
             off.append(np.abs(left - fitted).max())
         # What a step along the tangent leaves of the laws falls with its square.
         assert off[1] < 0.02 * off[0] and off[0] < 1e-2
+
+
+def test_the_proximal_stiffness_bears_what_the_jumps_change() -> None:
+    laws, memory, pressure = make_case(compliance_n=0.1, compliance_s=0.3)
+    everywhere, (state, _) = np.ones(COUNT, dtype=bool), converge(laws, memory, pressure, 4, WIDTH)
+    law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, WIDTH, np.full(COUNT, 1e9))
+    # All but rigid: whatever the tractions, the jumps stay but for the joint's own.
+    given = np.linalg.solve(law.tangent[:, :2], (np.ones((COUNT, 2)) - law.offset[:, :2])[..., None])
+    moved = law.evaluate(given[..., 0])
+    np.testing.assert_allclose(moved.p_n, 1.0, rtol=1e-6)
+    np.testing.assert_allclose(moved.g_n - 0.1 * moved.p_n, state.g_n - 0.1 * state.p_n, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(plastic_slip(laws, moved), plastic_slip(laws, state), rtol=0, atol=1e-6)
 
 
 def test_laws_that_are_not_coulombs_are_not_smoothed() -> None:

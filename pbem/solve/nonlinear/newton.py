@@ -186,8 +186,8 @@ def _run_search(
             search.globalisation.frozen, jump,
         )
         constraints = hold.release(problem.constrain(law, load), modes)
+        part = forcing.choose(search.level > 0)
         try:
-            part = forcing.choose(search.level > 0)
             solved = tangent.solve(constraints, load, law, min(part, CLOSELY) if search.smoothed else part)
             loosely = solved.loosely
             forcing.used |= loosely
@@ -198,7 +198,8 @@ def _run_search(
                 outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation)
                 if loosely and not outcome.settled:
                     forcing.tighten()
-        except ConvergenceError:
+        except ConvergenceError as error:
+            forcing.used |= part > 0 and error.reason == "linear solver"  # in full it may be solved
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
         pairs, proposal = outcome.pairs, outcome.proposal

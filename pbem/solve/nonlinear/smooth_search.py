@@ -19,7 +19,15 @@ import numpy as np
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
-from pbem.contact.smoothed import close_all, find_smooth, linearise_smoothly, measure_violation, read_modes
+from pbem.contact.smoothed import (
+    close_all,
+    find_smooth,
+    linearise_smoothly,
+    measure_violation,
+    read_modes,
+    take_off_proximal,
+)
+from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.recorded import Record
@@ -28,15 +36,21 @@ from pbem.solve.problem.tangent import TangentOperator
 
 # The laws are smoothed where after so many iterations ...
 FIRST = 4
-# ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer.
+# ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer;
 MANY, LEAST = 0.03, 60
+# or, after any number of iterations, as many times as many as at best before.
+SOARED = 2
 # The width is this part of the mean violation of the true laws, and at least this part of the largest traction: with
 # less, blocks that touch nothing would be held by nothing but rounding.
 WIDTH, NARROWEST = 0.1, 1e-6
+# The proximal stiffness is this part of that of the surroundings of each pair alone: blocks that nothing else holds move
+# by far less than 1e5 times what a load strains their neighbours, and slivers are as stiff as that where they are thin.
+PROXIMAL = 1e-5
 # It ends after so many iterations, or one in which no more than this part of all pairs, or so many, change.
 LONGEST, FEW, FEWEST = 14, 1e-3, 10
-# Where the violation grows by more than this, systems are all but singular: it ends with what was before.
-WORSE = 2.0
+# Where the violation grows by more than this, a system was all but singular: it ends with what was before. The first
+# pairs that a block comes to touch as the width falls make it grow by less.
+WORSE = 10.0
 # The part of the residual that is left: blocks that are nearly free move by far more than it tells.
 CLOSELY = 1e-3
 
@@ -76,8 +90,9 @@ class SmoothSearch:
         """
         if self._first is None:
             self._first = state
-        many = len(counts) >= FIRST and counts[-1] > max(MANY * self._problem.laws.count, LEAST)
-        if not (self._allowed and many and counts[-1] >= min(counts[:-1])):
+        many, fewest = counts[-1] > max(MANY * self._problem.laws.count, LEAST), min(counts[:-1], default=np.inf)
+        stalls = len(counts) >= FIRST and counts[-1] >= fewest
+        if not (self._allowed and many and (stalls or counts[-1] > SOARED * fewest)):
             return False
         self._allowed = False
         return True
@@ -89,13 +104,15 @@ class SmoothSearch:
         """Modes (m,), and the state of all pairs that they were read from, after `most` iterations at most; modes:
         those before. pause: called between iterations, where the run may be stopped; `find` then goes on from there.
 
-        Raises ConvergenceError: "singular tangent", "linear solver".
+        Raises ConvergenceError of the first system: "singular tangent", "linear solver"; from a later one that is not
+        solved it comes back with what was before.
         """
         problem, memory, load = self._problem, self._memory, self._load
         if self._course is None:
             self._course = self._start(modes)
         modes, state, holding = self._course.modes, self._course.state, self._course.holding
         largest, violation = self._course.largest, self._course.violation
+        proximal = PROXIMAL * problem.laws.own_stiffness
         for taken in range(self.taken, min(LONGEST, most)):
             self._course = SmoothCourse(modes, state, holding, largest, violation)
             pause()
@@ -104,11 +121,19 @@ class SmoothSearch:
                 break
             begin = time.perf_counter()
             law = linearise_smoothly(
-                problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width)
+                problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width,
+                proximal)
             constraints = hold.release(problem.constrain(law, load), holding)
-            solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
+            try:
+                solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
+            except ConvergenceError:
+                if not taken:
+                    raise
+                return modes, state
             forcing.used |= solved.loosely
-            before, former, state = modes, state, evaluate_pairs(problem.mesh, law, solved.unknowns)
+            found = evaluate_pairs(problem.mesh, law, solved.unknowns)
+            before, former, state = modes, state, take_off_proximal(
+                problem.laws, self._smooth, found, state, proximal)
             last = violation
             modes, violation = problem.decide(lambda at=state: (  # type: ignore[misc]
                 read_modes(problem.laws, self._smooth, at, memory, load.pressure), self._measure(at)))

@@ -24,7 +24,7 @@ from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
-from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows, choose_options, find_order
+from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows, choose_options, find_order, refuse_unsolved
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
 from pbem.solve.tangent.shared_product import SharedProduct, SharedRows
 from pbem.solve.tangent.sweeps import Sweeps
@@ -179,10 +179,14 @@ class KrylovTangent(TangentOperator):
         return _Iterate(load, factor * part, forced + factor * product, scale)
 
     def _solve_loosely(self, constraints: ConstraintMap, forcing: float) -> Solved:
-        """Until the residual is only this part of what it is (theory, 88); its true size is not asked for."""
+        """Until the residual is only this part of what it is (theory, 88); its true size is not asked for.
+
+        Raises ConvergenceError: "linear solver".
+        """
         now = self._now
         begin, least = self.problem.measure(now.residual), self._tolerance * now.scale
         now = self._improve(now, max(forcing * begin, least))
+        refuse_unsolved(self._solver, forcing)
         off, left = self.preconditioner.correct(now.residual)
         self._now = replace(now, part=now.part - off, residual=self.preconditioner.turn_back(left))
         unknowns = self.solution = self.gather(self._now.part)

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import gather_parts
 from pbem.solve.petsc.session import PREFIX, PETSc
@@ -82,3 +83,14 @@ def find_order(problem: Problem) -> Integer:
     own = problem.system.nodes.astype(float)
     nodes = gather_parts(problem.comm, own).astype(np.int64)
     return number_components(nodes)
+
+
+def refuse_unsolved(solver: PETSc.KSP, part: float) -> None:
+    """Raise ConvergenceError ("linear solver") where GMRES did not reduce a residual to a part of it within its limit
+    of iterations. Not where rounding ended it, as there is no better solution then."""
+    reasons = PETSc.KSP.ConvergedReason
+    if solver.getConvergedReason() in (reasons.DIVERGED_MAX_IT, reasons.DIVERGED_NANORINF):
+        raise ConvergenceError(
+            "linear solver",
+            f"GMRES did not reduce a residual to {part:g} of it in {solver.getIterationNumber()} iterations",
+        )

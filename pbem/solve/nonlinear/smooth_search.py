@@ -43,8 +43,8 @@ SOARED = 2
 # The width is this part of the mean violation of the true laws, and at least this part of the largest traction: with
 # less, blocks that touch nothing would be held by nothing but rounding.
 WIDTH, NARROWEST = 0.1, 1e-6
-# The proximal stiffness is this part of that of the surroundings of each pair alone: blocks that nothing else holds move
-# by far less than 1e5 times what a load strains their neighbours, and slivers are as stiff as that where they are thin.
+# The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
+# where tangents cancel these, and so little that blocks hardly feel it.
 PROXIMAL = 1e-5
 # It ends after so many iterations, or one in which no more than this part of all pairs, or so many, change.
 LONGEST, FEW, FEWEST = 14, 1e-3, 10
@@ -122,7 +122,8 @@ class SmoothSearch:
             begin = time.perf_counter()
             law = linearise_smoothly(
                 problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width,
-                proximal)
+                proximal,
+            )
             constraints = hold.release(problem.constrain(law, load), holding)
             try:
                 solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))

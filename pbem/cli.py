@@ -136,6 +136,9 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
         with contextlib.redirect_stderr(sys.stderr if rank == 0 else sys.stdout):
             options = parser.parse_args(arguments)
             options.arguments = arguments
+            for name in ("output", "profile", "plot"):
+                if getattr(options, name, None) == "":  # of a script whose variable is not set
+                    parser.error(f"--{name}: found an empty name; expected the name of a file")
             if petsc and options.command not in ("run", "sweep"):
                 parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run` and `pbem sweep`")
     except SystemExit as end:

@@ -243,6 +243,20 @@ def run_into_closed_pipe(*arguments: str) -> subprocess.CompletedProcess[str]:
         os.close(writer)
 
 
+@pytest.mark.parametrize("words", [
+    ["run", "blocks.toml", "--force", "-o", ""], ["run", "blocks.toml", "--force", "--profile="],
+    ["export", "blocks.h5", "-o", ""], ["plot", "blocks.h5", "--output="], ["check", "blocks.toml", "--plot", ""],
+    ["sweep", "blocks.toml", "--set", "interfaces.joint.friction=0.1,0.2", "-o", ""],
+    ["make", "cracks", "--count", "3", "-o", ""],
+])  # fmt: skip
+def test_empty_names_of_files_are_refused(words: list[str], computed: Path, capsys: Capture) -> None:
+    before = computed.read_bytes()
+    assert main(words) == 2
+    assert "found an empty name; expected the name of a file" in capsys.readouterr().err
+    assert computed.read_bytes() == before
+    assert sorted(os.listdir()) == ["blocks.h5", "blocks.toml"]
+
+
 def test_a_run_whose_reader_has_gone_is_not_finished(folder: Path) -> None:
     done = run_into_closed_pipe("run", "blocks.toml")
     assert done.returncode == 1, done.stderr

@@ -21,8 +21,10 @@ from pbem.contact.laws import SLIP, STICK, ModeState, PairLaws, PairState, plast
 from pbem.contact.modes import Proposal, measure_law_error
 from pbem.contact.subset import settle_subset
 
-# Problems of friction at most, and how far the laws may be from holding in the end: Newton's steps with all go on.
-MOST_RUN, NEAR = 2000, 1e-9
+# Problems of friction at most, of so many pairs; of more pairs fewer, as each costs more, but so many at least.
+MOST_RUN, OF_PAIRS, LEAST_RUN = 2000, 100, 50
+# How far the laws may be from holding in the end: Newton's steps with all pairs go on.
+NEAR = 1e-9
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ def run_on(
     # Slips of the step so far count for pairs that slip: at first none does that could stick.
     begins = np.where((memory.modes.mode == SLIP) & resists_slip(laws), STICK, memory.modes.mode)
     modes, present = ModeState(begins.astype(np.int8), memory.modes.sign), response
-    for _ in range(MOST_RUN):
+    most = round(MOST_RUN * min(OF_PAIRS / laws.count, 1.0) ** 2)
+    for _ in range(max(most, LEAST_RUN)):
         frozen = replace(subset, modes=modes)
         problem = pose(frozen, present)
         d = solve_in_modes(problem, modes) if holds(modes) else None

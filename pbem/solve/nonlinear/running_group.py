@@ -27,7 +27,7 @@ from pbem.solve.problem.tangent import Solved, TangentOperator
 # sign of faces that run on.
 SLOW, FALLING = 0.5, 0.1
 # Of models with so few pairs all run on together; of others so many at most.
-ALL, MOST = 100, 250
+ALL, MOST = 100, 600
 # Runs of a search at most, and those that find no state of rest.
 MOST_RUNS, MOST_FAILED = 12, 4
 

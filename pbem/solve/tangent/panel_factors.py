@@ -60,13 +60,15 @@ class PanelFactors:
 
     def fill_columns(self, first: int, values: Real) -> None:
         """Set some columns (local_rows, k), from the first on, of this rank's rows."""
-        number = np.arange(first, first + values.shape[1])
-        owner = self._panel_of[number] % self.comm.size
-        given = [values[:, owner == rank].T for rank in range(self.comm.size)]
-        at = self._place(number[owner == self.comm.rank])
-        shapes = [(len(at), rows.stop - rows.start) for rows in self._rows_of]
+        end, size = first + values.shape[1], self.comm.size
+        given: list[list[Real]] = [[] for _ in range(size)]
+        for panel in range(self._panel_of[first], self._panel_of[end - 1] + 1):
+            begin, stop = max(self._cuts[panel], first), min(self._cuts[panel + 1], end)
+            given[panel % size].append(values[:, begin - first : stop - first].T)
+        at, after = self._place(np.array([first, end])).tolist()
+        shapes = [(after - at, rows.stop - rows.start) for rows in self._rows_of]
         for rows, part in zip(self._rows_of, self._exchange(given, shapes), strict=True):
-            self._columns[at, rows] = part
+            self._columns[at:after, rows] = part
 
     def factorise(self) -> None:
         """Factorise the filled matrix. Raises ConvergenceError ("singular tangent") on all ranks alike."""
@@ -120,11 +122,11 @@ class PanelFactors:
         cuts = [slice(a, b) for a, b in pairwise(share)]
         mine = cuts[self.comm.rank].stop - cuts[self.comm.rank].start
         lengths = [rows.stop - rows.start for rows in self._rows_of]
-        parts = self._exchange([rhs[:, cut].T for cut in cuts], [(mine, length) for length in lengths])
+        parts = self._exchange([[rhs[:, cut].T] for cut in cuts], [(mine, length) for length in lengths])
         values = np.concatenate(parts, axis=1)[:, self._order]
         self._solve_many(values)
         here = lengths[self.comm.rank]
-        found = self._exchange([values[:, rows] for rows in self._rows_of],
+        found = self._exchange([[values[:, rows]] for rows in self._rows_of],
                                [(cut.stop - cut.start, here) for cut in cuts])
         return np.ascontiguousarray(np.concatenate(found, axis=0).T)
 
@@ -193,12 +195,14 @@ class PanelFactors:
         within = np.where((panel % size == rank), columns - panel * width, 0)
         return np.minimum(before * width + within, len(self._columns))
 
-    def _exchange(self, given: list[Real], shapes: list[tuple[int, int]]) -> list[Real]:
-        """Arrays of these shapes from all ranks, for one given to each."""
-        sent = np.concatenate([part.ravel() for part in given])
-        counts = [rows * columns for rows, columns in shapes]
-        taken = np.empty(sum(counts))
-        self.comm.Alltoallv([sent, [part.size for part in given]], [taken, counts])
+    def _exchange(self, given: list[list[Real]], shapes: list[tuple[int, int]]) -> list[Real]:
+        """Arrays of these shapes from all ranks, for the arrays given to each, one below the other."""
+        sizes, counts = [sum(part.size for part in parts) for parts in given], [rows * width for rows, width in shapes]
+        sent, taken, end = np.empty(sum(sizes)), np.empty(sum(counts)), 0
+        for part in (part for parts in given for part in parts):
+            sent[end : end + part.size].reshape(part.shape)[:] = part
+            end += part.size
+        self.comm.Alltoallv([sent, sizes], [taken, counts])
         ends = np.cumsum(counts)[:-1]
         return [part.reshape(shape) for part, shape in zip(np.split(taken, ends), shapes, strict=True)]
 

@@ -18,7 +18,6 @@ from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model, Operator
-from pbem.model.refinement import bisect_elements
 from pbem.parallel import (
     Comm,
     StopSignals,
@@ -30,7 +29,7 @@ from pbem.parallel import (
     world,
 )
 from pbem.passes import Target, blame_pass, blame_tries, plan_finer, plan_graded, recall_mesh
-from pbem.results.accuracy import Decision, Pass, decide
+from pbem.results.accuracy import Decision, Pass, decide, refine_marked
 from pbem.results.doubts import find_smooth
 from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
@@ -191,7 +190,7 @@ def _refine_and_solve(
         target = Target(target.path, False, True)
         one = Pass(one.number + 1, now.first_unknowns, spare=decision.marked is None)
         if decision.marked is not None:
-            model = bisect_elements(model, decision.marked, decision.gently)
+            model = refine_marked(model, decision)
             continue
         planned = plan_graded(model, decision.ends, graded)
         if planned:

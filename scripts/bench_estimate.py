@@ -42,7 +42,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.mesh.interpolation import interpolate, interpolate_tips
 from pbem.model.model import Model
 from pbem.model.refinement import bisect_elements, count_elements
-from pbem.results.accuracy import Pass, decide
+from pbem.results.accuracy import Pass, decide, refine_marked
 from pbem.results.estimates import Comparison, Relative
 from pbem.solve.estimate.coarser_mesh import relate_meshes
 from scripts.refined_models import list_models
@@ -221,7 +221,7 @@ def refine(model: Model, accuracy: float, elements: int) -> Solved:
             raise ConvergenceError("accuracy", decision.failure)
         if decision.marked is None:
             return solved
-        asked = bisect_elements(asked, decision.marked, decision.gently)
+        asked = refine_marked(asked, decision)
 
 
 def measure_error(solved: Solved, reference: Solved) -> float:

@@ -12,9 +12,10 @@ from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.end_grading import ContactEnd
 from pbem.model.model import Model
-from pbem.model.refinement import count_elements
+from pbem.model.refinement import bisect_elements, count_elements
 from pbem.results.contact_ends import find_contact_ends
 from pbem.results.estimator import Estimator
+from pbem.results.rates import list_corner_ends
 from pbem.solve.problem.step import ContactState
 
 # What `analysis.accuracy` is asked of, and how it is called.
@@ -95,13 +96,14 @@ class Pass:
 
 @dataclass(frozen=True)
 class Decision:
-    """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`), None if
-    there is no further pass for the accuracy; why that cannot be reached, empty if it was or was not asked for; where
-    contacts end within elements that are too long, if that is asked for."""
+    """What follows a pass: sentences for the log; the elements to be halved (gently: see `bisect_elements`; far: those
+    in corners twice), None if there is no further pass for the accuracy; why that cannot be reached, empty if it was or
+    was not asked for; where contacts end within elements that are too long, if that is asked for."""
 
     notes: tuple[str, ...] = ()
     marked: Mapping[str, Bool] | None = None
     gently: bool = False
+    far: bool = False
     failure: str = ""
     ends: tuple[ContactEnd, ...] = ()
 
@@ -145,7 +147,21 @@ def decide(
     if not comparison.energy.any():  # gone on with after its last step: where errors are is not in the file
         return Decision((says,), {name: np.zeros(count_elements(curve), bool) for name, curve in model.curves.items()})
     marked = mark_elements(model, mesh, comparison.energy, comparison.jumps, accuracy, reached.worst)
-    return Decision((says,), marked, gently=reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy)
+    near = reached.worst * SAFETY <= NEAR ** (model.analysis.order + 1) * accuracy
+    return Decision((says,), marked, near, far=reached.worst > FAR * accuracy)
+
+
+def refine_marked(model: Model, decision: Decision) -> Model:
+    """The model of the next pass. Far from the goal the marked elements in corners are halved twice: there errors fall
+    with a small power of their length, whatever the order."""
+    assert decision.marked is not None
+    finer = bisect_elements(model, decision.marked, decision.gently)
+    if not decision.far:
+        return finer
+    again = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in finer.curves.items()}
+    for before, after in zip(list_corner_ends(model), list_corner_ends(finer), strict=True):
+        again[after.curve][after.element] |= decision.marked[before.curve][before.element]
+    return bisect_elements(finer, again)
 
 
 def mark_contacts(model: Model) -> dict[str, Bool]:

@@ -136,13 +136,13 @@ def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int,
     Where nothing was merged nothing is known: as if they were twice as long.
     """
     found: dict[str, list[tuple[int, float, float]]] = {}
-    for mine, other in zip(_list_corner_ends(model), _list_corner_ends(coarser), strict=True):
+    for mine, other in zip(list_corner_ends(model), list_corner_ends(coarser), strict=True):
         found.setdefault(other.curve, []).append((other.element, max(other.length / mine.length, 2.0), other.power))
     return found
 
 
 @dataclass(frozen=True)
-class _LegEnd:
+class LegEnd:
     """An end of a leg at a corner: curve, its element there (along all legs) and that element's length; the power of
     the distance that jumps follow there, infinite where it is not known."""
 
@@ -152,18 +152,18 @@ class _LegEnd:
     power: float = math.inf
 
 
-def _list_corner_ends(model: Model) -> list[_LegEnd]:
+def list_corner_ends(model: Model) -> list[LegEnd]:
     """The ends of legs that meet another one at an angle, or several; in the order of the points at which they meet."""
-    meeting: dict[complex, list[tuple[_LegEnd, complex]]] = {}
+    meeting: dict[complex, list[tuple[LegEnd, complex]]] = {}
     for name, curve in model.curves.items():
         number = 0
         for leg in curve.legs:
             lengths = leg.length * np.diff(leg.element_fractions())
-            first, last = _LegEnd(name, number, lengths[0]), _LegEnd(name, number + leg.elements - 1, lengths[-1])
+            first, last = LegEnd(name, number, lengths[0]), LegEnd(name, number + leg.elements - 1, lengths[-1])
             meeting.setdefault(leg.start, []).append((first, leg.tangent(False)))
             meeting.setdefault(leg.end, []).append((last, -leg.tangent(True)))
             number += leg.elements
-    found: list[_LegEnd] = []
+    found: list[LegEnd] = []
     for ends in meeting.values():
         if len(ends) == 2:
             turn = abs(cmath.phase(-ends[0][1] / ends[1][1]))

@@ -14,7 +14,8 @@ from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.results.accuracy import mark_contacts, mark_elements
+from pbem.model.refinement import count_elements
+from pbem.results.accuracy import Decision, mark_contacts, mark_elements, refine_marked
 from pbem.results.rates import (
     CORNER,
     FORCE_RATE,
@@ -152,3 +153,16 @@ top = { ux = 0.0, uy = 0.0 }
     marked = mark_contacts(model)
     assert {name for name, each in marked.items() if each.any()} == {"bottom", "floor"}
     assert marked["floor"].all() and marked["bottom"].all()
+
+
+@pytest.mark.parametrize("far", [False, True])
+def test_far_from_the_goal_elements_in_corners_are_halved_twice(plate: Model, far: bool) -> None:
+    marked = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in plate.curves.items()}
+    marked["bottom"][[0, 4]] = marked["branch"][0] = True
+    finer = refine_marked(plate, Decision(marked=marked, far=far))
+    lengths = {name: np.diff(finer.curves[name].legs[0].element_fractions()) for name in ("bottom", "branch", "left")}
+    # Those in the corner of the plate and at the mouth of the crack; not the one between, nor what was not marked.
+    assert lengths["bottom"][0] == pytest.approx((1 / 32) if far else (1 / 16))
+    assert lengths["branch"][0] == pytest.approx((1 / 32) if far else (1 / 16))
+    assert lengths["bottom"].min() == lengths["bottom"][0] and lengths["bottom"][-1] == pytest.approx(1 / 8)
+    assert np.isclose(lengths["bottom"], 1 / 16).sum() >= 2

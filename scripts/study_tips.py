@@ -7,15 +7,16 @@ Then straight cracks, arcs of 20 to 200 degrees, and kinked cracks that turn by 
 1 of the other leg, as case files, on the meshes that the program makes of them: with the gradings of the file ("file"),
 and with its own ("auto"); K (relative to that of the tip) and J, against closed forms and, for kinks, a fine mesh.
 
-usage: .venv/bin/python -m scripts.study_tips [WAYS] [KINDS]
-    of each kind; 200; straight,arc,kinked,straight-files,arc-files,kinked-files; "files" for the last three
+usage: .venv/bin/python -m scripts.study_tips [WAYS] [KINDS] [FIRST]
+    of each kind; 200; straight,arc,kinked,straight-files,arc-files,kinked-files; "files" for the last three; the first
+    seed; 0
 """
 
 from __future__ import annotations
 
 import sys
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import astuple
 
 import numpy as np
@@ -38,21 +39,23 @@ def main() -> None:
     """Print the table."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     kinds = sys.argv[2].split(",") if len(sys.argv) > 2 else [*KINDS, "files"]
+    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    seeds = range(first, first + count)
     if any(kind in KINDS for kind in kinds):
-        print_ways(count, [kind for kind in kinds if kind in KINDS])
+        print_ways(seeds, [kind for kind in kinds if kind in KINDS])
     files = [kind for kind in FILES if "files" in kinds or f"{kind}-files" in kinds]
     if files:
-        print_files(count, files)
+        print_files(seeds, files)
 
 
-def print_ways(count: int, kinds: list[str]) -> None:
+def print_ways(seeds: Sequence[int], kinds: list[str]) -> None:
     """The first part of the table."""
     heads = "".join(f"{f'{name}: largest, 90 %':>22s}" for name in QUANTITIES)
     print(f"{'crack':10s}{'neighbours':12s}{'order':>5s}{'ways':>6s}{heads}")
     for kind, make in ((kind, KINDS[kind]) for kind in kinds):
         for mesh in ("as given", "2"):
             errors = defaultdict(list)
-            for seed in range(count):
+            for seed in seeds:
                 way = make(seed)
                 errors[way.order].append(astuple(measure(way if mesh == "as given" else limit_ratios(way))))
             for order, found in sorted(errors.items()):
@@ -62,14 +65,14 @@ def print_ways(count: int, kinds: list[str]) -> None:
                 print(f"{kind:10s}{mesh:12s}{order:5d}{len(found):6d}{text}", flush=True)
 
 
-def print_files(count: int, kinds: list[str]) -> None:
+def print_files(seeds: Sequence[int], kinds: list[str]) -> None:
     """The part of case files, and those whose K is off by more than it should be."""
     print(f"{'crack':10s}{'mesh':12s}{'order':>5s}{'ways':>6s}{'K: largest, 90 %':>22s}{'J: largest, 90 %':>22s}")
     beyond = []
     for kind in kinds:
         draw, measure_tips, allowed = FILES[kind]
         errors = defaultdict(list)
-        for seed in range(count):
+        for seed in seeds:
             drawn = draw(seed)
             for mesh in ("file", "auto"):
                 found = measure_tips(drawn, mesh == "file")

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Models whose faces come near each other, over the whole range of distances: what the fitted meshes are worth.
 
-    .venv/bin/python scripts/study_meshes.py [--only cracks|cantilevers|rings|slots|pins] [--quick]
+    .venv/bin/python scripts/study_meshes.py [--only cracks|cantilevers|rings|slots|pins] [--quick] [--seed 1]
 
-Every model is solved as it is written, and again turned, shifted and in other units; a line tells the unknowns, the
+Every model is solved as it is written, and again turned, shifted and in other units; with a seed distances and
+places are drawn. A line tells the unknowns, the
 error against the reference, and by how much the second result differs from the first. Exit code 1 if an error is beyond
 its limit. References: of two parallel cracks the same at order 3 with twice the elements, and the energy release of
 both together, which tends to that of one; beam theory in plane strain with Timoshenko's shear; Jeffery's eccentric
@@ -17,7 +18,7 @@ import cmath
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,34 @@ class Place:
         return {"young": YOUNG * self.stress, "poisson": POISSON}
 
 
-HERE, ELSEWHERE = Place(), Place(33.0, 1e3, 1e-3, 40 - 17j)
+HERE = Place()
+
+
+@dataclass(frozen=True)
+class Range:
+    """What is studied: a few of all values of a kind, or as many drawn between the least and the largest, with the
+    place where models are solved again."""
+
+    quick: bool = False
+    draw: np.random.Generator | None = None
+    elsewhere: Place = field(default_factory=lambda: Place(33.0, 1e3, 1e-3, 40 - 17j))
+
+    def choose(self, few: Sequence[float], every: Sequence[float]) -> Sequence[float]:
+        """The values, positive, in the order in which they are given."""
+        chosen = few if self.quick else every
+        if self.draw is None:
+            return chosen
+        return [float(f"{10**self.draw.uniform(*np.log10([min(every), max(every)])):.3g}") for _ in chosen]
+
+
+def draw_range(seed: int, kind: str, quick: bool) -> Range:
+    """Values and a place that depend on all of these alone."""
+    draw = np.random.default_rng([seed, list(STUDIES).index(kind)])
+    place = Place(
+        draw.uniform(-180, 180), 10.0 ** draw.integers(-5, 6), 10.0 ** draw.integers(-5, 6),
+        complex(*draw.uniform(-100, 100, 2)),
+    )  # fmt: skip
+    return Range(quick, draw, place)
 
 
 @dataclass(frozen=True)
@@ -104,15 +132,15 @@ def read_factors(solved: Solved, place: Place) -> np.ndarray:
     return found / (place.stress * place.length**0.5)
 
 
-def study_cracks(quick: bool) -> Iterator[Row]:
+def study_cracks(given: Range) -> Iterator[Row]:
     """K of two parallel cracks with 8 elements asked; of the largest."""
-    distances = (0.5, 0.1, 0.02) if quick else (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
-    for distance in distances:
+    for distance in given.choose((0.5, 0.1, 0.02), (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)):
         for text, load in (("opened", (1.0, 0.0)), ("pressed and sheared", (-1.0, 1.0))):
             solved = solve_cracks(distance, load, HERE)
             found = read_factors(solved, HERE)
             largest = np.abs(found).max()
-            moved = np.abs(read_factors(solve_cracks(distance, load, ELSEWHERE), ELSEWHERE) - found).max() / largest
+            there = read_factors(solve_cracks(distance, load, given.elsewhere), given.elsewhere)
+            moved = np.abs(there - found).max() / largest
             name = f"two cracks, {distance:g} apart, {text}"
             if distance >= 0.005:
                 finer = read_factors(solve_cracks(distance, load, HERE, max(16, round(1 / distance)), 3), HERE)
@@ -139,18 +167,18 @@ def solve_cantilever(slenderness: float, place: Place) -> Solved:
     )
 
 
-def study_cantilevers(quick: bool) -> Iterator[Row]:
+def study_cantilevers(given: Range) -> Iterator[Row]:
     """Deflection with 10 elements asked on each side."""
-    for slenderness in (10, 50) if quick else (10, 15, 20, 30, 50, 80, 100, 150, 200):
+    for slenderness in given.choose((10, 50), (10, 15, 20, 30, 50, 80, 100, 150, 200)):
         deflections = []
-        for place in (HERE, ELSEWHERE):
+        for place in (HERE, given.elsewhere):
             solved = solve_cantilever(slenderness, place)
             nodes = solved.nodes("right")
             deflections.append(-place.back(complex(solved.last.displacement[nodes[len(nodes) // 2]])).imag)
         thick = 10.0 / slenderness
         force = 1e-3 * thick
         exact = 4 * force * 10.0**3 / (MODULUS * thick**3) + 1.2 * force * 10 / (thick * YOUNG / (2 + 2 * POISSON))
-        yield Row(f"cantilever 1:{slenderness}: deflection", solved.unknowns, abs(deflections[0] / exact - 1), 0.015,
+        yield Row(f"cantilever 1:{slenderness:g}: deflection", solved.unknowns, abs(deflections[0] / exact - 1), 0.015,
                   abs(deflections[1] / deflections[0] - 1))
 
 
@@ -167,14 +195,14 @@ def solve_ring(ligament: float, order: int, place: Place) -> Solved:
     )  # fmt: skip
 
 
-def study_rings(quick: bool) -> Iterator[Row]:
+def study_rings(given: Range) -> Iterator[Row]:
     """Hoop stress of the bore where the ligament is thinnest, 64 elements asked on each circle."""
-    for ligament in (0.1, 0.01) if quick else (0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003):
+    for ligament in given.choose((0.1, 0.01), (0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.003)):
         e = 1 - ligament
         exact = 2 * 4 * (4 + 1 - 2 * e - e**2) / (5 * (4 - 1 - 2 * e - e**2)) - 1
         for order in (2, 3):
             stresses = []
-            for place in (HERE, ELSEWHERE):
+            for place in (HERE, given.elsewhere):
                 solved = solve_ring(ligament, order, place)
                 at = np.argmin(np.abs(solved.mesh.position + solved.model.origin - place.point(2 - ligament)))
                 stresses.append(solved.hoop_stress()[at] / place.stress)
@@ -217,30 +245,30 @@ def read_lift(solved: Solved, place: Place) -> float:
     return place.back(complex(solved.last.displacement[corner])).imag
 
 
-def study_slots(quick: bool) -> Iterator[Row]:
+def study_slots(given: Range) -> Iterator[Row]:
     """Displacement of the corner, with 20 elements asked on one face and 27 on the other."""
     crack = read_lift(solve_slot(0.0, "SST", HERE, (40, 54), 3, 24), HERE)
-    for width in (1e-1, 1e-4) if quick else (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6):
+    for width in given.choose((1e-1, 1e-4), (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6)):
         exact = crack if width < 1e-3 else read_lift(solve_slot(width, "SST", HERE, (40, 40), 3, 24), HERE)
         for scheme in ("SST", "DBEM", "HST", "THST"):
             solved = solve_slot(width, scheme, HERE)
             lift = read_lift(solved, HERE)
-            moved = read_lift(solve_slot(width, scheme, ELSEWHERE), ELSEWHERE)
+            moved = read_lift(solve_slot(width, scheme, given.elsewhere), given.elsewhere)
             yield Row(f"slot {width:g} wide, {scheme}: displacement", solved.unknowns, abs(lift / exact - 1), 0.01,
                       abs(moved / lift - 1))
 
 
-def study_pins(quick: bool) -> Iterator[Row]:
+def study_pins(given: Range) -> Iterator[Row]:
     """Contact pressures everywhere, of the largest."""
-    for exponent in (2, 5) if quick else range(2, 7):
+    for clearance in given.choose((1e-2, 1e-5), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)):
         for first in ("pin", "hole"):
-            here = conforming.pressure(10.0**-exponent, 24, 24, first)
-            there = conforming.pressure(10.0**-exponent, 24, 24, first, 1e3, 33.0)
-            yield Row(f"pin in a hole, clearance 1e-{exponent}, {first} first: pressure", here.unknowns, here.error,
+            here = conforming.pressure(clearance, 24, 24, first)
+            there = conforming.pressure(clearance, 24, 24, first, given.elsewhere.length, given.elsewhere.turn)
+            yield Row(f"pin in a hole, clearance {clearance:g}, {first} first: pressure", here.unknowns, here.error,
                       0.01, abs(there.error - here.error))
 
 
-STUDIES: dict[str, Callable[[bool], Iterator[Row]]] = {
+STUDIES: dict[str, Callable[[Range], Iterator[Row]]] = {
     "cracks": study_cracks, "cantilevers": study_cantilevers, "rings": study_rings, "slots": study_slots,
     "pins": study_pins,
 }  # fmt: skip
@@ -251,12 +279,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--only", action="append", default=[], choices=list(STUDIES), help="may be repeated")
     parser.add_argument("--quick", action="store_true", help="a few distances of each kind")
+    parser.add_argument("--seed", type=int, help="draw distances and places")
     options = parser.parse_args()
     beyond = rows = 0
     print(f"{'model':62s} unknowns     error   limit  elsewhere       s")
     for name in options.only or STUDIES:
         begin = time.perf_counter()
-        for row in STUDIES[name](options.quick):
+        given = Range(options.quick) if options.seed is None else draw_range(options.seed, name, options.quick)
+        for row in STUDIES[name](given):
             good = row.error <= row.limit
             beyond, rows = beyond + (not good), rows + 1
             print(f"{row.name:62s} {row.unknowns:8d} {row.error:9.1e}{' ' if good else '*'} {row.limit:6g}  "

@@ -86,6 +86,7 @@ class _Pressed:
         fraction = mesh.geometry.select(elements).fractions(local[:, None])[:, 0]
         self._largest = float(self._pressure[pairs].max(initial=0.0))
         self._own = {int(e): (pairs[elements == e], fraction[elements == e]) for e in np.unique(elements)}
+        # Ends that meet are one number: pbem.geometry.shape.join_ends.
         self._after = {complex(mesh.start[e]): e for e in self._own}
         self._before = {complex(mesh.end[e]): e for e in self._own}
 

@@ -154,6 +154,7 @@ class LegEnd:
 
 def list_corner_ends(model: Model) -> list[LegEnd]:
     """The ends of legs that meet another one at an angle, or several; in the order of the points at which they meet."""
+    # Ends that meet are one number: pbem.geometry.shape.join_ends.
     meeting: dict[complex, list[tuple[LegEnd, complex]]] = {}
     for name, curve in model.curves.items():
         number = 0

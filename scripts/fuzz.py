@@ -8,14 +8,15 @@
     .venv/bin/python scripts/fuzz.py runs --count 3000 [--records FILE]
     .venv/bin/python scripts/fuzz.py ranks --count 200
 
-cases: what `pbem check` does, in this process. results: damaged files are read, described, drawn and resumed in
-processes of their own, since HDF5 may crash. values: keys and values of `--set`, of `Case.replace` and of sweeps, and
-quantities; what is accepted is written and read back. commands: the command line, but for runs. runs: small cases are
-computed, each in a process of its own; those that finish have no values that are not numbers, and their forces balance
-or a note says that they do not. ranks: what one rank does with them, two must do: end, statuses, iterations and values.
-Mutants of more than 800 nodes or 40 steps are passed over, and not counted. Prints each new kind of failure (exception
-and place in the program) with the number of the mutant, which --only makes again; exit code 1 if there are any.
-Anything that takes more than a minute of processor time is a failure, and so are control characters in what is said.
+cases: what `pbem check` does, in this process. results: damaged files, also of a run that was stopped within a search,
+are read, described, drawn and resumed in processes of their own, since HDF5 may crash. values: keys and values of
+`--set`, of `Case.replace` and of sweeps, and quantities; what is accepted is written and read back. commands: the
+command line, but for runs. runs: small cases are computed, each in a process of its own; those that finish have no
+values that are not numbers, and their forces balance or a note says that they do not. ranks: what one rank does with
+them, two must do: end, statuses, iterations and values. Mutants of more than 800 nodes or 40 steps are passed over, and
+not counted. Prints each new kind of failure (exception and place in the program) with the number of the mutant, which
+--only makes again; exit code 1 if there are any. Anything that takes more than a minute of processor time is a failure,
+and so are control characters in what is said.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from pbem import cli
@@ -44,7 +46,7 @@ from pbem.case.build import make_checked_model, read_checked_model
 from pbem.case.case import Case
 from pbem.case.changed import label_option
 from pbem.case.overrides import read_options, read_overrides, write_overrides
-from pbem.errors import CaseError, ConvergenceError, PbemError, is_control
+from pbem.errors import CaseError, ConvergenceError, PbemError, StopError, is_control
 from pbem.mesh.generate import generate_mesh
 from pbem.results.describe import describe_results
 from pbem.results.model_text import describe_model
@@ -449,6 +451,29 @@ class Snapshot(SilentReporter):
             self.data = self._path.read_bytes()
 
 
+class Interruption(SilentReporter):
+    """Asks its own process to stop in the iteration of this number, as a batch system does."""
+
+    def __init__(self, number: int) -> None:
+        self._left = number
+
+    def iterate(self, _: object) -> None:
+        """Count."""
+        self._left -= 1
+        if self._left == 0:
+            os.kill(os.getpid(), signal.SIGUSR1)
+
+
+def expect_end(case: Path, path: Path, expected: Results) -> None:
+    """Raise AssertionError if a run that goes on with the file ends with other numbers than these."""
+    import pbem
+
+    found = pbem.run(case, path, resume=True)
+    for name in ("displacement", "traction"):
+        values, right = getattr(found, name), getattr(expected, name)
+        np.testing.assert_allclose(values, right, rtol=0, atol=1e-9 * np.abs(right).max())
+
+
 def expect_prefix(path: Path, expected: Sequence[Results]) -> None:
     """Raise AssertionError if the file has other numbers than one of these, or than its first steps.
 
@@ -484,7 +509,6 @@ def use_results(path: Path, draw: bool, expected: Sequence[Results], resume: Cal
         expect_prefix(path, expected)
     with contextlib.suppress(PbemError):
         resume()
-        expect_prefix(path, expected[:1])
 
 
 def in_child(action: Callable[[], None]) -> BaseException | None:
@@ -522,7 +546,9 @@ def fuzz_results(seed: int, numbers: range, failures: Failures) -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         case, another = folder / "case.toml", folder / "another.toml"
-        case.write_text(SMALL.replace('name = "more"', 'name = "more"\nsteps = 2'), encoding="utf-8")
+        # All steps are stored: what a run that was stopped has stored besides would remain in the file.
+        text = SMALL.replace('name = "more"', 'name = "more"\nsteps = 2').replace("every = 2\n", "")
+        case.write_text(text, encoding="utf-8")
         another.write_text(SMALL.replace("uy = -0.6", "uy = -0.5"), encoding="utf-8")
         snapshot = Snapshot(3, folder / "whole.h5")
         expected = (pbem.run(case, folder / "whole.h5", reporter=snapshot), pbem.run(another, folder / "another.h5"))
@@ -531,15 +557,25 @@ def fuzz_results(seed: int, numbers: range, failures: Failures) -> int:
             assert len(each.displacement) == len(each.contact["seat"].slip)
         model = read_checked_model(case)
         mesh = generate_mesh(model)
-        files = (folder / "whole.h5").read_bytes(), snapshot.data
+        with contextlib.suppress(StopError):
+            pbem.run(case, folder / "stopped.h5", reporter=Interruption(4))
+        stopped = (folder / "stopped.h5").read_bytes()
+        with h5py.File(folder / "stopped.h5") as file:
+            assert "search" in file["unfinished"]
+        files = (folder / "whole.h5").read_bytes(), snapshot.data, stopped
         other = (folder / "another.h5").read_bytes()
         path = folder / "mutant.h5"
         for number in numbers:
             chance = random.Random(f"{seed}/{number}")
-            path.write_bytes(damage(chance, chance.choice(files), other))
+            begun = chance.choice(files)
+            path.write_bytes(damage(chance, begun, other))
 
-            def resume() -> None:
+            def resume(goes_on: bool = begun is stopped) -> None:
+                if goes_on:
+                    expect_end(case, path, expected[0])
+                    return
                 ResultWriter.resume(path, model, mesh, 1, "", (), np.zeros(len(model.interior_points), int)).finish()
+                expect_prefix(path, expected[:1])
 
             error = in_child(partial(use_results, path, chance.random() < 0.03, expected, resume))
             if error is not None:

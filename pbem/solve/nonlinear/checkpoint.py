@@ -36,7 +36,7 @@ KIND = "kind"
 GIVEN = {
     "forcing": (),
     "fixed_point": (),
-    "hold": ("problem", "memory", "settled", "floating"),
+    "hold": ("problem", "memory", "load", "settled", "floating"),
     "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "_smooth"),

@@ -20,7 +20,7 @@ from pbem.contact.free_motions import (
     open_unequal_neighbours,
     stick_calmest_pairs,
 )
-from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, follow_leaders, resists_slip
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairState, resists_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Proposal
 from pbem.contact.separating import stick_bonded
@@ -28,7 +28,9 @@ from pbem.errors import ConvergenceError
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance
+from pbem.solve.nonlinear.blocks import open_floating, place_block
 from pbem.solve.nonlinear.imbalance import DRIVEN
+from pbem.solve.nonlinear.resting import describe_lying, find_idle, find_pairs_around, let_lie, rest_bodies
 from pbem.solve.nonlinear.unsettled import Unsettled
 from pbem.solve.problem.problem import Problem
 
@@ -43,10 +45,9 @@ TRIED, BEYOND = 3, 1e-3
 SLIGHT = 1e-2
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
-# Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
-# length of the model) carry nothing.
-FAINT = 1e-2
 SHARES = (0.0, 0.3, 1.0)
+# Bodies that nothing drives are laid down so often in one step.
+MOST_LAID = 12
 
 
 class Hold:
@@ -61,8 +62,8 @@ class Hold:
     pairs push the body, it moves until its contacts hold it: from then on (driven) no free motion is left to anchors.
     """
 
-    def __init__(self, problem: Problem, memory: Memory) -> None:
-        self.problem, self.memory = problem, memory
+    def __init__(self, problem: Problem, memory: Memory, load: Load | None = None) -> None:
+        self.problem, self.memory, self.load = problem, memory, load
         self.settled: PairState | None = None
         self.pairs: Integer = np.zeros(0, dtype=np.int64)
         self.count = 0
@@ -72,6 +73,8 @@ class Hold:
         self.rolls = False
         # The sense of the friction of pairs that stuck last.
         self.sense = np.zeros(problem.laws.count, dtype=np.int8)
+        # So often bodies were found free, and laid down where nothing drives them; their names.
+        self.freed, self.laid, self.rested = 0, 0, set[str]()
         # Blocks that pairs were closed to hold; the last state of all pairs that was found; what floats in it.
         self.placed: set[int] = set()
         self.state: PairState | None = None
@@ -128,6 +131,7 @@ class Hold:
             raise error
 
     def _hold_bodies(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        modes = self._lay_down(modes, opening, slip, before)
         if not self.find_free(modes):
             return modes
         mesh, laws = self.problem.mesh, self.problem.laws
@@ -144,6 +148,22 @@ class Hold:
             if held is not closed:
                 return held
         return self._stick_bodies(closed, slip, before, modes)
+
+    def _lay_down(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:
+        """The modes, with bodies that are free and that nothing drives at rest where they fit, and those that lay on
+        pairs that carry nothing at rest elsewhere where they touch more by now."""
+        if self.load is None or before is None or self.laid >= MOST_LAID:
+            return modes
+        free = [motion.regions[0] for motion in self.list_free(modes) if len(motion.regions) == 1]
+        self.freed += bool(free)
+        names = list(dict.fromkeys(free)) if self.freed > 1 else []
+        for name in sorted(self.rested - {*names}):
+            own, _ = find_pairs_around(self.problem.mesh, name)
+            idle = self.state is not None and find_idle(self.problem, self.state, self.load.pressure, [name])[own].all()
+            names += [name] if idle and (modes.mode[own] != before.mode[own]).any() else []
+        laid, lying = rest_bodies(self.problem, self.load, modes, opening, slip, names)
+        self.rested, self.laid = self.rested | {*lying}, self.laid + bool(lying)
+        return laid
 
     def _note_sense(self, before: ModeState) -> None:
         """Take note of the friction of pairs that stuck in the last solution."""
@@ -184,6 +204,8 @@ class Hold:
         """The proposal, without a change where only a pair that holds a body is overloaded and by next to nothing,
         after its neighbours were found to be so too (see BEYOND), or where those of a body that rolled pull by next to
         nothing. pressure (m,): of fluid. On the first rank, which knows what holds a body."""
+        if self.rested and proposal.changed.any():
+            proposal = let_lie(self.problem, modes, state, proposal, pressure, [*self.rested])
         at = np.flatnonzero(proposal.changed)
         if self.rolls and self._rests(modes, state.p_n + pressure, proposal):
             return Proposal(modes, np.zeros_like(proposal.violation))
@@ -235,48 +257,26 @@ class Hold:
         return modes
 
     def _place_block(self, body: int, modes: ModeState, opening: Real, before: ModeState | None) -> ModeState:
-        """The modes, with the pairs closed on which a block comes to rest all of whose pairs are open.
-
-        One that does not touch anything in some place stays where pairs held it until now.
-        """
-        problem = self.problem
-        own, normal = problem.cut.find_around(body)
+        """See place_block; as they are if some pairs around the block are closed."""
+        own, _ = self.problem.cut.find_around(body)
         if (modes.mode[own] != OPEN).any():
             return modes
         self.placed.add(body)
-        space = measure_space(problem.mesh.pairs.position[own], normal, opening[own])
-        mode = modes.mode.copy()
-        if before is not None and space.is_wide and (before.mode[own] != OPEN).any():
-            mode[own] = before.mode[own]
-        else:
-            nearest = own[space.nearest]
-            nearest = nearest[~problem.laws.parted[nearest]]
-            mode[nearest] = np.where(resists_slip(problem.laws)[nearest], STICK, SLIP)
-        return follow_leaders(problem.laws, ModeState(mode, modes.sign))
+        return place_block(self.problem, body, modes, opening, before)
 
     def find_floating(self, modes: ModeState, state: PairState, pressure: Real) -> tuple[CutMotion, ...]:
         """Free motions of blocks that touch what is around them by chance: the pairs carry next to nothing, and there
         are places where nothing touches."""
-        problem, pairs = self.problem, self.problem.mesh.pairs
-        if not problem.parts.block.any():
+        if not self.problem.parts.block.any():
             return ()
-        carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
-        jumps = problem.traction_scale * np.hypot(state.g_n, state.g_s)
-        usual = float(pairs.weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(pairs.weight.sum())
-        mode = modes.mode.copy()
-        for body in np.flatnonzero(problem.parts.block):
-            own, normal = problem.cut.find_around(int(body))
-            weight = pairs.weight[own]
-            if weight @ carried[own] > FAINT * usual * weight.sum():
-                continue
-            loose = ~(problem.laws.bonded | (problem.laws.tensile_strength > 0))[own]
-            if measure_space(pairs.position[own], normal, state.g_n[own]).is_wide:
-                mode[own[loose]] = OPEN
-        return self._find_cut_motions(ModeState(mode, modes.sign)) if (mode != modes.mode).any() else ()
+        floating = open_floating(self.problem, modes, state, pressure)
+        return self._find_cut_motions(floating) if (floating.mode != modes.mode).any() else ()
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of what holds a body in the end."""
-        return (*self._describe_floating_blocks(), *self._describe_held(modes))
+        pressure = np.zeros(self.problem.laws.count) if self.load is None else self.load.pressure
+        lying = describe_lying(self.problem, self.state, pressure, sorted(self.rested))
+        return (*self._describe_floating_blocks(), *lying, *self._describe_held(modes))
 
     def _describe_floating_blocks(self) -> tuple[str, ...]:
         if not self.floating:

@@ -134,7 +134,7 @@ def _search_modes(
 ) -> Solution:
     """See solve_step; by one search, whose iterations join those before. resumed: see Checkpoint."""
     parts = {
-        "hold": Hold(problem, memory), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
+        "hold": Hold(problem, memory, load), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
         "smoothing": SmoothSearch(problem, memory, load, search.sweeps), "running": RunningGroup(problem, tangent),
     }
     checkpoint = Checkpoint(tangent, load, iterations, parts)

@@ -8,9 +8,10 @@ from pbem.contact.cohesive import SEPARATION
 from pbem.contact.laws import Memory, resists_slip
 from pbem.contact.separating import find_bonded
 from pbem.errors import ConvergenceError
+from pbem.solve.problem.given import is_driven
 from pbem.solve.problem.problem import Problem
 from pbem.solve.steps.ceiling import Ceiling
-from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction, is_driven
+from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
 
 # Reasons for which a step without equilibrium can fail.
 UNSETTLED = ("iteration limit", "mode cycle", "singular tangent", "no admissible modes")
@@ -45,9 +46,10 @@ def find_reason(
     unless = error.unless
     if unless is None:
         return error
+    load = problem.evaluate_load(stage, target)
 
     def is_doubtful() -> bool:
-        driven = is_driven(problem, stage, target, unless.motions)
+        driven = is_driven(problem, load, unless.motions)
         if unless.error is None and driven and resists_slip(problem.laws).any():
             return False  # what friction does not hold can slide away from forces that could balance it
         return (driven or unless.may_stick) and bool(can_balance(problem, memory, stage, target))

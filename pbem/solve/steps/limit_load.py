@@ -7,22 +7,17 @@ no smaller step finds an equilibrium. A linear programme in the tractions of the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Integer, Real
-from pbem.contact.constraints import ConstraintMap, build_constraints
 from pbem.contact.laws import Memory, PairLaws, tensile_limit
 from pbem.contact.loads import Load
-from pbem.contact.modes import P_N, P_S, Linearisation
-from pbem.model.rigid_body_modes import RigidBodyMode
+from pbem.solve.problem.given import BALANCED, collect_given, find_push
 from pbem.solve.problem.problem import Problem
 
-# What is left of a balance, as a part of the loads, counts as none: what the mesh of a sound model leaves.
-BALANCED = 1e-3
 # A share that is less than the whole by no more than this is the whole.
 ROUNDING = 1e-6
 # How a linear programme can end.
@@ -50,28 +45,6 @@ def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -
     """Whether some tractions balance the loads at a fraction of a stage; None if unknown, as above."""
     solved = _solve(problem, memory, stage, fraction, fraction)
     return None if solved is None or not solved.certain else solved.share is not None
-
-
-def is_driven(problem: Problem, stage: int, fraction: float, motions: Sequence[RigidBodyMode]) -> bool:
-    """Whether the loads at a fraction of a stage do work on one of these motions of bodies."""
-    mesh, load = problem.mesh, problem.evaluate_load(stage, fraction)
-    _, given = _collect_given(problem, load)
-    force = np.where(mesh.node_crack, 0.0, mesh.weight) * (given[::2] + 1j * given[1::2])
-    for motion in motions:
-        work = np.zeros(mesh.nodes + 3 * len(mesh.region_names))
-        for number, name in enumerate(mesh.region_names):
-            if name in motion.velocities:
-                own = np.flatnonzero(mesh.node_region == number)
-                shift, spin = motion.velocities[name]
-                work[own] = (np.conj(shift + 1j * spin * mesh.position[own]) * force[own]).real
-                support = problem.model.regions[number].material.rigid
-                if support is not None:
-                    moved = shift + 1j * spin * support.about
-                    work[mesh.nodes + 3 * number + np.arange(3)] = (
-                        _find_push(problem, number, load) * [moved.real, moved.imag, spin])
-        if abs(work.sum()) > BALANCED * np.abs(work).sum():
-            return True
-    return False
 
 
 @dataclass(frozen=True)
@@ -110,7 +83,7 @@ def _sum_up(
     Of rigid tools those that are given; what holds a given motion bears anything.
     """
     mesh = problem.mesh
-    maps, known = zip(*(_collect_given(problem, load) for load in loads), strict=True)
+    maps, known = zip(*(collect_given(problem, load) for load in loads), strict=True)
     weight = np.where(mesh.node_crack, 0.0, mesh.weight)
     rows, columns, values = [], [], []
     pushes, balances = np.zeros((2, 3 * len(regions))), np.ones(3 * len(regions), dtype=bool)
@@ -122,7 +95,7 @@ def _sum_up(
         lever = lever / reach
         if support is not None:
             balances[3 * row : 3 * row + 3] = support.forced
-            pushes[:, 3 * row : 3 * row + 3] = [_find_push(problem, region, load) / [1, 1, reach] for load in loads]
+            pushes[:, 3 * row : 3 * row + 3] = [find_push(problem, region, load) / [1, 1, reach] for load in loads]
         for part, along in enumerate((np.ones_like(lever), np.full_like(lever, 1j), 1j * lever)):
             for component, value in enumerate((along.real, along.imag)):
                 rows.append(np.full(len(own), 3 * row + part))
@@ -133,24 +106,6 @@ def _sum_up(
     before, after = (resultant @ each + push for each, push in zip(known, pushes, strict=True))
     matrix = resultant @ maps[0].matrix[2 * mesh.nodes :]
     return matrix[balances], before[balances], after[balances]
-
-
-def _find_push(problem: Problem, region: int, load: Load) -> Real:
-    """The forces along x and y and the moment (3,) that are given of a rigid tool, about its point; else 0."""
-    name, support = problem.mesh.region_names[region], problem.model.regions[region].material.rigid
-    assert support is not None
-    return np.where(support.forced, load.rigid[list(problem.model.rigid).index(name)], 0.0)
-
-
-def _collect_given(problem: Problem, load: Load) -> tuple[ConstraintMap, Real]:
-    """The map from tractions of pairs to those of faces, and those that are given (2 nodes,), with what stands for the
-    forces inside of bodies."""
-    mesh, count = problem.mesh, problem.laws.count
-    tangent = np.zeros((count, 4, 2))
-    tangent[:, P_N, 0] = tangent[:, P_S, 1] = 1.0
-    law = Linearisation(tangent, np.zeros((count, 4)), np.arange(count))
-    constraints = build_constraints(mesh, problem.outer, np.zeros(count), law, load, 1.0)
-    return constraints, (constraints.offset - load.known)[2 * mesh.nodes :]
 
 
 def _maximise(

@@ -1,0 +1,49 @@
+"""Blocks between cracks that touch what is around them by chance: where they are laid, and which of them float."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.arrays import Real
+from pbem.contact.floating import measure_space
+from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
+from pbem.solve.problem.problem import Problem
+
+# Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
+# length of the model) carry nothing.
+FAINT = 1e-2
+
+
+def place_block(problem: Problem, body: int, modes: ModeState, opening: Real, before: ModeState | None) -> ModeState:
+    """The modes, with the pairs closed on which a block comes to rest all of whose pairs are open.
+
+    One that does not touch anything in some place stays where pairs held it until now.
+    """
+    own, normal = problem.cut.find_around(body)
+    space = measure_space(problem.mesh.pairs.position[own], normal, opening[own])
+    mode = modes.mode.copy()
+    if before is not None and space.is_wide and (before.mode[own] != OPEN).any():
+        mode[own] = before.mode[own]
+    else:
+        nearest = own[space.nearest]
+        nearest = nearest[~problem.laws.parted[nearest]]
+        mode[nearest] = np.where(resists_slip(problem.laws)[nearest], STICK, SLIP)
+    return follow_leaders(problem.laws, ModeState(mode, modes.sign))
+
+
+def open_floating(problem: Problem, modes: ModeState, state: PairState, pressure: Real) -> ModeState:
+    """The modes, with the pairs open around blocks that carry next to nothing and fit where nothing touches."""
+    pairs = problem.mesh.pairs
+    carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
+    jumps = problem.traction_scale * np.hypot(state.g_n, state.g_s)
+    usual = float(pairs.weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(pairs.weight.sum())
+    mode = modes.mode.copy()
+    for body in np.flatnonzero(problem.parts.block):
+        own, normal = problem.cut.find_around(int(body))
+        weight = pairs.weight[own]
+        if weight @ carried[own] > FAINT * usual * weight.sum():
+            continue
+        loose = ~(problem.laws.bonded | (problem.laws.tensile_strength > 0))[own]
+        if measure_space(pairs.position[own], normal, state.g_n[own]).is_wide:
+            mode[own[loose]] = OPEN
+    return ModeState(mode, modes.sign)

@@ -1,0 +1,91 @@
+"""Discs in holes that open all around them: what is around them is as if they were not there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.driver import run as run_case
+from pbem.results.reader import Results
+from tests.parallel.launch import launch_snippet
+from tests.verification.test_settling import Listener
+
+# Principal stresses of a ratio of more than a third open a round hole everywhere.
+SPACE = """
+title = "tight discs of other stiffness in a plane under tension"
+materials.m = {{ young = 2.0e5, poisson = 0.28 }}
+materials.hard = {{ young = 1.5e7, poisson = 0.1 }}
+materials.soft = {{ young = 2.6e3, poisson = 0.22 }}
+curves.a = {{ center = [{x}, {y}], radius = 1.0, elements = {elements} }}
+curves.b = {{ center = [{far}, {y}], radius = 0.6, elements = {elements} }}
+curves.c = {{ points = [[{left}, {y}], [{right}, {y}]], elements = 6 }}
+regions.rock = {{ material = "m", infinite = true, boundary = ["a", "b"] }}
+analysis = {{ order = {order}, scheme = "{scheme}", steps = {steps} }}
+remote = {{ sxx = 140.0, syy = 100.0, sxy = -30.0 }}
+"""
+DISCS = """
+regions.da = {{ material = "hard", boundary = ["a"] }}
+regions.db = {{ material = "soft", boundary = ["b"], cracks = ["c"] }}
+interfaces.a = {{ law = "coulomb", friction = {friction} }}
+interfaces.b = {{ law = "coulomb", friction = 0.22 }}
+interfaces.c = {{ law = "coulomb", friction = 0.4 }}
+"""
+
+
+def write(path: Path, discs: bool, scheme: str = "SST", order: int = 2, elements: int = 24, steps: int = 1,
+          friction: float = 0.75, x: float = 0.0, y: float = 0.0, more: str = "") -> Path:  # fmt: skip
+    text = SPACE + DISCS if discs else "\n".join(line for line in SPACE.splitlines() if not line.startswith("curves.c"))
+    text = text.format(x=x, y=y, far=x + 3.1, left=x + 2.8, right=x + 3.4, scheme=scheme, order=order,
+                       elements=elements, steps=steps, friction=friction)  # fmt: skip
+    path.write_text(text + more, encoding="utf-8")
+    return path
+
+
+def take_walls(results: Results) -> np.ndarray:
+    """Displacement (k, 2) of the plane at its holes in the last step, without a rigid motion."""
+    nodes = results.nodes
+    own = nodes.region == nodes.region_names.index("rock")
+    u, z = results.displacement[-1][own] @ [1, 1j], nodes.position[own] @ [1, 1j]
+    z = z - z.mean()
+    u = u - u.mean()
+    turned: np.ndarray = u - 1j * z * ((np.conj(1j * z) * u).real.sum() / (np.abs(z) ** 2).sum())
+    return turned
+
+
+@pytest.mark.parametrize(("scheme", "order", "elements", "steps", "friction"), [
+    ("SST", 2, 24, 1, 0.75), ("SST", 3, 48, 3, 0.1), ("HST", 2, 24, 1, 0.0), ("DBEM", 1, 30, 2, 0.75),
+    ("THST", 2, 24, 1, 0.3), ("SST", 2, 40, 1, 0.0),
+])  # fmt: skip
+def test_the_plane_is_as_if_its_holes_were_empty(
+    scheme: str, order: int, elements: int, steps: int, friction: float, tmp_path: Path
+) -> None:
+    given = {"scheme": scheme, "order": order, "elements": elements, "steps": steps}
+    filled = pbem.run(write(tmp_path / "filled.toml", True, friction=friction, **given), tmp_path / "filled.h5")  # type: ignore[arg-type]
+    empty = pbem.run(write(tmp_path / "empty.toml", False, **given), tmp_path / "empty.h5")  # type: ignore[arg-type]
+    expected = take_walls(empty)
+    np.testing.assert_allclose(take_walls(filled), expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+    for name in ("a", "b"):
+        contact = filled.contact[name]
+        assert np.abs(contact.traction_n[-1]).max() < 1e-6 * 140
+        assert contact.opening[-1].min() > -1e-8 * contact.opening[-1].max()
+    assert filled.steps.iterations.max() <= 15
+
+
+def test_where_a_body_lies_is_told(tmp_path: Path) -> None:
+    listener = Listener()
+    run_case(write(tmp_path / "filled.toml", True), tmp_path / "filled.h5", reporter=listener)
+    assert any("Nothing presses on 'da', 'db'" in note for note in listener.notes)
+
+
+def test_ranks_lay_bodies_down_alike(tmp_path: Path) -> None:
+    case = write(tmp_path / "filled.toml", True, x=300.0, y=-70.0)
+    run = launch_snippet(2, f"import pbem; pbem.run({str(case)!r}, {str(tmp_path / 'two.h5')!r})")
+    assert run.returncode == 0, run.stderr
+    one, two = pbem.run(case, tmp_path / "one.h5"), pbem.open_results(tmp_path / "two.h5")
+    for name in ("a", "b"):
+        assert np.array_equal(one.contact[name].mode, two.contact[name].mode)
+        largest = np.abs(one.contact[name].opening).max()
+        np.testing.assert_allclose(two.contact[name].opening, one.contact[name].opening, rtol=0, atol=1e-8 * largest)

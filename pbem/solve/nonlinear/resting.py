@@ -24,7 +24,7 @@ IDLE = 1e-6
 def rest_bodies(
     problem: Problem, load: Load, modes: ModeState, opening: Real, slip: Real, names: Sequence[str]
 ) -> tuple[ModeState, tuple[str, ...]]:
-    """The modes with bodies at rest on some of their pairs, and the names of these bodies.
+    """The modes with bodies at rest on some of their pairs (theory, 128), and the names of these bodies.
 
     names: of regions that come into question. Only those that no load drives and that fit somewhere into the space
     around them. opening, slip (m,): as they are, the slip of this step alone.

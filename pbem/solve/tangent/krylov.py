@@ -40,8 +40,7 @@ WIDENING, MOST_WIDENING = 4, 16
 # Other friction in a further case changes the operator a little in every group: the inverses of the former one serve
 # until the constraint map has changed by this part.
 MOST_DRIFT = 0.9
-# GMRES goes on to this part of the tolerance of Newton's method: what two ways to a state leave between their fields,
-# as of a run that was stopped and gone on with, is then below 1e-9 also where they follow from many steps.
+# GMRES goes on to this part of Newton's tolerance: two ways to a state then leave less than 1e-9 between its fields.
 SAFETY = 0.01
 # The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
 # sets that are far from each other are settled one by one.

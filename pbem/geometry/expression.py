@@ -62,6 +62,18 @@ def list_names(text: str) -> set[str]:
         return set()
 
 
+def list_switches(text: str) -> list[str]:
+    """Expressions at whose changes of sign max, min and abs of an expression change their branch."""
+    found = []
+    for node in ast.walk(_parse(text)):
+        match node:
+            case ast.Call(func=ast.Name(id="abs"), args=[one]):
+                found.append(ast.unparse(one))
+            case ast.Call(func=ast.Name(id="min" | "max"), args=[one, other]):
+                found.append(f"({ast.unparse(one)}) - ({ast.unparse(other)})")
+    return found
+
+
 def is_linear(text: str, names: tuple[str, ...]) -> bool:
     """Whether an expression is a polynomial of degree 1 at most in these names, by how it is written."""
     return _find_degree(_parse(text), names) <= 1

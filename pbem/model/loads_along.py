@@ -29,7 +29,7 @@ def check_loads(case: Case, model: Model) -> list[Fault]:
     model: about the origin of the user's coordinates.
     """
     faults = []
-    for loc, curve, given, stages in _list_given(case):
+    for loc, curve, given, stages in list_given(case):
         value = read_value(loc, given, timed=True)[0]
         if not isinstance(value, Varying) or curve not in model.curves:
             continue
@@ -76,7 +76,7 @@ def _list_steps(steps: int) -> list[float]:
     return [number / steps for number in range(1, steps + 1, max(1, steps // MOST_STEPS))]
 
 
-def _list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]]:
+def list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]]:
     """Place, curve, what is given, and the stages in which it acts: until another value takes its place."""
     tables: list[tuple[KeyPath, object, int]] = []
     for key in ("boundary", "interfaces", "contacts"):

@@ -1,0 +1,80 @@
+"""Kinks of tractions that vary along a curve, as at the level of water on a wall: elements end there.
+
+Within an element a traction is the polynomial through its values at the nodes, which has another resultant than one
+with a kink.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from scipy.optimize import brentq
+
+from pbem.arrays import Real
+from pbem.description.case import Case
+from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.expression import evaluate_expression, list_switches
+from pbem.model.given import read_value
+from pbem.model.loads_along import list_given
+from pbem.model.touching import place_on_leg
+from pbem.model.varying import Varying
+
+TRACTIONS = ("tx", "ty", "tn", "ts", "pressure")
+# Kinks this part of an element from the end of a leg, or from each other, stay within it: they change the resultant by
+# its square at most.
+NEAREST = 0.05
+# Kinks on a leg at most, of its elements: values in a dense table are measured, and have kinks everywhere.
+MOST = 0.5
+# Slopes of a table that differ by less than this part are one.
+STRAIGHT = 1e-9
+# Points of a leg between which an expression changes its branch once at most.
+SAMPLES = 65
+
+
+def list_kinks(case: Case, curves: Mapping[str, Curve]) -> list[complex]:
+    """Points of the curves of bodies at which tractions, by tables or expressions of the place alone, have kinks."""
+    places: list[complex] = []
+    for loc, name, given, _ in list_given(case):
+        if loc[-3] != "boundary" or loc[-1] not in TRACTIONS or name not in curves:
+            continue
+        value = read_value(loc, given, timed=True)[0]
+        if isinstance(value, Varying) and not value.timed:
+            places += _find_on_curve(value, curves[name])
+    return list(dict.fromkeys(places))
+
+
+def _find_on_curve(value: Varying, curve: Curve) -> Iterator[complex]:
+    passed = 0.0
+    for leg in curve.legs:
+        found = _find_in_table(value, leg, passed) if value.table else _find_in_expression(value, leg, passed)
+        spare = NEAREST / leg.elements
+        inside = [t for t in sorted(found) if spare < t < 1 - spare]
+        apart = [t for k, t in enumerate(inside) if k == 0 or t - inside[k - 1] > spare]
+        if len(apart) <= MOST * leg.elements:
+            yield from (complex(leg.point(np.array(t))) for t in apart)
+        passed += leg.length
+
+
+def _find_in_table(value: Varying, leg: Leg, passed: float) -> Real:
+    """Fractions of a leg at which the slope of a table changes."""
+    along, values = np.array(value.table).T
+    slopes = np.concatenate([[0.0], np.diff(values) / np.diff(along), [0.0]])
+    bends = np.abs(np.diff(slopes)) > STRAIGHT * np.abs(slopes).max()
+    return np.asarray((along[bends] - passed) / leg.length)
+
+
+def _find_in_expression(value: Varying, leg: Leg, passed: float) -> list[float]:
+    """Fractions of a leg at which what max, min or abs choose by changes its sign."""
+    found = []
+    at = np.linspace(0.0, 1.0, SAMPLES)
+    for text in list_switches(value.expression):
+        def switch(t: Real | float, text: str = text) -> Real:
+            places = place_on_leg(leg, passed, np.atleast_1d(np.asarray(t, dtype=float)))
+            return evaluate_expression(text, x=places.point.real, y=places.point.imag, s=places.along, t=0.0)
+
+        values = switch(at)
+        for k in np.flatnonzero(values[1:] * values[:-1] < 0):
+            found.append(float(brentq(lambda t: float(switch(t)[0]), at[k], at[k + 1], xtol=1e-15)))
+        found += at[values == 0].tolist()
+    return found

@@ -48,7 +48,8 @@ def test_the_resultant_of_water_that_stands_below_the_crest(kind: str, unit: flo
     on, whole = solved.nodes("up"), 7 * (LEVEL * unit) ** 2 / 2
     force, height = solved.mesh.weight[on] * solved.last.traction[on], solved.mesh.position[on].imag
     np.testing.assert_allclose(force.sum(), whole, rtol=1e-9)
-    np.testing.assert_allclose(force.real @ (height - solved.mesh.start.imag.min()), whole * LEVEL * unit / 3, rtol=1e-9)
+    moment = force.real @ (height - solved.mesh.start.imag.min())
+    np.testing.assert_allclose(moment, whole * LEVEL * unit / 3, rtol=1e-9)
 
 
 def count(pressure: Any) -> list[int]:

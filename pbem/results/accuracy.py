@@ -36,6 +36,9 @@ FAR = 8.0
 # Elements with this part of the largest energy are refined in any case: where errors are spread evenly, to refine some
 # of them alone brings nothing.
 ALIKE = 0.1
+# Far from the goal elements in corners are halved twice where no larger part of all is marked, as else errors come from
+# everywhere, and where cracks turn, as the power is known to be small there.
+FEW = 0.25
 # And those with nearly the energy of the last one that is: what is symmetrical stays so.
 AS_LAST = 0.9
 # And those whose jumps are off by more than this part of the error that the estimates may have.
@@ -153,14 +156,16 @@ def decide(
 
 def refine_marked(model: Model, decision: Decision) -> Model:
     """The model of the next pass. Far from the goal the marked elements in corners are halved twice: there errors fall
-    with a small power of their length, whatever the order."""
+    with a small power of their length, whatever the order. See FEW."""
     assert decision.marked is not None
     finer = bisect_elements(model, decision.marked, decision.gently)
     if not decision.far:
         return finer
     again = {name: np.zeros(count_elements(curve), dtype=bool) for name, curve in finer.curves.items()}
+    few = np.concatenate(list(decision.marked.values())).mean() <= FEW
     for before, after in zip(list_corner_ends(model), list_corner_ends(finer), strict=True):
-        again[after.curve][after.element] |= decision.marked[before.curve][before.element]
+        turns = before.curve in model.crack_tips and before.power < 1
+        again[after.curve][after.element] |= (few or turns) and decision.marked[before.curve][before.element]
     return bisect_elements(finer, again)
 
 

@@ -166,3 +166,15 @@ def test_far_from_the_goal_elements_in_corners_are_halved_twice(plate: Model, fa
     assert lengths["branch"][0] == pytest.approx((1 / 32) if far else (1 / 16))
     assert lengths["bottom"].min() == lengths["bottom"][0] and lengths["bottom"][-1] == pytest.approx(1 / 8)
     assert np.isclose(lengths["bottom"], 1 / 16).sum() >= 2
+
+
+def test_where_all_is_marked_only_turns_of_cracks_are_halved_twice(plate: Model) -> None:
+    marked = {name: np.ones(count_elements(curve), dtype=bool) for name, curve in plate.curves.items()}
+    once, twice = (refine_marked(plate, Decision(marked=marked, far=far)) for far in (False, True))
+
+    def read_first(model: Model, name: str) -> float:
+        return float(model.curves[name].legs[0].element_fractions()[1])
+
+    assert read_first(twice, "wing") == pytest.approx(0.5 * read_first(once, "wing"))
+    for name in ("bottom", "branch", "after"):
+        assert read_first(twice, name) == pytest.approx(read_first(once, name))

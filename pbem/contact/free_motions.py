@@ -170,13 +170,13 @@ def close_nearest_beside(laws: PairLaws, modes: ModeState, opening: Real, beside
     return follow_leaders(laws, ModeState(mode, modes.sign))
 
 
-# Slips that differ by less than this part are those of a symmetric model.
-ALIKE = 1e-6
+# Slips that differ by less than this part are those of a symmetric model; less than this part of the largest are none.
+ALIKE, NOTHING = 1e-6, 1e-10
 
 
 def stick_calmest_pairs(
     of: Integer, laws: PairLaws, modes: ModeState, slip: Real, overloaded: Integer,
-    holds: Callable[[ModeState], bool],
+    holds: Callable[[ModeState], bool], largest: float = 0.0,
 ) -> tuple[ModeState, Integer]:
     """Modes with the calmest pairs of one joint after the other sticking until `holds` says enough, and the pairs.
 
@@ -184,9 +184,11 @@ def stick_calmest_pairs(
     Only of joints on which all closed pairs slip; there the pair of the least slip (m,), and those that are its
     images in a symmetric model. overloaded: pairs that
     stuck instead and could not carry what was left: on their joints only pairs that slip in the other sense come
-    into question, as the body moves on in the sense of the overload. The same modes and none if nothing holds.
+    into question, as the body moves on in the sense of the overload. The same modes and none if nothing holds. largest:
+    slip so far, as that of the step alone may be its rounding in all pairs.
     """
     mode = modes.mode.copy()
+    slip = np.where(np.abs(slip) <= NOTHING * max(largest, float(np.abs(slip).max(initial=0.0))), 0.0, slip)
     sense = np.zeros(int(of.max(initial=-1)) + 2)  # the last one is that of pairs without a joint
     sense[of[overloaded]] = modes.sign[overloaded]
     sticks = np.zeros(len(sense), dtype=bool)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,3 +66,44 @@ def test_of_many_bonds_those_near_the_front_are_followed(tmp_path: Path, monkeyp
     np.testing.assert_array_equal(few.contact["fault"].mode, whole.contact["fault"].mode)
     theirs = whole.contact["fault"].slip
     np.testing.assert_allclose(few.contact["fault"].slip, theirs, atol=1e-9 * np.abs(theirs).max())
+
+
+# A disc in an infinite plane, pressed and then pulled: all of its bonds are lost, and nothing holds it in between.
+DISC = """
+materials.grain = { young = 116.0, poisson = 0.32 }
+materials.rock = { young = 84.5, poisson = 0.28 }
+curves.edge = { center = [3.0, -2.0], radius = 1.6, angles = [0.0, 360.0], elements = 16 }
+regions.grain = { material = "grain", boundary = ["edge"] }
+regions.rock = { material = "rock", boundary = ["edge"], infinite = true }
+interfaces.edge = { law = "coulomb", friction = 0.448, cohesion = 0.0215, cohesion_lost = true }
+analysis = { order = 2, scheme = "SST" }
+[[stages]]
+name = "pressed"
+steps = 2
+remote = { sxx = -0.683, syy = 0.279, sxy = -0.129 }
+[[stages]]
+name = "pulled"
+steps = 1
+remote = { sxx = 0.272, syy = 0.0955, sxy = 0.0193 }
+"""
+
+
+def test_no_cascade_ends_in_modes_that_leave_a_body_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What bonds do while a body is free hangs on the last bits of its motion: such modes are for Newton's steps."""
+    asked: list[bool] = []
+    ends: list[bool] = []
+    run_cascade = newton.run_cascade
+
+    def watch(*arguments: Any) -> cascade.Cascade:
+        *others, holds = arguments
+        found = run_cascade(*others, lambda modes: asked.append(holds(modes)) or asked[-1])
+        if found.modes is not None:
+            ends.append(holds(found.modes))
+        return found
+
+    monkeypatch.setattr(newton, "run_cascade", watch)
+    (tmp_path / "disc.toml").write_text(DISC)
+    results = pbem.run(tmp_path / "disc.toml", tmp_path / "disc.h5")
+    assert results.status == "finished" and results.pairs.at("broken", -1).all()
+    assert not all(asked), "no cascade came to modes that leave the disc free"
+    assert all(ends)

@@ -44,12 +44,15 @@ class Cascade:
 def run_cascade(
     problem: Problem, tangent: TangentOperator, constraints: ConstraintMap, modes: ModeState, memory: Memory,
     load: Load, law: Linearisation, solved: Solved, failing: Bool, floor: float, most: int,
+    holds: Callable[[ModeState], bool] = lambda modes: True,
 ) -> Cascade:
     """Let bonds fail, the worst first, until no other fails; all ranks together.
 
     modes, solved: a settled state, in which the bonds `failing` (m,) are overloaded. floor: a stress that counts as
     rounding does (see pbem.contact.modes). most: the largest number of brittle pairs that are followed at once; of more
-    those that are nearest to the failing ones, to which their load goes. What fails beyond them fails next.
+    those that are nearest to the failing ones, to which their load goes. What fails beyond them fails next. holds:
+    whether modes of all pairs hold all bodies, asked on the first rank; where bonds that are lost leave one free what
+    the others do hangs on the last bits of its motion, and the cascade ends.
     """
     broken = memory.broken | failing
     leader = problem.laws.leader
@@ -62,14 +65,15 @@ def run_cascade(
     scale = problem.traction_scale
     start = memory.lose(broken)
     subset = take_subset(problem.laws, start, load.pressure, modes, pairs)
-    lost, own = problem.decide(lambda: _follow(subset, response, scale, floor))
+
+    def complete(own: ModeState) -> ModeState:
+        mode, sign = modes.mode.copy(), modes.sign.copy()
+        mode[pairs], sign[pairs] = own.mode, own.sign
+        return ModeState(mode[leader], sign[leader])
+
+    lost, own = problem.decide(lambda: _follow(subset, response, scale, floor, lambda now: holds(complete(now))))
     broken[pairs] = lost
-    broken = broken[leader]
-    if own is None:
-        return Cascade(broken, None)
-    mode, sign = modes.mode.copy(), modes.sign.copy()
-    mode[pairs], sign[pairs] = own.mode, own.sign
-    return Cascade(broken, ModeState(mode[leader], sign[leader]))
+    return Cascade(broken[leader], None if own is None else complete(own))
 
 
 def _find_nearest(position: Complex, pairs: Integer, failing: Integer, most: int) -> Integer:
@@ -79,12 +83,14 @@ def _find_nearest(position: Complex, pairs: Integer, failing: Integer, most: int
     return np.sort(pairs[np.argsort(distance, kind="stable")[:most]])
 
 
-def _follow(subset: Subset, response: Response, scale: float, floor: float) -> tuple[Bool, ModeState | None]:
+def _follow(
+    subset: Subset, response: Response, scale: float, floor: float, holds: Callable[[ModeState], bool]
+) -> tuple[Bool, ModeState | None]:
     """The bonds of s pairs that are lost in the end, and their modes; None if some round could not be settled."""
     broken = subset.memory.broken.copy()
     while True:
         memory = subset.memory.lose(broken)
-        found = _settle(replace(subset, memory=memory), response, scale, floor)
+        found = _settle(replace(subset, memory=memory), response, scale, floor, holds)
         if found is None:
             return broken, None
         modes, state = found
@@ -96,7 +102,7 @@ def _follow(subset: Subset, response: Response, scale: float, floor: float) -> t
 
 
 def _settle(
-    subset: Subset, response: Response, scale: float, floor: float
+    subset: Subset, response: Response, scale: float, floor: float, holds: Callable[[ModeState], bool]
 ) -> tuple[ModeState, PairState] | None:
     """Modes and states of all pairs while the intact ones stick: of those that are lost by Newton's steps among them
     alone, by pivoting where these do not end."""
@@ -108,24 +114,31 @@ def _settle(
     def judge(chosen: ModeState, state: PairState) -> Proposal:
         return update_active_set(own.laws, chosen, state, own.memory, own.pressure, 1.0, floor)
 
-    modes, d = _step(own, part, scale, judge)
+    def complete(chosen: ModeState) -> ModeState:
+        mode, sign = subset.modes.mode.copy(), subset.modes.sign.copy()
+        mode[lost], sign[lost] = chosen.mode, chosen.sign
+        return ModeState(mode, sign)
+
+    def hold(chosen: ModeState) -> bool:
+        return holds(complete(chosen))
+
+    modes, d = _step(own, part, scale, judge, hold)
     if modes is None:
-        modes = settle_subset(own, part, judge).modes
+        modes = settle_subset(own, part, judge, hold).modes
         d = None if modes is None else _solve_laws(own, modes, part, scale)
     if modes is None or d is None:
         return None
-    mode, sign = subset.modes.mode.copy(), subset.modes.sign.copy()
-    mode[lost], sign[lost] = modes.mode, modes.sign
-    return ModeState(mode, sign), replace(response, change=response.change[:, :, columns]).evaluate(d)
+    return complete(modes), replace(response, change=response.change[:, :, columns]).evaluate(d)
 
 
 def _step(
-    subset: Subset, response: Response, scale: float, judge: Callable[[ModeState, PairState], Proposal]
+    subset: Subset, response: Response, scale: float, judge: Callable[[ModeState, PairState], Proposal],
+    holds: Callable[[ModeState], bool],
 ) -> tuple[ModeState | None, Real | None]:
-    """Modes that no longer change, and d; None if that takes too many steps."""
+    """Modes that no longer change, and d; None if that takes too many steps or frees a body."""
     modes = subset.modes
     for _ in range(MOST_STEPS):
-        d = _solve_laws(subset, modes, response, scale)
+        d = _solve_laws(subset, modes, response, scale) if holds(modes) else None
         if d is None:
             break
         proposal = judge(modes, response.evaluate(d))

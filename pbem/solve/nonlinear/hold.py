@@ -228,12 +228,12 @@ class Hold:
     def _stick(
         self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]
     ) -> ModeState:
+        largest = float(np.abs(self.memory.slip).max(initial=0.0))
         for passed_over in (overloaded, overloaded[:0]):
-            held, pairs = stick_calmest_pairs(joint, self.problem.laws, modes, slip, passed_over, holds)
+            held, pairs = stick_calmest_pairs(joint, self.problem.laws, modes, slip, passed_over, holds, largest)
             if len(pairs):
                 break
-        self.count += 1
-        self.pairs = np.union1d(self.pairs, pairs)
+        self.count, self.pairs = self.count + 1, np.union1d(self.pairs, pairs)
         return held
 
     def _hold_parts(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None) -> ModeState:

@@ -209,7 +209,7 @@ def _run_search(
             floor = find_floor(problem, solved)
             cascade = run_cascade(
                 problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
-                min(search.most_pivoted, MOST_PIVOTED),
+                min(search.most_pivoted, MOST_PIVOTED), lambda now: not hold.leaves_free(now),
             )
             memory = memory.lose(cascade.broken)
             proposal = judge_solution(hold, modes, memory, load, law, solved, search.globalisation).proposal

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
+
+from pbem.case.build import parse_model
+from pbem.mesh.generate import generate_mesh
+from pbem.solve.petsc.session import petsc_options
+from pbem.solve.system.choice import choose_system
 
 # Of each size a singular matrix, then a regular one whose pivots are far from its diagonal; ranks have unequal shares.
 SOLVE = """
@@ -47,6 +53,25 @@ for rank in world.gather(world.rank) or ():
     print("solved on", rank)
 """
 
+SQUARE = """
+[materials.rock]
+young = 1.0e3
+poisson = 0.2
+[curves]
+bottom = { points = [[0, 0], [1, 0]], elements = 1 }
+right = { points = [[1, 0], [1, 1]], elements = 1 }
+top = { points = [[1, 1], [0, 1]], elements = 1 }
+left = { points = [[0, 1], [0, 0]], elements = 1 }
+[regions.plate]
+material = "rock"
+boundary = ["bottom", "right", "top", "left"]
+[boundary]
+bottom = { uy = 0.0 }
+left = { ux = 0.0 }
+top = { tx = 0.0, ty = -1.0 }
+right = { tx = 0.0, ty = 0.0 }
+"""
+
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -54,3 +79,16 @@ Launch = Callable[..., subprocess.CompletedProcess[str]]
 def test_residuals_are_of_rounding(ranks: int, mpirun_snippet: Launch) -> None:
     done = mpirun_snippet(ranks, SOLVE, timeout=60.0)
     assert done.stdout.splitlines() == [f"solved on {rank}" for rank in range(ranks)], done.stderr
+
+
+def test_shares_are_refused_where_scalapack_has_to_be_used_only() -> None:
+    model = parse_model(SQUARE)[1]
+    mesh = generate_mesh(model)
+    by_gmres = replace(model, solver=replace(model.solver, linear="gmres"))
+    system = choose_system(model, mesh)
+    assert mesh.nodes == 12
+    assert system.refuse_ranks(model, mesh, 10) is None and system.refuse_ranks(by_gmres, mesh, 9) is None
+    assert "ScaLAPACK cannot share the 24 rows" in str(system.refuse_ranks(by_gmres, mesh, 10))
+    assert "fewer than the 13 ranks" in str(system.refuse_ranks(model, mesh, 13))
+    with petsc_options({"mat_scalapack_grid_height": "2"}):
+        assert "ScaLAPACK cannot share" in str(system.refuse_ranks(model, mesh, 10))

@@ -49,7 +49,8 @@ class DenseSystem:
     @staticmethod
     def refuse_ranks(model: Model, mesh: Mesh, ranks: int) -> str | None:
         """What to say when a model cannot be shared by so many ranks; None if it can."""
-        return refuse_shares(mesh.nodes, ranks, choose_method(model.solver.linear, len(mesh.region_names)) == "lu")
+        lu = choose_method(model.solver.linear, len(mesh.region_names)) == "lu"
+        return refuse_shares(mesh.nodes, ranks, lu and not factors_in_panels(model))
 
     @staticmethod
     def assemble(
@@ -124,20 +125,27 @@ class DenseSystem:
         rows, laws = self.tangent_rows, problem.laws
         varying = ~(laws.bonded | laws.parted | laws.follows)
         tangent: TangentOperator
-        # Options of the Krylov solver are heeded where it does the work.
-        asked = any(name.startswith(("ksp_", "pc_type")) for name in list_options())
-        # Those of PETSc's factors, too.
-        panels = problem.comm.size > 1 and not any(name.startswith(("pc_", "mat_")) for name in list_options())
-        if problem.model.solver.linear == "gmres" or asked:
+        if asks_for_gmres(problem.model):
             tangent = FactoredTangent(problem, rows)
         else:
             few = 2 * np.count_nonzero(varying) <= FEW * problem.unknowns
+            panels = problem.comm.size > 1 and factors_in_panels(problem.model)
             tangent = CondensedTangent(problem, rows, varying, few, panels)
         return ReleasedTangent(problem, tangent) if problem.anchors else tangent
 
     def place_interior(self, model: Model, mesh: Mesh, points: Complex, location: Location) -> InteriorRows:
         """See System."""
         return place_directly(model, mesh, points, location)
+
+
+def asks_for_gmres(model: Model) -> bool:
+    """Whether a Krylov solver does the work: its options are heeded where it does."""
+    return model.solver.linear == "gmres" or any(name.startswith(("ksp_", "pc_type")) for name in list_options())
+
+
+def factors_in_panels(model: Model) -> bool:
+    """Whether several ranks factorise a dense matrix without PETSc, whose options are heeded where it does the work."""
+    return not asks_for_gmres(model) and not any(name.startswith(("pc_", "mat_")) for name in list_options())
 
 
 def place_directly(model: Model, mesh: Mesh, points: Complex, location: Location) -> InteriorRows:

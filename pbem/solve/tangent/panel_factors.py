@@ -1,9 +1,8 @@
 """LU factors of a dense matrix whose columns are dealt to several ranks in panels, in the place of the matrix.
 
 Panel by panel the rank that has it eliminates with row interchanges and passes it on, and every rank brings its own
-columns up to date (G. H. Golub, C. F. Van Loan, Matrix Computations, fourth edition, 2013, section 3.6). Almost all is
-products of matrices, as wide as the processor likes them; ScaLAPACK's triangular solutions for many right-hand sides
-multiply by 32 columns at a time and take four times as long.
+columns up to date (theory, source 38). Almost all is products of matrices, as wide as the processor likes them; with
+ScaLAPACK solutions for many right-hand sides take four times as long.
 """
 
 from __future__ import annotations

@@ -140,6 +140,10 @@ def draw_slope(rng: random.Random) -> Draft:
     return draft
 
 
+# Width of what a block leaves of the one below it on either side, at least.
+LEDGE = 0.02
+
+
 def draw_stack(rng: random.Random) -> Draft:
     """Blocks of different widths and stiffness on each other, with equal or different meshes, pressed and sheared."""
     draft = _start("A stack of blocks", rng)
@@ -148,6 +152,9 @@ def draw_stack(rng: random.Random) -> Draft:
     half, stack = rng.uniform(1.2, 1.8), []
     for _ in range(count):
         lean = rng.uniform(-0.2, 0.2)
+        if stack:  # within the block below
+            left, right, _ = stack[-1]
+            lean = min(max(lean, left + half + LEDGE), right - half - LEDGE)
         stack.append((lean - half, lean + half, rng.uniform(0.5, 1.2)))
         half = (half - 0.25) * rng.uniform(0.6, 0.95)
     _add_stack(draft, stack, rng, shared)

@@ -39,7 +39,8 @@ GIVEN = {
     "hold": ("problem", "memory", "load", "settled", "floating"),
     "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
-    "smoothing": ("_problem", "_memory", "_load", "_smooth"),
+    "smoothing": ("_problem", "_memory", "_load", "smooth"),
+    "blocks": ("_problem", "_smooth"),
 }
 
 

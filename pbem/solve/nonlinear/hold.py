@@ -79,8 +79,8 @@ class Hold:
         self.placed: set[int] = set()
         self.state: PairState | None = None
         self.floating: tuple[CutMotion, ...] = ()
-        # Only violations of this share of the largest change modes, once those that hold a body came back: many changes
-        # at a time free a body whose contact only wants to move on around it.
+        self.loose = False  # whether blocks that nothing holds stay where they are: see OpenBlocks
+        # Only violations of this share of the largest change modes, once those that hold a body came back: many free it.
         self.share = 0.0
 
     def release(self, constraints: ConstraintMap, modes: ModeState) -> ConstraintMap:
@@ -265,12 +265,12 @@ class Hold:
         return place_block(self.problem, body, modes, opening, before)
 
     def find_floating(self, modes: ModeState, state: PairState, pressure: Real) -> tuple[CutMotion, ...]:
-        """Free motions of blocks that touch what is around them by chance: the pairs carry next to nothing, and there
-        are places where nothing touches."""
-        if not self.problem.parts.block.any():
+        """Free motions of blocks that touch their neighbours by chance: pairs carry next to nothing, somewhere none."""
+        if not (self.problem.parts.block.any() or self.loose):
             return ()
         floating = open_floating(self.problem, modes, state, pressure)
-        return self._find_cut_motions(floating) if (floating.mode != modes.mode).any() else ()
+        free = self.loose or (floating.mode != modes.mode).any()
+        return self.problem.find_cut_motions(self._stick_bonded(floating)) if free else ()
 
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of what holds a body in the end."""
@@ -315,7 +315,7 @@ class Hold:
         return self.problem.find_free_motions(self._stick_bonded(modes))
 
     def _find_cut_motions(self, modes: ModeState) -> tuple[CutMotion, ...]:
-        return self.problem.find_cut_motions(self._stick_bonded(modes))
+        return () if self.loose else self.problem.find_cut_motions(self._stick_bonded(modes))
 
     def _stick_bonded(self, modes: ModeState) -> ModeState:
         return stick_bonded(self.problem.laws, self.memory, modes, self.settled)

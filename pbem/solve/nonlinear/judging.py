@@ -13,6 +13,7 @@ from pbem.contact.laws import Memory, ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, measure_law_error, update_active_set
 from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.open_blocks import OpenBlocks
 from pbem.solve.nonlinear.search import Globalisation
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved
@@ -23,31 +24,36 @@ STRAIN_FLOOR = 0.1
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a solution says of the modes that led to it; settled: none changes, and the laws of slipping pairs hold."""
+    """What a solution says of the modes that led to it; settled: none changes, and the laws of slipping pairs hold.
+
+    rests: whether the stiffness of open blocks bears no more than the tolerance.
+    """
 
     pairs: PairState
     proposal: Proposal
     settled: bool
     failing: Bool
     law_error: float
+    rests: bool
 
 
 def judge_solution(
     hold: Hold, modes: ModeState, memory: Memory, load: Load, law: Linearisation, solved: Solved,
-    globalisation: Globalisation,
+    globalisation: Globalisation, blocks: OpenBlocks,
 ) -> Outcome:
-    """What the first rank says of a solution from modes and linearised laws."""
+    """What the first rank says of a solution from modes and linearised laws, with the stiffness of open blocks."""
     problem, laws = hold.problem, hold.problem.laws
 
     def judge() -> Outcome:
-        pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        pairs, off = blocks.take_off(modes, evaluate_pairs(problem.mesh, law, solved.unknowns))
         floor = find_floor(problem, solved)
         proposal = make_judge(problem, solved, globalisation)(laws, modes, pairs, memory, load.pressure)
         proposal = hold.excuse(modes, pairs, proposal, load.pressure)
         law_error = measure_law_error(laws, modes, pairs, memory, load.pressure, floor)
         failing = find_failures(laws, pairs, memory, load.pressure, floor)
-        settled = not proposal.changed.any() and law_error <= problem.model.solver.newton_tolerance
-        return Outcome(pairs, proposal, settled, failing, law_error)
+        tolerance = problem.model.solver.newton_tolerance
+        settled = not proposal.changed.any() and law_error <= tolerance
+        return Outcome(pairs, proposal, settled, failing, law_error, off <= tolerance)
 
     return problem.decide(judge)
 

@@ -40,6 +40,7 @@ from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.judging import find_floor, judge_solution, make_judge
+from pbem.solve.nonlinear.open_blocks import OpenBlocks
 from pbem.solve.nonlinear.recorded import Record
 from pbem.solve.nonlinear.running_group import RunningGroup, find_rest
 from pbem.solve.nonlinear.search import (
@@ -133,9 +134,11 @@ def _search_modes(
     forcing: Forcing, resumed: Plain | None,
 ) -> Solution:
     """See solve_step; by one search, whose iterations join those before. resumed: see Checkpoint."""
+    smoothing = SmoothSearch(problem, memory, load, search.sweeps)
     parts = {
         "hold": Hold(problem, memory, load), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
-        "smoothing": SmoothSearch(problem, memory, load, search.sweeps), "running": RunningGroup(problem, tangent),
+        "smoothing": smoothing, "running": RunningGroup(problem, tangent),
+        "blocks": OpenBlocks(problem, smoothing.smooth),
     }
     checkpoint = Checkpoint(tangent, load, iterations, parts)
     course = checkpoint.resume(resumed) if resumed else None
@@ -151,7 +154,7 @@ def _run_search(
     problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
     refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
     checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
-    fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup,
+    fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup, blocks: OpenBlocks,
 ) -> Solution:
     """See _search_modes; course: with which it begins, None at its first iteration."""
     laws = problem.laws
@@ -176,15 +179,17 @@ def _run_search(
             finally:
                 search.spent += smoothing.taken
                 smoothing.begun = False
+            hold.loose = True
+            blocks.begin(pairs)
             normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
             modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
                 laws, hold.apply(new, at.g_n, slipped)))
             continue
         begin = time.perf_counter()
-        law = linearise(
+        law = blocks.stiffen(linearise(
             laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale,
             search.globalisation.frozen, jump,
-        )
+        ), modes)
         constraints = hold.release(problem.constrain(law, load), modes)
         part = forcing.choose(search.level > 0)
         try:
@@ -192,10 +197,10 @@ def _run_search(
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN
-            outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation)
+            outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation, blocks)
             if outcome.settled and not solved.checked:
                 solved = tangent.check(solved, constraints, load, law)
-                outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation)
+                outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation, blocks)
                 if loosely and not outcome.settled:
                     forcing.tighten()
         except ConvergenceError as error:
@@ -212,13 +217,13 @@ def _run_search(
                 min(search.most_pivoted, MOST_PIVOTED), lambda now: not hold.leaves_free(now),
             )
             memory = memory.lose(cascade.broken)
-            proposal = judge_solution(hold, modes, memory, load, law, solved, search.globalisation).proposal
+            proposal = judge_solution(hold, modes, memory, load, law, solved, search.globalisation, blocks).proposal
             search.restart()
         record.add(solved, modes, proposal.changed, begin)
         driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
         if driven:
             search.restart()
-        elif outcome.settled and not fails:
+        elif outcome.settled and outcome.rests and not fails:
             forcing.used = False  # what follows is said of a solution in full
             problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
             for note in hold.describe(modes) if problem.comm.rank == 0 else ():
@@ -235,6 +240,7 @@ def _run_search(
             raise ConvergenceError(refused.reason, refused.detail + moves)
         frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(proposal, outcome.law_error)
+        blocks.move_on(pairs, outcome.settled)
         running.note(search, proposal, outcome.law_error)
         if search.taken >= most or (hurried and search.is_stuck()):
             raise _end(hold, "iteration limit", proposal, search)

@@ -71,13 +71,14 @@ class SmoothSearch:
     """Whether the laws are smoothed in a search, once, and the modes that this leads to.
 
     Decided by counts, modes and violations that all ranks have from the first one. allowed: whether it may be at all.
+    smooth (m,): pairs whose laws can be.
     """
 
     def __init__(self, problem: Problem, memory: Memory, load: Load, allowed: bool) -> None:
         laws = problem.laws
         self._problem, self._memory, self._load = problem, memory, load
-        self._smooth = find_smooth(laws, memory, load.pressure) if allowed else np.zeros(laws.count, dtype=bool)
-        self._allowed = bool((self._smooth | laws.bonded | laws.parted | laws.follows).all() and self._smooth.any())
+        self.smooth = find_smooth(laws, memory, load.pressure) if allowed else np.zeros(laws.count, dtype=bool)
+        self._allowed = bool((self.smooth | laws.bonded | laws.parted | laws.follows).all() and self.smooth.any())
         self._first: PairState | None = None
         self.taken = 0  # iterations so far
         self.begun = False  # whether `find` is to be asked, or has not ended yet
@@ -121,7 +122,7 @@ class SmoothSearch:
                 break
             begin = time.perf_counter()
             law = linearise_smoothly(
-                problem.laws, self._smooth, state, memory, load.pressure, problem.traction_scale, width,
+                problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale, width,
                 proximal,
             )
             constraints = hold.release(problem.constrain(law, load), holding)
@@ -134,10 +135,10 @@ class SmoothSearch:
             forcing.used |= solved.loosely
             found = evaluate_pairs(problem.mesh, law, solved.unknowns)
             before, former, state = modes, state, take_off_proximal(
-                problem.laws, self._smooth, found, state, proximal)
+                problem.laws, self.smooth, found, state, proximal)
             last = violation
             modes, violation = problem.decide(lambda at=state: (  # type: ignore[misc]
-                read_modes(problem.laws, self._smooth, at, memory, load.pressure), self._measure(at)))
+                read_modes(problem.laws, self.smooth, at, memory, load.pressure), self._measure(at)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
@@ -157,6 +158,6 @@ class SmoothSearch:
     def _measure(self, state: PairState) -> float:
         """The mean violation of the true laws along all pairs (stress)."""
         problem = self._problem
-        weight = np.where(self._smooth, problem.mesh.pairs.weight, 0.0)
-        off = measure_violation(problem.laws, self._smooth, state, self._memory, self._load.pressure)
+        weight = np.where(self.smooth, problem.mesh.pairs.weight, 0.0)
+        off = measure_violation(problem.laws, self.smooth, state, self._memory, self._load.pressure)
         return float(weight @ off / weight.sum())

@@ -1,0 +1,106 @@
+"""The proximal stiffness of open pairs after smoothed laws: what it bears, that it goes, and how blocks settle."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pbem.contact.laws import OPEN, SLIP, ModeState, PairState
+from pbem.contact.modes import linearise
+from pbem.solve.nonlinear.open_blocks import FALL, PART, OpenBlocks
+from pbem.solve.nonlinear.smooth_search import SmoothSearch
+from pbem.solve.problem.step import Step
+from tests.unit.test_laws import make_laws, remember
+from tests.unit.test_sweeps import many_groups, march_over, write_network
+
+Real = NDArray[np.float64]
+__all__ = ["many_groups"]
+
+COUNT, SCALE = 12, 7.0
+
+
+def make_blocks(own_stiffness: float = 3.0) -> tuple[Any, OpenBlocks, ModeState, PairState]:
+    """Laws, of which all but the first pair are smoothed; modes of which every other pair is open; a state."""
+    laws = make_laws(COUNT, np.full(COUNT, 0.6), own_stiffness=np.full(COUNT, own_stiffness))
+    modes = ModeState(np.where(np.arange(COUNT) % 2, SLIP, OPEN).astype(np.int8), np.ones(COUNT))
+    state = PairState(*np.random.default_rng(4).normal(size=(4, COUNT)))
+    problem: Any = SimpleNamespace(laws=laws)
+    return laws, OpenBlocks(problem, np.arange(COUNT) > 0), modes, state
+
+
+def test_open_pairs_bear_what_their_jumps_change() -> None:
+    laws, blocks, modes, state = make_blocks()
+    pressure = np.full(COUNT, 0.2)
+    law = linearise(laws, modes, np.full(COUNT, -1.0), np.zeros(COUNT), remember(0.0, COUNT), pressure, SCALE)
+    assert blocks.stiffen(law, modes) is law
+    unknowns = np.random.default_rng(5).normal(size=(COUNT, 2))
+    usual = law.evaluate(unknowns)
+    assert blocks.take_off(modes, usual) == (usual, 0.0)
+    blocks.begin(state)
+    found = blocks.stiffen(law, modes).evaluate(unknowns)
+    held = (modes.mode == OPEN) & (np.arange(COUNT) > 0)
+    stiffness = np.where(held, PART * 3.0, 0.0)
+    np.testing.assert_allclose(found.p_n - usual.p_n, stiffness * (usual.g_n - state.g_n), rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(found.p_s - usual.p_s, stiffness * (usual.g_s - state.g_s), rtol=1e-6, atol=1e-15)
+    left, off = blocks.take_off(modes, found)
+    np.testing.assert_allclose(left.p_n, usual.p_n, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(left.p_s, usual.p_s, rtol=0, atol=1e-14)
+    largest = max(np.abs(usual.p_n).max(), np.abs(usual.p_s).max())
+    most = max(np.abs(found.p_n - usual.p_n).max(), np.abs(found.p_s - usual.p_s).max())
+    np.testing.assert_allclose(off, most / largest, rtol=1e-6)
+
+
+def test_the_stiffness_falls_once_no_mode_changes() -> None:
+    _, blocks, modes, state = make_blocks()
+    blocks.move_on(state, True)
+    assert blocks.state is None
+    blocks.begin(state)
+    blocks.move_on(state, False)
+    assert blocks.part == PART
+    moved = PairState(state.p_n, state.p_s, state.g_n + 1.0, state.g_s)
+    before = blocks.take_off(modes, moved)[1]
+    blocks.move_on(state, True)
+    np.testing.assert_allclose(blocks.take_off(modes, moved)[1], FALL * before, rtol=1e-4)
+    blocks.move_on(moved, True)
+    assert blocks.take_off(modes, moved)[1] == 0.0
+
+
+def write_blocks(load: str) -> str:
+    """Two triangular blocks in a plane, each between three cracks that cross."""
+    curves = {}
+    for name, middle, turn in (("left", -1.5, 0.2), ("right", 1.5, 0.9)):
+        corners = middle + 0.6 * np.exp(1j * (turn + 2 * np.pi / 3 * np.arange(4)))
+        for k in range(3):
+            beyond = 0.3 * (corners[k + 1] - corners[k])
+            ends = [corners[k] - beyond, corners[k + 1] + beyond]
+            curves[f"{name}_{k}"] = [[round(z.real, 4), round(z.imag, 4)] for z in ends]
+    head = write_network(1, 4).split("cracks = ")[0].replace("sxx = 0.1, syy = -1.0, sxy = 0.3", load)
+    text = f"{head}cracks = {list(curves)}\n[curves]\n"
+    text += "".join(f"{name} = {{ points = {ends}, elements = 8 }}\n" for name, ends in curves.items())
+    return text + "[interfaces]\n" + "".join(f'{name} = {{ law = "coulomb", friction = 0.6 }}\n' for name in curves)
+
+
+def solve(text: str, smooths: bool) -> Step:
+    """The step of a case whose laws are smoothed after the first iteration, or never."""
+    def begins(search: SmoothSearch, counts: list[int], state: PairState) -> bool:
+        search._first, search._allowed, allowed = state, False, search._allowed
+        return allowed and smooths
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SmoothSearch, "begins", begins)
+        return march_over(text)
+
+
+def test_blocks_in_open_cracks_settle_in_fewer_iterations(many_groups: None) -> None:
+    text = write_blocks("sxx = 1.0, syy = -0.05, sxy = 0.0")
+    found, usual = solve(text, True), solve(text, False)
+    # Without it, 15 of two searches.
+    assert len(found.iterations) <= 11 < len(usual.iterations)
+    assert (usual.contact.mode == OPEN).mean() > 0.6
+    np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
+    slip = usual.contact.slip
+    np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-6 * np.abs(slip).max())

@@ -80,7 +80,7 @@ class Hold:
         self.state: PairState | None = None
         self.floating: tuple[CutMotion, ...] = ()
         self.loose = False  # whether blocks that nothing holds stay where they are: see OpenBlocks
-        # Only violations of this share of the largest change modes, once those that hold a body came back: many free it.
+        # Only violations of this share of the largest change modes, once those that hold a body came back.
         self.share = 0.0
 
     def release(self, constraints: ConstraintMap, modes: ModeState) -> ConstraintMap:

@@ -24,7 +24,7 @@ FALL = 1e-2
 
 
 class OpenBlocks:
-    """The proximal stiffness of open pairs in the iterations after smoothed laws; the same on all ranks.
+    """The proximal stiffness of open pairs in iterations after smoothed laws, alike on all ranks (theory, 127).
 
     smooth (m,): pairs that have one. state: from which the jumps change; None before there were smoothed laws.
     """

@@ -45,7 +45,7 @@ class OpenBlocks:
             self.part *= FALL if settled else 1.0
 
     def stiffen(self, law: Linearisation, modes: ModeState) -> Linearisation:
-        """The linearised laws with the stiffness in open pairs."""
+        """The linearised laws with the stiffness in open pairs. (theory, 127)"""
         if self.state is None:
             return law
         stiffness = self._find_stiffness(modes)

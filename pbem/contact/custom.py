@@ -102,14 +102,23 @@ def _describe(error: BaseException) -> str:
 @contextmanager
 def _kept_surroundings() -> Iterator[None]:
     """What a file may change for the whole program is set back: NumPy's errors, filters of warnings, the directory."""
-    folder, filters = os.getcwd(), list(warnings.filters)
+    folder, filters = _find_folder(), list(warnings.filters)
     try:
         with np.errstate():
             yield
     finally:
-        os.chdir(folder)
+        if folder is not None and _find_folder() != folder:
+            os.chdir(folder)
         if warnings.filters != filters:  # `catch_warnings` would make each warning be told again at each call
             warnings.filters[:] = filters  # type: ignore[index]
+
+
+def _find_folder() -> str | None:
+    """The directory of the process; None if it is no longer there."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return None
 
 
 def _run(file: str, text: str) -> dict[str, Any]:

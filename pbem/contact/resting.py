@@ -22,15 +22,15 @@ ASKEW = np.array([0.031, 0.047, 0.023])
 
 
 @dataclass(frozen=True)
-class Rest:
-    """Pairs on which a body rests: those at which it sticks, and those at which it slides, in a sense (-1, 0, 1)."""
+class Place:
+    """Pairs on which a body lies: those at which it sticks, and those at which it slides, in a sense (-1, 0, 1)."""
 
     sticking: Integer
     sliding: Integer
     sense: Integer
 
 
-def find_rest(position: Complex, normal: Complex, opening: Real, slip: Real, may_stick: Bool) -> Rest | None:
+def find_place(position: Complex, normal: Complex, opening: Real, slip: Real, may_stick: Bool) -> Place | None:
     """Pairs, of those (k,) around a body, on which it lies without force, where all others are open or just closed.
 
     normal: into which the body would move to open them; opening, slip: as they are now, that of the body against what
@@ -43,7 +43,7 @@ def find_rest(position: Complex, normal: Complex, opening: Real, slip: Real, may
     return _rest_on_three(position, normal, opening, slip)
 
 
-def _rest_on_two(position: Complex, normal: Complex, opening: Real, slip: Real, may_stick: Bool) -> Rest | None:
+def _rest_on_two(position: Complex, normal: Complex, opening: Real, slip: Real, may_stick: Bool) -> Place | None:
     """Where a body that closes a pair and takes back its slip turns about it until another one closes; of all such
     places the one that is the nearest to where the body is."""
     size = float(np.abs(opening).max(initial=0.0))
@@ -59,7 +59,7 @@ def _rest_on_two(position: Complex, normal: Complex, opening: Real, slip: Real, 
             moved = float(np.abs(motion).max())
             if moved < least and abs(rate[other]) > LEVER * abs(lever[other]):
                 sense = _find_sense(normal, slip, motion, np.array([other]))
-                best, least = Rest(np.array([k]), np.array([other]), sense), moved
+                best, least = Place(np.array([k]), np.array([other]), sense), moved
     return best
 
 
@@ -74,7 +74,7 @@ def _find_range(left: Real, rate: Real, span: float, rounded: float) -> list[tup
     return [(float(low), int(first)), (float(high), int(last))] if low <= high + rounded / span else []
 
 
-def _rest_on_three(position: Complex, normal: Complex, opening: Real, slip: Real) -> Rest | None:
+def _rest_on_three(position: Complex, normal: Complex, opening: Real, slip: Real) -> Place | None:
     """Without friction: where the nearest pair closes, or comes as near as it can, and others stop what is left; two
     pairs hold a round body, whose turning opens nothing."""
     from scipy.optimize import linprog  # here, as few runs need it
@@ -95,7 +95,7 @@ def _rest_on_three(position: Complex, normal: Complex, opening: Real, slip: Real
     if len(touching) != rows.shape[1] or np.linalg.svd(rows[touching], compute_uv=False)[-1] < 0.1 * LEVER:
         return None
     motion = size * (motions[:, : rows.shape[1]] @ found.x)
-    return Rest(touching[:0], touching, _find_sense(normal, slip, motion, touching))
+    return Place(touching[:0], touching, _find_sense(normal, slip, motion, touching))
 
 
 def _find_sense(normal: Complex, slip: Real, motion: Complex, of: Integer) -> Integer:

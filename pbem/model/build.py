@@ -30,7 +30,7 @@ from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.interior import list_interior_points
-from pbem.model.kinks import list_kinks
+from pbem.model.kinks import split_at_kinks
 from pbem.model.law import check_along
 from pbem.model.load_notes import note_jumps, note_loads
 from pbem.model.loading import Loading, list_held, read_loading
@@ -161,8 +161,8 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     apart = list_apart(case, roles)
     split = split_at_junctions(shapes.curves, shapes.tolerance, apart)
     curves: Mapping[str, Curve]
-    loaded = [*(complex(*table.at) for table in case.point_loads.values()), *list_kinks(case, split.curves)]
-    curves, places = split_at_points(split.curves, shapes.tolerance, loaded)
+    loaded = [complex(*table.at) for table in case.point_loads.values()]
+    curves, places = split_at_points(split_at_kinks(case, split.curves), shapes.tolerance, loaded)
     opposite: Mapping[str, Mapping[complex, tuple[str, complex]]] = {}
     cracks = {name: region for name, region in roles.cracks.items() if name in curves}
     # Two bodies may touch anywhere along their curves in contact; one body may not touch itself.

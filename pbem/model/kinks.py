@@ -6,7 +6,7 @@ with a kink.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import brentq
@@ -15,6 +15,7 @@ from pbem.arrays import Real
 from pbem.description.case import Case
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.expression import evaluate_expression, list_switches
+from pbem.geometry.junction import split_leg
 from pbem.model.given import read_value
 from pbem.model.loads_along import list_given
 from pbem.model.touching import place_on_leg
@@ -32,28 +33,43 @@ STRAIGHT = 1e-9
 SAMPLES = 65
 
 
-def list_kinks(case: Case, curves: Mapping[str, Curve]) -> list[complex]:
-    """Points of the curves of bodies at which tractions, by tables or expressions of the place alone, have kinks."""
-    places: list[complex] = []
+def split_at_kinks(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
+    """The curves, those of bodies with an end of a leg at each kink of tractions by tables or expressions of the place
+    alone."""
+    kinks: dict[str, dict[int, list[float]]] = {}
     for loc, name, given, _ in list_given(case):
         if loc[-3] != "boundary" or loc[-1] not in TRACTIONS or name not in curves:
             continue
         value = read_value(loc, given, timed=True)[0]
         if isinstance(value, Varying) and not value.timed:
-            places += _find_on_curve(value, curves[name])
-    return list(dict.fromkeys(places))
+            for number, found in _find_on_curve(value, curves[name]):
+                kinks.setdefault(name, {}).setdefault(number, []).extend(found)
+    return {name: _split(curve, kinks[name]) if name in kinks else curve for name, curve in curves.items()}
 
 
-def _find_on_curve(value: Varying, curve: Curve) -> Iterator[complex]:
+def _split(curve: Curve, kinks: Mapping[int, Sequence[float]]) -> Curve:
+    legs: list[Leg] = []
+    for number, leg in enumerate(curve.legs):
+        at = _part(kinks.get(number, ()), NEAREST / leg.elements)
+        legs += split_leg(leg, {complex(leg.point(np.array(t))): t for t in at})
+    return Curve(curve.name, tuple(legs))
+
+
+def _find_on_curve(value: Varying, curve: Curve) -> Iterator[tuple[int, list[float]]]:
+    """The numbers of legs with kinks, and the fractions of these legs at which they are."""
     passed = 0.0
-    for leg in curve.legs:
+    for number, leg in enumerate(curve.legs):
         found = _find_in_table(value, leg, passed) if value.table else _find_in_expression(value, leg, passed)
-        spare = NEAREST / leg.elements
-        inside = [t for t in sorted(found) if spare < t < 1 - spare]
-        apart = [t for k, t in enumerate(inside) if k == 0 or t - inside[k - 1] > spare]
-        if len(apart) <= MOST * leg.elements:
-            yield from (complex(leg.point(np.array(t))) for t in apart)
+        apart = _part(found, NEAREST / leg.elements)
+        if apart and len(apart) <= MOST * leg.elements:
+            yield number, apart
         passed += leg.length
+
+
+def _part(fractions: Iterable[float], spare: float) -> list[float]:
+    """Those that are further than `spare` from the ends, and from the one before."""
+    inside = [float(t) for t in sorted(fractions) if spare < t < 1 - spare]
+    return [t for k, t in enumerate(inside) if k == 0 or t - inside[k - 1] > spare]
 
 
 def _find_in_table(value: Varying, leg: Leg, passed: float) -> Real:
@@ -76,5 +92,7 @@ def _find_in_expression(value: Varying, leg: Leg, passed: float) -> list[float]:
         values = switch(at)
         for k in np.flatnonzero(values[1:] * values[:-1] < 0):
             found.append(float(brentq(lambda t: float(switch(t)[0]), at[k], at[k + 1], xtol=1e-15)))
-        found += at[values == 0].tolist()
+        # Where it is zero over a stretch both branches are one; what ends the stretch is a switch of its own.
+        crosses = (values[1:-1] == 0) & (values[:-2] * values[2:] < 0)
+        found += at[1:-1][crosses].tolist()
     return found

@@ -61,6 +61,7 @@ def test_smooth_values_and_dense_tables_divide_nothing() -> None:
     assert len(count({"expression": "7*(6*U - y)"})) == 1
     assert len(count({"expression": "7*max(8*U - y, 0)"})) == 1  # the level is above the crest
     assert len(count(SWITCHED)) == 2
+    assert len(count({"expression": "7*max(4.7*t*U - y, 0)"})) == 1
     s = np.linspace(0, HEIGHT, 101)
     dense = {"table": [[float(at), math.sin(at)] for at in s]}
     text = write({"expression": "1"}).replace('{ expression = "1" }', f"{{ table = {dense['table']} }}")
@@ -68,6 +69,26 @@ def test_smooth_values_and_dense_tables_divide_nothing() -> None:
     assert len(parse_model(text)[1].curves["up"].legs) == 1
     straight = write({"expression": "1"}).replace('{ expression = "1" }', "{ table = [[0, 1], [2, 2], [6, 4]] }")
     assert "table" in straight and len(parse_model(straight)[1].curves["up"].legs) == 1
+
+
+@pytest.mark.parametrize(("expression", "levels"), [
+    ("7*max(max(4.7 - y, 0), 0)", [4.7]), ("abs(max(4.7 - y, 0))", [4.7]), ("abs(y - 3)", [3.0]),
+    ("max(max(4 - y, 0), 3*max(3 - y, 0))", [4.0, 3.0, 2.5]),
+])  # fmt: skip
+def test_switches_that_are_zero_over_a_stretch(expression: str, levels: list[float]) -> None:
+    for elements in (12, 64):
+        text = write({"expression": expression}, elements=elements)
+        legs = parse_model(text)[1].curves["up"].legs
+        np.testing.assert_allclose([leg.end.imag for leg in legs[:-1]], levels, rtol=0, atol=1e-9)
+
+
+def test_several_kinks_of_several_tractions_on_one_face() -> None:
+    text = write({"expression": "1"}).replace('pressure = { expression = "1" }', (
+        'tn = { table = [[0, 0], [2, 0], [6, 4]] }, ts = { expression = "max(y - 2, 0)" }'))  # fmt: skip
+    assert "ts" in text
+    legs = parse_model(text)[1].curves["up"].legs
+    np.testing.assert_allclose([leg.end.imag for leg in legs], [4.0, 2.0, 0.0], rtol=0, atol=1e-9)
+    assert sum(leg.elements for leg in legs) == 12
 
 
 def test_what_decides_between_branches() -> None:

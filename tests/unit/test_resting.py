@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.contact.resting import Rest, find_rest
+from pbem.contact.resting import Place, find_place
 
 ANGLES = 2 * np.pi * (np.arange(60) + 0.37) / 60
 
 
-def move(rest: Rest, position: np.ndarray, normal: np.ndarray, opening: np.ndarray, slip: np.ndarray) -> np.ndarray:
+def move(rest: Place, position: np.ndarray, normal: np.ndarray, opening: np.ndarray, slip: np.ndarray) -> np.ndarray:
     """Openings (k,) after the rigid motion that closes the pairs of a rest, and takes back the slip where it sticks."""
     touching = np.concatenate([rest.sticking, rest.sliding])
     lever = (position - position[0]) / np.abs(position - position[0]).max()
@@ -52,7 +52,7 @@ def make_space(shape: str, size: float) -> tuple[np.ndarray, np.ndarray, np.ndar
 @pytest.mark.parametrize("shape", ["disc", "ellipse", "square"])
 def test_a_body_lies_where_nothing_overlaps(shape: str, rough: bool, size: float) -> None:
     position, normal, opening, slip = make_space(shape, size)
-    rest = find_rest(position, normal, opening, slip, np.full(60, rough))
+    rest = find_place(position, normal, opening, slip, np.full(60, rough))
     assert rest is not None
     assert (len(rest.sticking), len(rest.sliding)) == ((1, 1) if rough else (0, 2 if shape == "disc" else 3))
     moved = move(rest, position, normal, opening, slip)
@@ -65,11 +65,11 @@ def test_a_body_lies_where_nothing_overlaps(shape: str, rough: bool, size: float
 def test_a_body_that_two_sides_pinch_lies_nowhere(rough: bool) -> None:
     position, normal, opening, slip = make_space("disc", 1.0)
     pinched = opening - 0.03 * np.cos(2 * ANGLES) ** 2
-    assert find_rest(position, normal, pinched, slip, np.full(60, rough)) is None
+    assert find_place(position, normal, pinched, slip, np.full(60, rough)) is None
 
 
 def test_pairs_without_friction_do_not_stick() -> None:
     position, normal, opening, slip = make_space("ellipse", 1.0)
     rough = np.arange(60) == 41
-    rest = find_rest(position, normal, opening, slip, rough)
+    rest = find_place(position, normal, opening, slip, rough)
     assert rest is not None and rest.sticking.tolist() == [41]

@@ -9,6 +9,7 @@ import pytest
 
 import pbem
 from pbem.driver import run as run_case
+from pbem.errors import ConvergenceError
 from pbem.results.reader import Results
 from tests.parallel.launch import launch_snippet
 from tests.verification.test_settling import Listener
@@ -89,3 +90,56 @@ def test_ranks_lay_bodies_down_alike(tmp_path: Path) -> None:
         assert np.array_equal(one.contact[name].mode, two.contact[name].mode)
         largest = np.abs(one.contact[name].opening).max()
         np.testing.assert_allclose(two.contact[name].opening, one.contact[name].opening, rtol=0, atol=1e-8 * largest)
+
+
+PUSHED = """
+materials.m = {{ young = 1000.0, poisson = 0.3 }}
+curves.hole = {{ center = [0, 0], radius = 1.0001, elements = 32 }}
+curves.edge = {{ center = [0, 0], radius = 4.0, elements = 16 }}
+curves.rim = {{ center = [0, 0], radius = 1.0, elements = 32 }}
+curves.hub = {{ center = [0, 0], radius = 0.15, elements = 12 }}
+regions.plate = {{ material = "m", boundary = ["hole", "edge"] }}
+regions.pin = {{ material = "m", boundary = ["rim", "hub"] }}
+boundary.edge = {{ ux = 0.0, uy = 0.0 }}
+contacts.seat = {{ between = ["rim", "hole"], friction = {friction} }}
+analysis.steps = 1
+[boundary.hub]
+tx = {{ expression = "x/0.15 + {x!r}" }}
+ty = {{ expression = "y/0.15 + {y!r}" }}
+"""
+
+
+@pytest.mark.parametrize(("friction", "direction"), [(0.3, 3.3), (0.1, 2.0), (0.6, 5.5)])
+def test_a_small_push_beside_large_loads_in_balance_is_borne(friction: float, direction: float, tmp_path: Path) -> None:
+    push = 2e-5 * np.exp(1j * direction)
+    case = tmp_path / "pin.toml"
+    case.write_text(PUSHED.format(friction=friction, x=float(push.real), y=float(push.imag)), encoding="utf-8")
+    results = pbem.run(case, tmp_path / "pin.h5")
+    borne = results.reactions["edge"][-1] @ [1, 1j]
+    assert abs(borne + 2 * np.pi * 0.15 * push) < 1e-2 * abs(borne)
+    assert results.steps.iterations.max() <= 15
+
+
+SLIDING = """
+materials.m = { young = 1000.0, poisson = 0.2 }
+curves.base = { points = [[0, 0], [6, 0]], elements = 12 }
+curves.rest = { points = [[6, 0], [6, -1], [0, -1], [0, 0]], elements = 12 }
+curves.foot = { points = [[1, 0], [2, 0]], elements = 6 }
+curves.top = { points = [[2, 0], [2, 1], [1, 1], [1, 0]], elements = 12 }
+curves.idle = { points = [[7, 0], [8, 0], [8, 1], [7, 1], [7, 0]], elements = 12 }
+regions.c = { material = "m", boundary = ["base", "rest"] }
+regions.b = { material = "m", boundary = ["foot", "top"] }
+regions.a = { material = "m", boundary = ["idle"] }
+boundary.rest = { ux = 0.0, uy = 0.0 }
+contacts.seat = { between = ["foot", "base"], friction = 0.2 }
+boundary.top = { tx = 0.3, ty = -1.0 }
+analysis.steps = 1
+"""
+
+
+def test_a_body_without_contacts_beside_one_that_slides_away(tmp_path: Path) -> None:
+    case = tmp_path / "slide.toml"
+    case.write_text(SLIDING, encoding="utf-8")
+    with pytest.raises(ConvergenceError) as caught:
+        pbem.run(case, tmp_path / "slide.h5")
+    assert caught.value.reason in ("limit load", "free motion") and "'b'" in caught.value.detail

@@ -10,13 +10,16 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Proposal
-from pbem.contact.resting import find_rest
+from pbem.contact.resting import find_place
 from pbem.mesh.mesh import Mesh
 from pbem.solve.problem.given import is_driven
 from pbem.solve.problem.problem import Problem
 
 # All motions of a body.
 FREE = 3
+# Loads that leave no more than this part of themselves drive nothing: a small push beside large loads that balance does
+# drive a body.
+UNDRIVEN = 1e-6
 # What lies carries no more than this part of what others do, or of what the jumps would make of the model's stiffness.
 IDLE = 1e-6
 
@@ -37,12 +40,12 @@ def rest_bodies(
         opened[own] = OPEN
         free = [each for each in problem.find_free_motions(ModeState(opened, modes.sign)).motions
                 if each.regions == (name,)]
-        if len(free) < FREE or is_driven(problem, load, free):
+        if len(free) < FREE or is_driven(problem, load, free, UNDRIVEN):
             continue
         normal, own = normal[~laws.parted[own]], own[~laws.parted[own]]
-        if laws.follows[own].any():
+        if len(own) < FREE or laws.follows[own].any():
             continue
-        found = find_rest(mesh.pairs.position[own], normal, opening[own], slip[own], resists_slip(laws)[own])
+        found = find_place(mesh.pairs.position[own], normal, opening[own], slip[own], resists_slip(laws)[own])
         if found is None:
             continue
         mode, sign = opened, modes.sign.copy()

@@ -84,9 +84,13 @@ class RunningGroup:
 
     def _find_neighbours(self, pairs: Integer) -> Integer:
         """The pairs next to some, the more the oftener groups ran on."""
-        reach = 4**self.runs if self.runs else 0
-        near = (pairs[:, None] + np.arange(-reach, reach + 1)).clip(0, len(self._interface) - 1)
-        near = near[self._interface[near] == self._interface[pairs][:, None]]
+        if not self.runs or len(pairs) > MOST:
+            return pairs
+        # The group has no room for more.
+        reach = min(4**self.runs, MOST)
+        near = pairs[:, None] + np.arange(-reach, reach + 1)
+        inside = near.clip(0, len(self._interface) - 1)
+        near = inside[(near == inside) & (self._interface[inside] == self._interface[pairs][:, None])]
         return np.unique(near[self._beside[near]])
 
 

@@ -35,8 +35,11 @@ def find_push(problem: Problem, region: int, load: Load) -> Real:
     return np.where(support.forced, load.rigid[list(problem.model.rigid).index(name)], 0.0)
 
 
-def is_driven(problem: Problem, load: Load, motions: Sequence[RigidBodyMode]) -> bool:
-    """Whether a load does work on one of these motions of bodies."""
+def is_driven(
+    problem: Problem, load: Load, motions: Sequence[RigidBodyMode], balanced: float = BALANCED
+) -> bool:
+    """Whether a load does work on one of these motions of bodies: more than a part, `balanced`, of what it does without
+    signs."""
     mesh = problem.mesh
     _, given = collect_given(problem, load)
     force = np.where(mesh.node_crack, 0.0, mesh.weight) * (given[::2] + 1j * given[1::2])
@@ -52,6 +55,6 @@ def is_driven(problem: Problem, load: Load, motions: Sequence[RigidBodyMode]) ->
                     moved = shift + 1j * spin * support.about
                     work[mesh.nodes + 3 * number + np.arange(3)] = (
                         find_push(problem, number, load) * [moved.real, moved.imag, spin])
-        if abs(work.sum()) > BALANCED * np.abs(work).sum():
+        if abs(work.sum()) > balanced * np.abs(work).sum():
             return True
     return False

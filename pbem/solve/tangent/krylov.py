@@ -41,7 +41,7 @@ WIDENING, MOST_WIDENING = 4, 16
 # until the constraint map has changed by this part.
 MOST_DRIFT = 0.9
 # GMRES goes on to this part of Newton's tolerance: two ways to a state then leave less than 1e-9 between its fields.
-SAFETY = 0.01
+SAFETY = 0.03
 # The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
 # sets that are far from each other are settled one by one.
 MOST_SETTLED_BY_GMRES = 12

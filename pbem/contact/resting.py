@@ -13,6 +13,8 @@ from pbem.arrays import Bool, Complex, Integer, Real
 LEVER = 0.3
 # Openings of less than this part of the largest are none.
 ROUNDED = 1e-9
+# Motions that differ by less than this part are those to the images of a place in a symmetric model.
+ALIKE = 1e-6
 # So many of the pairs are looked at as those at which a body sticks.
 MOST_LOOKED_AT = 200
 # Motions that are looked for are at most so many times as large as the largest opening.
@@ -57,7 +59,7 @@ def _rest_on_two(position: Complex, normal: Complex, opening: Real, slip: Real, 
         for turn, other in _find_range(left, rate, np.abs(lever).max(initial=0.0), ROUNDED * size):
             motion = shift + 1j * turn * lever
             moved = float(np.abs(motion).max())
-            if moved < least and abs(rate[other]) > LEVER * abs(lever[other]):
+            if moved < (1 - ALIKE) * least and abs(rate[other]) > LEVER * abs(lever[other]):
                 sense = _find_sense(normal, slip, motion, np.array([other]))
                 best, least = Place(np.array([k]), np.array([other]), sense), moved
     return best

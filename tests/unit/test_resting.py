@@ -73,3 +73,14 @@ def test_pairs_without_friction_do_not_stick() -> None:
     rough = np.arange(60) == 41
     rest = find_place(position, normal, opening, slip, rough)
     assert rest is not None and rest.sticking.tolist() == [41]
+
+
+@pytest.mark.parametrize("last_bits", range(4))
+def test_of_images_in_a_symmetrical_hole_the_first_is_taken(last_bits: int) -> None:
+    at = np.exp(2j * np.pi * (np.arange(40) + 0.5) / 40)
+    play = 0.02 + 0.008 * (at**2).real
+    noise = 1e-15 * np.random.default_rng(last_bits).standard_normal(40)
+    place = find_place(at, -at, play + noise, np.zeros(40), np.ones(40, dtype=bool))
+    exact = find_place(at, -at, play, np.zeros(40), np.ones(40, dtype=bool))
+    assert place is not None and exact is not None
+    assert (place.sticking[0], place.sliding[0]) == (exact.sticking[0], exact.sliding[0])

@@ -8,9 +8,9 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 
-# Two pairs hold a body if the normal of one passes the other by this part of their distance; three without friction if
-# the least of what they feel of a motion of unit size is a tenth of it.
-LEVER = 0.3
+# Two pairs hold a body if the normal of one passes the other by this part of their distance; pairs without friction if
+# the least singular value of what they feel of motions of unit size is no less than this.
+LEVER, FELT = 0.3, 0.03
 # Openings of less than this part of the largest are none.
 ROUNDED = 1e-9
 # Motions that differ by less than this part are those to the images of a place in a symmetric model.
@@ -85,19 +85,19 @@ def _rest_on_three(position: Complex, normal: Complex, opening: Real, slip: Real
     lever = (position - position.mean()) / np.abs(position - position.mean()).max()
     motions = np.stack([np.ones_like(lever), np.full_like(lever, 1j), 1j * lever], axis=1)
     rows = (motions * np.conj(normal)[:, None]).real
-    rows = rows[:, np.abs(rows).max(axis=0) > ROUNDED]
+    # Motions along all faces open nothing: turns of a round body, and those of one between parallel faces along them.
+    seen = np.abs(rows).max(axis=0) > ROUNDED
+    rows, motions = rows[:, seen], motions[:, seen]
     if not size > 0:
         return None
-    aim = rows[np.argmin(opening)] + ASKEW[: rows.shape[1]]
-    found = linprog(aim, A_ub=-rows, b_ub=opening / size, bounds=[(-FARTHEST, FARTHEST)] * rows.shape[1],
-                    method="highs")
+    found = linprog(rows[np.argmin(opening)] + ASKEW[seen], A_ub=-rows, b_ub=opening / size,
+                    bounds=[(-FARTHEST, FARTHEST)] * rows.shape[1], method="highs")
     if found.status != 0:
         return None
     touching = np.flatnonzero(found.ineqlin.marginals < -ROUNDED)
-    if len(touching) != rows.shape[1] or np.linalg.svd(rows[touching], compute_uv=False)[-1] < 0.1 * LEVER:
+    if len(touching) != rows.shape[1] or np.linalg.svd(rows[touching], compute_uv=False)[-1] < FELT:
         return None
-    motion = size * (motions[:, : rows.shape[1]] @ found.x)
-    return Place(touching[:0], touching, _find_sense(normal, slip, motion, touching))
+    return Place(touching[:0], touching, _find_sense(normal, slip, size * (motions @ found.x), touching))
 
 
 def _find_sense(normal: Complex, slip: Real, motion: Complex, of: Integer) -> Integer:

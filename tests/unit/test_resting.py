@@ -61,6 +61,21 @@ def test_a_body_lies_where_nothing_overlaps(shape: str, rough: bool, size: float
     np.testing.assert_allclose(moved[np.concatenate([rest.sticking, rest.sliding])], 0.0, rtol=0, atol=1e-9 * largest)
 
 
+def test_a_smooth_body_between_parallel_faces_keeps_the_sense_of_its_slip() -> None:
+    along = np.linspace(-1, 1, 9)
+    position, normal = np.concatenate([along - 0.5j, along + 0.5j]), np.repeat([1j, -1j], 9)
+    opening = 0.01 + (np.conj(normal) * (0.004j + 0.002j * position)).real
+    slip = (np.conj(1j * normal) * (0.004 + 0j)).real
+    place = find_place(position, normal, opening, slip, np.zeros(18, dtype=bool))
+    assert place is not None and len(place.sticking) == 0 and len(place.sliding) == 2
+    # It moves across the faces, and turns, until these two pairs close; along the faces it does not move.
+    at, into = position[place.sliding], normal[place.sliding]
+    rates = np.stack([(np.conj(into) * 1j).real, (np.conj(into) * 1j * at).real], axis=1)
+    rise, turn = np.linalg.solve(rates, -opening[place.sliding])
+    slipped = slip[place.sliding] + (np.conj(1j * into) * (1j * rise + 1j * turn * at)).real
+    np.testing.assert_array_equal(place.sense, np.sign(slipped))
+
+
 @pytest.mark.parametrize("rough", [True, False], ids=["friction", "smooth"])
 def test_a_body_that_two_sides_pinch_lies_nowhere(rough: bool) -> None:
     position, normal, opening, slip = make_space("disc", 1.0)

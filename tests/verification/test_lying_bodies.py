@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.contact.laws import OPEN
 from pbem.driver import run as run_case
 from pbem.errors import ConvergenceError
 from pbem.results.reader import Results
@@ -73,6 +74,31 @@ def test_the_plane_is_as_if_its_holes_were_empty(
         assert np.abs(contact.traction_n[-1]).max() < 1e-6 * 140
         assert contact.opening[-1].min() > -1e-8 * contact.opening[-1].max()
     assert filled.steps.iterations.max() <= 15
+
+
+@pytest.mark.parametrize("friction", [0.5, 0.0])
+@pytest.mark.parametrize("angles", [(10, 370), (90, -270)], ids=["counter-clockwise", "clockwise"])
+def test_neither_units_nor_shifts_nor_the_order_of_regions_matter(
+    angles: tuple[int, int], friction: float, tmp_path: Path
+) -> None:
+    widest = []
+    units = ((1.0, 1.0, 0.0, False), (1e3, 1e-6, 1e4, True), (1e-5, 1e3, -300.0, True))
+    for length, stress, shift, disc_first in units:
+        regions = {"rock": {"material": "m", "infinite": True, "boundary": ["a"]},
+                   "disc": {"material": "h", "boundary": ["a"]}}
+        case = pbem.Case(
+            materials={"m": {"young": 2e5 * stress, "poisson": 0.28}, "h": {"young": 1e7 * stress, "poisson": 0.1}},
+            curves={"a": {"center": [shift * length, -shift * length], "radius": length, "angles": list(angles),
+                          "elements": 24}},
+            regions=dict(sorted(regions.items(), reverse=not disc_first)),
+            interfaces={"a": {"law": "coulomb", "friction": friction}},
+            remote={"sxx": 140.0 * stress, "syy": 100.0 * stress, "sxy": -30.0 * stress}, analysis={"steps": 1},
+        )  # fmt: skip
+        results = pbem.run(case, tmp_path / "disc.h5", force=True)
+        contact = results.contact["a"]
+        widest.append((contact.opening[-1].max() / length, *results.steps.iterations, (contact.mode[-1] == OPEN).sum()))
+        assert np.abs(contact.traction_n[-1]).max() < 1e-6 * 140 * stress
+    np.testing.assert_allclose(widest, [widest[0]] * 3, rtol=1e-6)
 
 
 def test_where_a_body_lies_is_told(tmp_path: Path) -> None:

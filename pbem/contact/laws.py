@@ -99,6 +99,12 @@ class ModeState:
         """The same for the same modes and signs of slipping pairs."""
         return self.mode.tobytes() + np.where(self.mode == SLIP, self.sign, 0.0).tobytes()
 
+    def put(self, at: Integer | Bool, own: ModeState) -> ModeState:
+        """These modes, with those of some pairs at their places (s,)."""
+        mode, sign = self.mode.copy(), self.sign.copy()
+        mode[at], sign[at] = own.mode, own.sign
+        return ModeState(mode, sign)
+
 
 @dataclass(frozen=True)
 class PairState:

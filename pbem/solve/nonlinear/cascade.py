@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.complementarity import Response, Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
-from pbem.contact.laws import Memory, ModeState, PairState, plastic_slip
+from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal, find_failures, linearise, update_active_set
 from pbem.contact.subset import settle_subset
@@ -67,9 +67,7 @@ def run_cascade(
     subset = take_subset(problem.laws, start, load.pressure, modes, pairs)
 
     def complete(own: ModeState) -> ModeState:
-        mode, sign = modes.mode.copy(), modes.sign.copy()
-        mode[pairs], sign[pairs] = own.mode, own.sign
-        return ModeState(mode[leader], sign[leader])
+        return follow_leaders(problem.laws, modes.put(pairs, own))
 
     lost, own = problem.decide(lambda: _follow(subset, response, scale, floor, lambda now: holds(complete(now))))
     broken[pairs] = lost
@@ -114,13 +112,8 @@ def _settle(
     def judge(chosen: ModeState, state: PairState) -> Proposal:
         return update_active_set(own.laws, chosen, state, own.memory, own.pressure, 1.0, floor)
 
-    def complete(chosen: ModeState) -> ModeState:
-        mode, sign = subset.modes.mode.copy(), subset.modes.sign.copy()
-        mode[lost], sign[lost] = chosen.mode, chosen.sign
-        return ModeState(mode, sign)
-
     def hold(chosen: ModeState) -> bool:
-        return holds(complete(chosen))
+        return holds(subset.modes.put(lost, chosen))
 
     modes, d = _step(own, part, scale, judge, hold)
     if modes is None:
@@ -128,7 +121,7 @@ def _settle(
         d = None if modes is None else _solve_laws(own, modes, part, scale)
     if modes is None or d is None:
         return None
-    return complete(modes), replace(response, change=response.change[:, :, columns]).evaluate(d)
+    return subset.modes.put(lost, modes), replace(response, change=response.change[:, :, columns]).evaluate(d)
 
 
 def _step(

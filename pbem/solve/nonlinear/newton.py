@@ -330,9 +330,7 @@ def _pivot(
     )
 
     def complete(own: ModeState) -> ModeState:
-        mode, sign = start.mode.copy(), start.sign.copy()
-        mode[group], sign[group] = own.mode, own.sign
-        return follow_leaders(problem.laws, ModeState(mode, sign))
+        return follow_leaders(problem.laws, start.put(group, own))
 
     def settle() -> Settled:
         if tangent.settling.nearby and len(group) > MOST_ASKED:

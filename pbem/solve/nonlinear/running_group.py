@@ -110,9 +110,7 @@ def find_rest(
     judge = make_judge(problem, solved, search.globalisation)
 
     def complete(own: ModeState) -> ModeState:
-        mode, sign = modes.mode.copy(), modes.sign.copy()
-        mode[group], sign[group] = own.mode, own.sign
-        return follow_leaders(problem.laws, ModeState(mode, sign))
+        return follow_leaders(problem.laws, modes.put(group, own))
 
     def spread(values: Real) -> Real:
         everywhere = np.full(len(modes.mode), np.nan)

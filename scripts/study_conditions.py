@@ -14,8 +14,6 @@ from __future__ import annotations
 import argparse
 import csv
 import itertools
-import os
-import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -30,16 +28,9 @@ from pbem.results.reader import Results  # noqa: E402
 from scripts.conditions.draft import OPERATORS, SCHEMES, Setting  # noqa: E402
 from scripts.conditions.everything import CONDITIONS  # noqa: E402
 from scripts.conditions.place import draw_place  # noqa: E402
+from scripts.conditions.ranks import Ranks  # noqa: E402
 from scripts.conditions.trial import check_energy  # noqa: E402
 
-# Of ranks on a machine with fewer cores, in a container as well.
-ENVIRONMENT = {
-    "OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_hwloc_base_binding_policy": "none", "PRTE_MCA_hwloc_default_binding_policy": "none",
-    "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
-}  # fmt: skip
-# Of what ranks print that fail.
-LAST_LINES = 6
 COLUMNS = ("name", "scheme", "operator", "order", "ranks", "seed", "cell", "quantity", "error", "tolerance", "message")
 
 
@@ -63,12 +54,12 @@ def make_setting(scheme: str, operator: str, order: int, seed: int) -> Setting:
     return Setting(scheme, operator, order, seed, draw_place(seed))
 
 
-def judge(name: str, setting: Setting, folder: Path, ranks: int = 1) -> Cell:
-    """Run a condition and hold its results against what is known."""
+def judge(name: str, setting: Setting, folder: Path, ranks: Ranks | None = None) -> Cell:
+    """Run a condition, on these ranks or on one, and hold its results against what is known."""
     trial = CONDITIONS[name](setting)
     path = folder / "results.h5"
     try:
-        results = run_on_ranks(trial.case, folder, ranks) if ranks > 1 else pbem.run(trial.case, path, force=True)
+        results = run_on_ranks(trial.case, folder, ranks) if ranks else pbem.run(trial.case, path, force=True)
     except StopError:
         raise
     except PbemError as error:
@@ -89,15 +80,10 @@ def judge_message(message: str, refused: str) -> Cell:
     return Cell("FAULT", message=message)
 
 
-def run_on_ranks(case: dict, folder: Path, ranks: int) -> Results:
-    """The results of a run of its own, on several ranks."""
+def run_on_ranks(case: dict, folder: Path, ranks: Ranks) -> Results:
+    """The results of a case that is computed on several ranks, from its file."""
     pbem.Case(**case).write(folder / "case.toml")
-    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-m", "pbem", "run",
-               str(folder / "case.toml"), "-o", str(folder / "results.h5"), "--force"]  # fmt: skip
-    environment = {**os.environ, **ENVIRONMENT}
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, timeout=300)
-    if done.returncode:
-        raise PbemError("\n".join((done.stderr.strip() or done.stdout.strip()).split("\n")[-LAST_LINES:]))
+    ranks.run(folder / "case.toml", folder / "results.h5")
     return pbem.open_results(folder / "results.h5")
 
 
@@ -130,16 +116,19 @@ def main() -> int:
             map(int, options.seeds.split(",")), map(int, options.ranks.split(","))]  # fmt: skip
     settings = list(itertools.product(*axes))
     rows: list[dict] = []
+    waiting = {ranks: Ranks(ranks) for *_, ranks in settings if ranks > 1}
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
             cells = []
             for scheme, operator, order, seed, ranks in settings:
-                cell = judge(name, make_setting(scheme, operator, order, seed), Path(folder), ranks)
+                cell = judge(name, make_setting(scheme, operator, order, seed), Path(folder), waiting.get(ranks))
                 cells.append(cell)
                 rows.append({"name": name, "scheme": scheme, "operator": operator, "order": order, "seed": seed,
                              "ranks": ranks, "cell": cell.word, "quantity": cell.quantity, "error": cell.error,
                              "tolerance": cell.tolerance, "message": cell.message})  # fmt: skip
             print(f"{name:36s} " + " ".join(f"{cell!s:8s}" for cell in cells), flush=True)
+    for each in waiting.values():
+        each.end()
     report(rows)
     if options.output:
         with options.output.open("w", newline="", encoding="utf-8") as file:

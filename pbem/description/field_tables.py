@@ -26,12 +26,12 @@ class InSituTable(Table):
 
 
 class EigenstrainTable(Table):
-    """Stress-free strain of a region."""
+    """Components of the stress-free strain of a region."""
 
-    exx: Number = 0.0
-    eyy: Number = 0.0
-    exy: Number = Field(0.0, description="shear component of the tensor, half the engineering shear strain")
-    ezz: Number = Field(0.0, description="strain normal to the plane; without effect in plane stress")
+    exx: LinearValue = 0.0
+    eyy: LinearValue = 0.0
+    exy: LinearValue = Field(0.0, description="shear component of the tensor, half the engineering shear strain")
+    ezz: LinearValue = Field(0.0, description="strain normal to the plane; without effect in plane stress")
 
 
 class PointForceTable(Table):

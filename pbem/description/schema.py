@@ -354,7 +354,8 @@ class CaseFile(Table):
         "material needs `expansion`. An expression must be linear in x and y."
     )
     eigenstrain: Mapping[str, EigenstrainTable] = Field(
-        {}, description="Stress-free strain of a region (misfit, swelling, shrinkage); grows with the load."
+        {}, description="Stress-free strain of a region (misfit, swelling, shrinkage); grows with the load. "
+        "Expressions must be linear in x and y."
     )
     point_loads: Mapping[str, PointLoadTable] = Field(
         {}, description="A force at a point inside a region, or on a boundary where no displacement is prescribed; "

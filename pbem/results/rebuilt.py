@@ -135,7 +135,11 @@ def _read_stress(stored: Any) -> LinearStress:
 
 
 def _read_swelling(stored: Mapping[str, Any]) -> Swelling:
-    return Swelling(tuple(stored["strain"]), _read_point(stored["growth"]), _read_point(stored["center"]),
+    growth = stored["growth"]
+    if len(growth) < len(stored["strain"]):  # of earlier versions, of a temperature
+        growth = [growth, growth, 0.0]
+    by_xx, by_yy, by_xy = map(_read_point, growth)
+    return Swelling(tuple(stored["strain"]), (by_xx, by_yy, by_xy), _read_point(stored["center"]),
                     stored["across"], _read_point(stored["across_growth"]))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scripts.conditions import joints, planes, rest, rigid, stages, values
+from scripts.conditions import joints, misfit, planes, rest, rigid, stages, values
 from scripts.conditions.trial import CONDITIONS
 
-__all__ = ["CONDITIONS", "joints", "planes", "rest", "rigid", "stages", "values"]
+__all__ = ["CONDITIONS", "joints", "misfit", "planes", "rest", "rigid", "stages", "values"]

@@ -72,7 +72,8 @@ class Elastic:
 
 @dataclass(frozen=True)
 class Field:
-    """ux, uy (polynomials, degree 2 at most) with stress-free strain: a temperature, or exx, eyy, exy, ezz.
+    """ux, uy (polynomials, degree 2 at most) with stress-free strain: a temperature, or exx, eyy, exy, ezz, numbers or
+    polynomials of degree 1.
 
     initial: s_xx, s_yy, s_xy that are there without displacement.
     """
@@ -81,20 +82,26 @@ class Field:
     ux: Real
     uy: Real
     temperature: Real = field(default_factory=lambda: ZERO)
-    eigenstrain: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    eigenstrain: tuple[Real | float, ...] = (0.0, 0.0, 0.0, 0.0)
     initial: Stress = (ZERO, ZERO, ZERO)
+
+    def strain(self) -> Stress:
+        """exx, eyy, exy of the displacement."""
+        exx = poly.polyder(np.pad(self.ux, ((0, 1), (0, 0))), axis=0)
+        eyy = poly.polyder(np.pad(self.uy, ((0, 0), (0, 1))), axis=1)
+        exy = add(
+            0.5 * poly.polyder(np.pad(self.ux, ((0, 0), (0, 1))), axis=1),
+            0.5 * poly.polyder(np.pad(self.uy, ((0, 1), (0, 0))), axis=0),
+        )  # fmt: skip
+        return exx, eyy, exy
 
     def stress(self) -> Stress:
         m = self.material
-        exx = add(poly.polyder(np.pad(self.ux, ((0, 1), (0, 0))), axis=0), [[-self.eigenstrain[0]]])
-        eyy = add(poly.polyder(np.pad(self.uy, ((0, 0), (0, 1))), axis=1), [[-self.eigenstrain[1]]])
-        exy = add(
-            0.5 * poly.polyder(np.pad(self.ux, ((0, 0), (0, 1))), axis=1),
-            0.5 * poly.polyder(np.pad(self.uy, ((0, 1), (0, 0))), axis=0), [[-self.eigenstrain[2]]],
-        )  # fmt: skip
+        own = [-np.atleast_2d(each) for each in self.eigenstrain]
+        exx, eyy, exy = (add(strain, less) for strain, less in zip(self.strain(), own, strict=False))
         heat = -m.expansion * self.temperature
         exx, eyy = add(exx, heat), add(eyy, heat)
-        across = add(heat, [[-self.eigenstrain[3]]]) if m.plane == "strain" else ZERO
+        across = add(heat, own[3]) if m.plane == "strain" else ZERO
         mean = m.lame * add(exx, eyy, across)
         sxx, syy, sxy = self.initial
         return add(mean, 2 * m.shear * exx, sxx), add(mean, 2 * m.shear * eyy, syy), add(2 * m.shear * exy, sxy)

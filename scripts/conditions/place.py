@@ -48,7 +48,8 @@ class Place:
 
     def stress_components(self, stress: tuple[float, float, float]) -> dict[str, float]:
         """s_xx, s_yy, s_xy of the model's own axes, as they are written."""
-        mean, deviator = 0.5 * (stress[0] + stress[1]), complex(0.5 * (stress[0] - stress[1]), stress[2]) * self.turn**2
+        mean = 0.5 * (stress[0] + stress[1])
+        deviator = (0.5 * (stress[0] - stress[1]) + 1j * stress[2]) * self.turn**2
         return {"sxx": self.stress * (mean + deviator.real), "syy": self.stress * (mean - deviator.real),
                 "sxy": self.stress * deviator.imag}  # fmt: skip
 

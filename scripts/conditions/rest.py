@@ -8,7 +8,7 @@ import numpy as np
 
 from pbem.results.reader import Results
 from scripts.conditions.draft import Draft, Setting
-from scripts.conditions.field import ZERO, Elastic, Field, add, evaluate, linear, quadratic, strained, stressed
+from scripts.conditions.field import ZERO, Elastic, Field, add, evaluate, linear, quadratic, stressed
 from scripts.conditions.place import Complex, Real
 from scripts.conditions.trial import CONDITIONS, Figure, Trial, compare, condition, exact, inside, off, own
 from scripts.conditions.values import CORNERS, INSIDE, SIDES, SOFT, STRESSED, finish, lay_blocks, pressed
@@ -206,38 +206,6 @@ enter_heat("heat, free", np.array([[100.0]]), False)
 enter_heat("heat that varies, free", np.array([[80.0, -30.0], [20.0, 0.0]]), False)
 enter_heat("heat, held", np.array([[100.0]]), True)
 enter_heat("heat that varies, held", np.array([[80.0, -30.0], [20.0, 0.0]]), True)
-
-MISFIT = (1e-3, -4e-4, 6e-4, 5e-4)
-
-
-def enter_misfit(name: str, held: bool) -> None:
-    def make(setting: Setting) -> Trial:
-        material = plain(setting)
-        exx, eyy, exy, ezz = MISFIT
-        across = material.poisson * ezz if material.plane == "strain" else 0.0
-        field = strained(material, (exx + across, eyy + across, exy), eigenstrain=MISFIT)
-        if held:
-            field = linear(material, setting.rng(name), eigenstrain=MISFIT)
-        draft = lay_blocks(setting, material)
-        for region in ("low", "up"):
-            draft["eigenstrain"][region] = {**setting.place.strain_components((exx, eyy, exy)), "ezz": ezz}
-        if held:
-            for k, side in enumerate(SIDES):
-                draft.give(side, field, ("u", "un ts", "t")[k % 3], "xy")
-        scale = material.young * 1e-3
-
-        def check(results: Results) -> Iterator[Figure]:
-            fields = {"low": field, "up": field}
-            yield from compare(results, setting.place, fields, exact(setting), stress=scale, rigid=not held)
-            yield from inside(results, setting.place, field, INSIDE, exact(setting), scale=scale)
-
-        return Trial(draft.case(), check)
-
-    CONDITIONS[name] = make
-
-
-enter_misfit("eigenstrain, free", False)
-enter_misfit("eigenstrain, held", True)
 
 
 @condition("heat and stress at rest that balance")

@@ -100,10 +100,10 @@ def test_heated_ring_in_a_rigid_hole(plane: str, tmp_path: Path) -> None:
 
 
 def test_a_free_body_grows_without_stress(tmp_path: Path) -> None:
-    """Temperature linear in x and y, and an eigenstrain: no stress, no K, no T; a cracked ring, pinned by nothing."""
-    case = make_ring(
-        "strain", temperature={"ring": {"expression": "40 + 2*x - y"}}, eigenstrain={"ring": {"exx": 1e-4, "ezz": 2e-4}}
-    )
+    """Temperature and eigenstrain linear in x and y: no stress, no K, no T; a cracked ring, pinned by nothing."""
+    strain = {"exx": {"expression": "1e-4 + 3e-6*x"}, "eyy": {"expression": "2e-5*(x - 0.4*y)"},
+              "exy": {"expression": "-1e-5*x + 2e-5*y"}, "ezz": 2e-4}
+    case = make_ring("strain", temperature={"ring": {"expression": "40 + 2*x - y"}}, eigenstrain={"ring": strain})
     case["curves"]["crack"] = {"points": [[28, 6], [32, 7]], "elements": 8}
     case["regions"]["ring"]["cracks"] = ["crack"]
     results = pbem.run(case, tmp_path / "free.h5")
@@ -136,6 +136,8 @@ FAULTS = {
     "of a plane": ({"eigenstrain": {"plane": {"exx": 1.0}}}, "of the infinite region"),
     "without expansion": ({"temperature": {"core": 1.0}}, "does not expand"),
     "not linear": ({"temperature": {"core": {"expression": "x*y"}}}, "not linear"),
+    "misfit not linear": ({"eigenstrain": {"core": {"exy": {"expression": "x**2"}}}}, "core.exy: .* not linear"),
+    "misfit as a table": ({"eigenstrain": {"core": {"exx": {"table": [[0, 1], [1, 2]]}}}}, "core.exx"),
     "of a stage": ({"stages": [{"eigenstrain": {"circle": {"exx": 1.0}}}]}, "stages"),
 }
 

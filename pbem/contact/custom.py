@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 import os
+import posix
 import sys
 import types
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,8 @@ PARTS = ("bound", "by_traction", "by_slip")
 LARGEST = math.sqrt(sys.float_info.max)
 # So many characters are told of what a law says itself when it fails.
 MOST_TOLD = 300
+# Calls that end the process at once, or put another program in its place: nobody would learn that it had not finished.
+ENDING = ("_exit", "execv", "execve")
 EXPECTED = "a Strength of bound, by_traction and by_slip, finite arrays with the shape of p_n"
 
 
@@ -104,13 +107,35 @@ def _kept_surroundings() -> Iterator[None]:
     """What a file may change for the whole program is set back: NumPy's errors, filters of warnings, the directory."""
     folder, filters = _find_folder(), list(warnings.filters)
     try:
-        with np.errstate():
+        with np.errstate(), _kept_running():
             yield
     finally:
         if folder is not None and _find_folder() != folder:
             os.chdir(folder)
         if warnings.filters != filters:  # `catch_warnings` would make each warning be told again at each call
             warnings.filters[:] = filters  # type: ignore[index]
+
+
+@contextmanager
+def _kept_running() -> Iterator[None]:
+    """Within it calls that end this process at once raise SystemExit, as sys.exit does; its children may end."""
+    before = [(module, name, getattr(module, name)) for module in (os, posix) for name in ENDING]
+    for module, name, ends in before:
+        setattr(module, name, _make_refusal(name, ends, os.getpid()))
+    try:
+        yield
+    finally:
+        for module, name, ends in before:
+            setattr(module, name, ends)
+
+
+def _make_refusal(name: str, ends: Callable[..., Any], process: int) -> Callable[..., Any]:
+    def refuse(*given: Any, **named: Any) -> Any:
+        if os.getpid() != process:
+            return ends(*given, **named)
+        raise SystemExit(f"os.{name}({', '.join(map(repr, given))})")
+
+    return refuse
 
 
 def _find_folder() -> str | None:

@@ -41,6 +41,11 @@ WRONG = {
     "changed": ("if calls > 3: slip += 1e9", "law.py fails (ValueError: output array is read-only)"),
     "exits": ("if calls > 3: sys.exit(0)", "law.py fails (SystemExit: 0)"),
     "exits on one rank": ("if calls > 3 and rank == 1: sys.exit(0)", "law.py fails (SystemExit: 0)"),
+    "ends the process": ("if calls > 3: os._exit(0)", "law.py fails (SystemExit: os._exit(0))"),
+    "ends the process on one rank": (
+        "if calls > 3 and rank == 1: os._exit(0)", "law.py fails (SystemExit: os._exit(0))",
+    ),
+    "another program": ("if calls > 3: os.execlp('true', 'true')", "law.py fails (SystemExit: os.execv"),
     "other shape": ("if calls > 3: friction = 0.2; p_n = p_n[:1]", "law.py gives a bound of shape (1,)"),
     "leaves on one rank": ("if calls > 3 and rank == 1: raise GeneratorExit", "law.py fails (GeneratorExit: )"),
     "other ranks": ("friction = friction * (1 + 0.1 * rank)", "law.py answers differently on different ranks"),
@@ -56,7 +61,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize(("what", "ranks"), [("not finite", 1), ("exits", 1), *((what, 2) for what in WRONG)])
+@pytest.mark.parametrize(
+    ("what", "ranks"),
+    [("not finite", 1), ("exits", 1), ("ends the process", 1), *((what, 2) for what in WRONG)],
+)
 def test_a_law_that_goes_wrong_ends_all_ranks(what: str, ranks: int, folder: Path) -> None:
     change, said = WRONG[what]
     (folder / "law.py").write_text(LAW.replace("CHANGE", change))

@@ -74,6 +74,9 @@ ARGUMENTS = {"p_n": np.array([-2.0, -1.0, 0.0]), "slip": np.array([0.0, 0.1, 0.2
     [
         ("p_n *= 0", "read-only"), ("slip += 1", "read-only"), ("friction[0] = 9", "read-only"),
         ("np.ndarray.sort(p_n)", "read-only"), ("1 / 0", "ZeroDivisionError"), ("exit(3)", "SystemExit"),
+        ("import os; os._exit(0)", "SystemExit: os._exit(0)"),
+        ("import posix; posix._exit(0)", "SystemExit: os._exit(0)"),
+        ("import os; os.execl('/bin/true', 'true')", "SystemExit: os.execv('/bin/true'"),
         ("return None", "no attribute 'bound'"), ("friction = friction[:2]; p_n = p_n[:2]", "shape (2,) for a p_n of"),
         ("p_n = np.where(p_n < -1.5, np.nan, p_n)", "bound = nan at p_n = -2 and slip = 0"),
         ("friction = friction / 0", "bound = inf"), ("friction = 'much'", "TypeError: bad operand"),
@@ -142,3 +145,25 @@ def test_sums_tell_answers_apart() -> None:
     swapped = make_law(GOOD)
     swapped(ARGUMENTS["p_n"][::-1], ARGUMENTS["slip"], friction=ARGUMENTS["friction"])
     assert abs(one.sums - swapped.sums)[0] > 0.1
+
+
+def test_processes_that_a_law_starts_end_as_ever() -> None:
+    text = """
+import multiprocessing, os, subprocess
+from pbem.contact.strength import Strength
+
+def strength(p_n, slip, friction):
+    one = multiprocessing.get_context("fork").Process(target=int)
+    one.start()
+    one.join()
+    assert one.exitcode == 0 and subprocess.run(["false"]).returncode == 1
+    child = os.fork()
+    if child == 0:
+        os._exit(7)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+    return Strength(-friction * p_n, 0 * p_n - friction, 0 * p_n)
+"""
+    ends = os._exit, os.execv
+    law = CustomLaw("my_law.py", text)
+    np.testing.assert_allclose(law(**ARGUMENTS).bound, [1.0, 0.5, 0.0])
+    assert law.fault == "" and (os._exit, os.execv) == ends

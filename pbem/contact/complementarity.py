@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg.lapack import dgesvx
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import (
@@ -43,6 +44,9 @@ ROUNDING, PERTURBATION = 1e-12, 1e-10
 BENT = 1e-9
 # Tractions that some motion hardly changes leave a body free without these pairs.
 FREE = 1e-11
+# Equations of modes whose reciprocal condition is less leave a body free: their solution would be rounding. Those of
+# bodies that are held have 1e-5 and more.
+REGULAR = 1e-12
 # Stiffness of the springs that then hold it, relative to that of its surroundings.
 SPRING = 1e-5
 
@@ -225,7 +229,10 @@ def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeSta
 
 
 def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:
-    """d (2 s,) for which every pair fulfils the equations of its mode; None if there is none, or not one alone."""
+    """d (2 s,) for which every pair fulfils the equations of its mode; None if there is none, or not one alone.
+
+    Rounding alone tells apart the solutions of equations that are all but singular: they have none either.
+    """
     is_open, slides = modes.mode == OPEN, modes.mode == SLIP
     by_normal = -modes.sign * np.where(pairs.rough, pairs.friction, 0.0)
     bound = modes.sign * np.where(pairs.rough, pairs.adhesion + pairs.friction * pairs.limit, 0.0)
@@ -238,10 +245,12 @@ def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:
     friction = np.where(slides, bound + by_normal * pairs.constant[0], 0.0) - pairs.constant[1]
     sticks = modes.mode == STICK
     second = np.where(sticks[:, None], pairs.change[3], tangential)
-    try:
-        d: Real = np.linalg.solve(
-            np.concatenate([first, second]), np.concatenate([given, np.where(sticks, -pairs.constant[3], friction)])
-        )
-    except np.linalg.LinAlgError:
+    matrix = np.concatenate([first, second])
+    right = np.concatenate([given, np.where(sticks, -pairs.constant[3], friction)])
+    if not len(right):
+        return right
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
-    return d if np.isfinite(d).all() else None
+    found = dgesvx(matrix, right[:, None])
+    d, condition = np.asarray(found[7])[:, 0], float(found[8])
+    return d if condition >= REGULAR and np.isfinite(d).all() else None

@@ -183,6 +183,12 @@ def test_the_angle_they_subtend_is_what_the_ray_turns_by(elements: Elements) -> 
     expect_equal(elements.subtend(points), np.angle(rays[..., 1:] / rays[..., :-1]).sum(axis=2), 1e-9)
 
 
+def test_they_subtend_a_number_at_their_own_ends(elements: Elements) -> None:
+    # Rounding decides which angle it is there; a quotient would be none at all.
+    angles = elements.subtend(np.concatenate([elements.start, elements.end]))
+    assert np.isfinite(angles).all() and (np.abs(angles) <= 2 * np.pi).all()
+
+
 def test_boxes_circles_and_heights_contain_them(elements: Elements) -> None:
     line, middle = elements.place(DENSE), 0.5 * (elements.start + elements.end)
     low, high = elements.bounds()

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pbem.contact import subset as subset_module
-from pbem.contact.complementarity import Response, Subset, take_subset
+from pbem.contact.complementarity import Response, Subset, solve_in_modes, take_subset
+from pbem.contact.complementarity import pose as pose_problem
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, resists_slip
 from pbem.contact.modes import Proposal, linearise, update_active_set
 from pbem.contact.subset import Settled, settle_subset
@@ -160,6 +161,26 @@ def test_modes_that_free_a_body_are_not_judged_by_its_rounding(cohesion: float, 
         lambda modes: bool((modes.mode == STICK).any() or (modes.mode != OPEN).all()),
     )
     assert found.modes is None and not found.exhaustive
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_a_body_that_all_its_pairs_let_slide_has_no_solution_among_rounding(scale: float) -> None:
+    # Three pairs pressed with 1 on a body whose motion along them nothing else resists: their shears are balanced.
+    subset = pose(np.full(3, 0.5), np.zeros(3))
+    modes = ModeState(np.full(3, SLIP, dtype=np.int8), np.ones(3))
+    change = np.zeros((3, 4, 6))
+    for pair in range(3):
+        change[pair, 0, 2 * pair] = change[pair, 3, 2 * pair + 1] = 1.0
+        change[pair, 2, 2 * pair] = -1.0
+    stiffness = 3 * np.eye(3) - 1.0
+    values = np.tile([-1.0, 0.2, 0.0, 0.0], (3, 1))
+    for held, solvable in ((0.0, False), (1e-15, False), (1e-5, True)):
+        change[:, 1, 1::2] = -scale * (stiffness + held * np.eye(3))
+        found = solve_in_modes(pose_problem(subset, Response(values, change, 1.0, 1.0)), modes)
+        assert (found is not None) == solvable
+    # 0.2 - scale * held * slip = 0.5 at each of them.
+    assert found is not None
+    np.testing.assert_allclose(found[1::2], -0.3 / (scale * 1e-5), rtol=1e-8)
 
 
 @pytest.mark.parametrize("size", [2.0**-30, 2.0**30])

@@ -90,7 +90,7 @@ class Straight(Kind):
         return [Crossing((back * (middle + local * half - z)).real, local, (back * -1j * half).real < 0)]
 
     def subtend(self, e: Shape, z: Any) -> Any:
-        return np.angle((e.end - z) / (e.start - z))
+        return np.angle((e.end - z) * np.conj(e.start - z))
 
     def extremes(self, e: Shape) -> list[Any]:
         return [e.start, e.end]

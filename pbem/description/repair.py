@@ -55,6 +55,9 @@ def _patch(raw: dict[str, Any], loc: KeyPath) -> bool:
         raw.pop("gravity", None)  # what weighs on what is unknown
         for stage in raw.get("stages", ()):
             stage.pop("gravity", None)
+    if table in ("point_supports", "point_loads") and key in known and key != "at" and isinstance(entry, dict):
+        entry[key] = 0.0  # there is one, whatever it is
+        return True
     if table == "stages" and key == "duration":
         raw["stages"][loc[1]][key] = _LAW_STAND_IN
         return True

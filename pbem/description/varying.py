@@ -11,12 +11,13 @@ from pydantic_core import PydanticCustomError
 from pbem.description.table import Table
 from pbem.description.values import LARGEST, FrictionAngle, NotNegative, Number, Point, Text, is_number
 
+LINEAR = '{ expression = "..." }, linear in x and y'
 EXAMPLES = '{ expression = "..." } or { table = [[s, value], ...] } with increasing s'
 
 
 def _check_varying(value: object) -> object:
     """A table has an expression, or a table of pairs of numbers; numbers and unknown keys are left to their types."""
-    if isinstance(value, str):
+    if isinstance(value, str | list | tuple):
         raise PydanticCustomError("expected", "{expected}", {"expected": f"a number, or {EXAMPLES}"})
     if not isinstance(value, dict) or set(value) == {"expression"} or not set(value) <= {"expression", "table"}:
         return value
@@ -59,6 +60,13 @@ class ExpressionTable(Table):
     expression: Text = Field(description="a linear function of `x` and `y`")
 
 
+def _check_linear(value: object) -> object:
+    """A table has an expression; numbers and unknown keys beside it are left to their types."""
+    if isinstance(value, str | list | tuple) or (isinstance(value, dict) and "expression" not in value):
+        raise PydanticCustomError("expected", "{expected}", {"expected": f"a number, or {LINEAR}"})
+    return value
+
+
 def _tell_kind(value: object) -> str:
     return VARYING if isinstance(value, dict | Table) else NUMBER
 
@@ -79,5 +87,6 @@ Angle = Annotated[
 ]
 # A number, or what is linear in x and y.
 LinearValue = Annotated[
-    Annotated[Number, Tag(NUMBER)] | Annotated[ExpressionTable, Tag(VARYING)], Discriminator(_tell_kind)
+    Annotated[Number, Tag(NUMBER)] | Annotated[ExpressionTable, Tag(VARYING)], Discriminator(_tell_kind),
+    BeforeValidator(_check_linear),
 ]

@@ -36,7 +36,7 @@ def check_loads(case: Case, model: Model) -> list[Fault]:
         times = [model.find_time(stage, fraction) for stage in stages
                  for fraction in (*FRACTIONS, *_list_steps(model.stages[stage].steps))]
         faults += _check_value(loc, value, model.curves[curve], times if value.timed else times[-1:])
-    faults += _check_rigid(model)
+    faults += [*_check_rigid(model), *_check_forces(case, model)]
     return faults + [fault for name, condition in model.conditions.items()
                      for key, value in zip(("kn", "ks"), condition.stiffness, strict=True) if isinstance(value, Varying)
                      for fault in _check_spring(("boundary", name, "spring", key), value, model.curves[name])]
@@ -54,6 +54,23 @@ def _check_rigid(model: Model) -> Iterator[Fault]:
             if wrong:
                 yield Fault.at(loc, f"a force or motion without a finite value at the time {wrong[0]:.6g}",
                                "finite values at all times")
+                break
+
+
+def _check_forces(case: Case, model: Model) -> Iterator[Fault]:
+    """Tractions with a given resultant have values, where that is an expression of the time."""
+    for name, table in case.boundary.items():
+        if table.force is None or name not in model.curves:
+            continue
+        leg = model.curves[name].legs[0]
+        start = Places(np.array([leg.point(np.array(0.0))]).reshape(1), np.zeros(1))
+        for number, stage in enumerate(model.stages):
+            times = [model.find_time(number, each) for each in (*FRACTIONS, *_list_steps(stage.steps))]
+            wrong = [time for time in times for value in stage.boundary.get(name, ())
+                     if isinstance(value, Varying) and not np.isfinite(value.evaluate(start, time)).all()]
+            if wrong:
+                found = f"a force without a finite value at the time {wrong[0]:.6g}"
+                yield Fault.at(("boundary", name, "force"), found, "finite values at all times")
                 break
 
 

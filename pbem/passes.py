@@ -9,26 +9,25 @@ from pathlib import Path
 from pbem.errors import ConvergenceError, PbemError
 from pbem.geometry.junction import format_point
 from pbem.mesh.generate import generate_mesh
-from pbem.model.end_grading import ContactEnd, grade_ends
+from pbem.model.end_grading import MOST_UNKNOWNS, ContactEnd, grade_ends, is_too_large
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions, bisect_elements, count_elements, impose_fractions, mark_near
 from pbem.results.accuracy import Pass
 from pbem.wording import count
 
-# A run whose contacts do not settle is tried again so many times, with so many times the elements and so many unknowns
-# at most: the next try is to cost no more than a user would wait for without having asked for it.
+# A run whose contacts do not settle is tried again so many times, with so many times the elements at most, and no more
+# than MOST_UNKNOWNS.
 MOST_TRIES = 3
 MOST_GROWTH = 3.0
-MOST_UNKNOWNS = 5_000
 # A pass of so many iterations went on for long before it came to what failed: all of that would be done again, as often
 # as there are tries.
 MOST_ITERATIONS = 400
 # Elements are graded towards the ends of contact so many times, with so many times the elements at most; the second
 # time only where the pressure still falls by more than STILL_COARSE of the largest over the element of an end: it was
 # not where it was looked for, or not known well enough for shorter elements.
-MOST_GRADED = 2
+MOST_GRADED = 3
 MOST_GROWN = 4
-STILL_COARSE = 0.1
+STILL_COARSE = 0.05
 # So many places are named.
 MOST_NAMED = 3
 
@@ -75,13 +74,20 @@ def plan_finer(
     return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
 
 
-def plan_graded(model: Model, ends: Sequence[ContactEnd], graded: int) -> Finer | None:
+def plan_graded(
+    model: Model, ends: Sequence[ContactEnd], graded: int, unknowns: int = 0, iterations: int = 0
+) -> Finer | None:
     """The model with elements graded towards the ends of contact, or as it is with the reason in the note; None if
-    there is nothing to be graded. graded: how often that was done."""
+    there is nothing to be graded. graded: how often that was done; unknowns, iterations: of this pass."""
     ends = [end for end in ends if end.fall > STILL_COARSE or not graded]
     if not ends:
         return None
     where = _name_ends(model, ends)
+    long = model.analysis.grade_contact_ends == "auto" and iterations > MOST_ITERATIONS
+    if long or is_too_large(model, unknowns):
+        what = f"{iterations} iterations" if long else f"{unknowns} unknowns"
+        return Finer(model, f"{where}, within elements that are long for the fall of the pressure there; they are not "
+                            f"graded, as the run took {what}: analysis.grade_contact_ends = true does.")  # fmt: skip
     if graded >= MOST_GRADED:
         fall = f"{max(end.fall for end in ends):.0%} of the largest pressure"
         return Finer(model, f"{where}, within elements over which the pressure still falls by {fall}: they were graded "

@@ -29,9 +29,10 @@ class AnalysisTable(Table):
         description="refine and solve again until 1.5 times the estimated relative errors of reactions, of slips and "
         "openings, and of K are below this value at every stored step; see `pbem help accuracy`",
     )
-    grade_contact_ends: Flag = Field(
-        False,
+    grade_contact_ends: Literal["auto"] | Flag = Field(
+        "auto",
         description="where contact of rounded faces ends within an element that is too long for the fall of the "
         "pressure there, shorten the elements of both curves towards that end and solve again from rest; contacts one "
-        'of whose curves has a `grading` other than `"auto"` are left as they are; see `pbem help accuracy`',
+        'of whose curves has a `grading` other than `"auto"` are left as they are; `"auto"`: not beside `accuracy`, '
+        "nor in large models; see `pbem help accuracy`",
     )

@@ -30,6 +30,7 @@ from pbem.forecast.usual import (
 from pbem.forecast.work import Work, count_work
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
+from pbem.model.end_grading import may_be_graded
 from pbem.model.model import Model
 from pbem.model.refinement import coarsen_model
 from pbem.wording import count
@@ -108,7 +109,8 @@ def make_forecast(
     return Forecast(
         ranks=ranks, unknowns=work.unknowns, operator="hierarchical" if work.hierarchical else "dense",
         memory=memory, rank_memory=_find_largest(memory, ranks, work), seconds=seconds, disk=count_disk(model, mesh),
-        passes=model.analysis.accuracy is not None or model.analysis.grade_contact_ends, speed=speed, cores_here=cores,
+        passes=model.analysis.accuracy is not None or may_be_graded(model, work.unknowns), speed=speed,
+        cores_here=cores,
     )  # fmt: skip
 
 

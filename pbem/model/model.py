@@ -195,14 +195,15 @@ class Analysis:
     """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements.
 
     accuracy: the mesh is refined until the estimated relative error is below it; None: it is taken as it is.
-    grade_contact_ends: whether elements are graded towards the ends of contact that were found.
+    grade_contact_ends: whether elements are graded towards the ends of contact that were found; "auto": if that is
+    worth its price.
     """
 
     scheme: Literal["SST", "DBEM", "HST", "THST"] = "SST"
     order: int = 2
     tips: bool = True
     accuracy: float | None = None
-    grade_contact_ends: bool = False
+    grade_contact_ends: bool | Literal["auto"] = "auto"
 
 
 # How the operator of the integral equations is stored.

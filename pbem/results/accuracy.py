@@ -121,9 +121,7 @@ def decide(
     """
     accuracy = model.analysis.accuracy
     if accuracy is None:
-        if contact is None or not model.analysis.grade_contact_ends:
-            return Decision()
-        return Decision(ends=find_contact_ends(model, mesh, contact))
+        return Decision() if contact is None else Decision(ends=find_contact_ends(model, mesh, contact))
     reached = measure_reached(relative)
     unknowns = 2 * mesh.nodes
     head = f"accuracy, pass {one.number}: {unknowns} unknowns"

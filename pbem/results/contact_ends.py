@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.laws import OPEN, find_joint
+from pbem.contact.laws import OPEN
 from pbem.mesh.mesh import Mesh, sort_pairs
-from pbem.model.end_grading import ContactEnd
-from pbem.model.model import Contact, Model
+from pbem.model.end_grading import ContactEnd, list_gradable
+from pbem.model.model import Model
 from pbem.solve.problem.step import ContactState
 
 # Of the largest pressure of the contact: what the root falls by over the element in which contact ends, whose nodes are
 # off by at most 0.2 of it. Elements that are made for an end are so long that it falls by TOLERANCE.
-COARSE = 0.055
-TOLERANCE = 0.06
+COARSE = 0.04
+TOLERANCE = 0.035
 # By so much of an element's length the ends that were found were off at most, in pins with 32 to 96 elements a circle.
 UNCERTAIN = 0.035
 # At least so long are elements, by the length in which the end is looked for.
@@ -42,34 +42,16 @@ class _Side:
 
 def find_contact_ends(model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
     """The ends of contacts between rounded bodies over whose element the pressure falls by more than COARSE of the
-    contact's largest (theory, 124), those that cannot be located among them; contacts one of whose curves has a grading
-    of the user's are left out.
+    contact's largest (theory, 124), those that cannot be located among them; of the contacts of `list_gradable`.
 
-    Elements are looked at on the curve that the pairs belong to. Contacts between straight curves without a gap, and
-    laws under which faces carry something before they touch or after they part, are left out.
+    Elements are looked at on the curve that the pairs belong to.
     """
-    found = []
+    gradable = list_gradable(model)
+    found: list[ContactEnd] = []
     for name, pairs in sort_pairs(mesh).items():
-        joint = find_joint(model, name)
-        if mesh.order and isinstance(joint, Contact) and _is_plain(joint):
-            curves = _list_free_curves(model, joint)
-            found += [end for end in _Pressed(mesh, contact, pairs).find(name, curves) if curves]
+        if name in gradable:
+            found += _Pressed(mesh, contact, pairs).find(name, gradable[name])
     return tuple(found)
-
-
-def _is_plain(joint: Contact) -> bool:
-    law = joint.law
-    held = isinstance(law.tensile_strength, float | int) and law.tensile_strength == 0
-    return law.kind == "coulomb" and held and law.normal_stiffness is None
-
-
-def _list_free_curves(model: Model, joint: Contact) -> tuple[str, ...]:
-    """Those of both curves whose elements the program may choose; none if it is one of a body and may not."""
-    tools = {side.curve for region in model.regions if region.rigid for loop in region.loops for side in loop.sides}
-    names = (joint.first, joint.second)
-    if any(name in model.given_gradings and name not in tools for name in names):
-        return ()
-    return tuple(name for name in names if name not in tools)
 
 
 class _Pressed:

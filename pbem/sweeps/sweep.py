@@ -23,6 +23,7 @@ from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
+from pbem.model.end_grading import may_be_graded
 from pbem.model.model import Model, Operator
 from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
@@ -316,10 +317,13 @@ def compute_case(
     try:
         with clock.piece("reading"):
             model = do_on_first(comm, PbemError, lambda: _make_model(setting, values))
-        if setting.keep is not None or model.analysis.accuracy is not None or model.analysis.grade_contact_ends:
+        whole = setting.keep is not None or model.analysis.accuracy is not None
+        with clock.piece("reading"):
+            mesh = None if whole else _mesh(setting, model)
+        if mesh is None or may_be_graded(model, 2 * mesh.nodes):
             _run_with_file(setting, values, outcome, kept)
         else:
-            _solve(model, setting, outcome, columns, kept, signals, place)
+            _solve(model, mesh, setting, outcome, columns, kept, signals, place)
     except CaseError as error:
         status, reason = "refused", "; ".join(str(fault) for fault in error.faults)
     except (ConvergenceError, LawError) as error:
@@ -342,14 +346,12 @@ def _mesh(setting: Setting, model: Model) -> Mesh:
 
 
 def _solve(
-    model: Model, setting: Setting, outcome: Outcome, columns: Sequence[Quantity], kept: KeptProblems,
+    model: Model, mesh: Mesh, setting: Setting, outcome: Outcome, columns: Sequence[Quantity], kept: KeptProblems,
     signals: StopSignals, place: Place,
 ) -> None:
     """March through the history, without a result file."""
     comm = kept.comm
-    with clock.piece("reading"):
-        mesh = _mesh(setting, model)
-        check_shares(model, mesh, comm.size)
+    check_shares(model, mesh, comm.size)
     if comm.rank == 0:
         outcome.expect(model, mesh)
     watch = Watch(comm, outcome if comm.rank == 0 else SilentReporter(), signals)

@@ -26,7 +26,7 @@ from tests.verification.rigid_sample import UNMOVED, Place, evaluate_persson, fi
 
 def write(path: Path, *given: Any, **analysis: Any) -> Path:
     """A case file of a pin; see `write_pin`."""
-    path.write_text(write_pin(*given, hub=0.02, edge=300.0, **analysis))
+    path.write_text(write_pin(*given, hub=0.002, edge=300.0, **analysis))
     return path
 
 
@@ -210,7 +210,7 @@ def test_elements_grow_with_the_distance_from_an_end() -> None:
     both = plan_graded(model, [end, lost], 0)
     assert both is not None and both.model.curves == finer.curves and "is not known" in both.note
     coarse = plan_graded(finer, [end], MOST_GRADED)
-    assert coarse is not None and coarse.model is finer and "graded 2 times" in coarse.note
+    assert coarse is not None and coarse.model is finer and "graded 3 times" in coarse.note
     crowd = [ContactEnd("seat", cmath.rect(1.0, 0.2 * k) - model.origin, ("rim",), long / 500, 0.0) for k in range(31)]
     many = plan_graded(model, crowd, 0)
     assert many is not None and many.model is model and "in place of" in many.note

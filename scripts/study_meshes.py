@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import cmath
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -26,6 +27,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import pbem
+from tests.verification import rigid_sample
 from tests.verification.proofs import conforming
 from tests.verification.proofs.proof import Solved, line, solve_case, solve_text
 
@@ -74,6 +77,10 @@ class Place:
 
 HERE = Place()
 
+# Of pins pressed by a force: orders at which pressures are smooth enough, and what is looked at if nothing is drawn.
+ORDERS = {"SST": (1, 2, 3), "DBEM": (1, 2, 3), "HST": (2, 3), "THST": (2, 3)}
+PINS = (("SST", 2, 24, 35.0), ("DBEM", 1, 64, 62.0), ("HST", 2, 48, 18.0), ("THST", 3, 96, 78.0))
+
 
 @dataclass(frozen=True)
 class Range:
@@ -90,6 +97,15 @@ class Range:
         if self.draw is None:
             return chosen
         return [float(f"{10**self.draw.uniform(*np.log10([min(every), max(every)])):.3g}") for _ in chosen]
+
+    def choose_pins(self) -> Sequence[tuple[str, int, int, float]]:
+        """Scheme, order, elements of a circle, and degrees from the middle of contact to its end."""
+        if self.draw is None:
+            return PINS
+        schemes, elements = list(ORDERS), (24, 32, 48, 64, 96, 128)
+        picked = [schemes[self.draw.integers(len(schemes))] for _ in PINS]
+        return [(scheme, int(self.draw.choice(ORDERS[scheme])), int(self.draw.choice(elements)),
+                 float(f"{self.draw.uniform(10, 80):.3g}")) for scheme in picked]
 
 
 def draw_range(seed: int, kind: str, quick: bool) -> Range:
@@ -266,6 +282,31 @@ def study_pins(given: Range) -> Iterator[Row]:
             there = conforming.pressure(clearance, 24, 24, first, given.elsewhere.length, given.elsewhere.turn)
             yield Row(f"pin in a hole, clearance {clearance:g}, {first} first: pressure", here.unknowns, here.error,
                       0.01, abs(there.error - here.error))
+        elsewhere = rigid_sample.Place(
+            np.radians(given.elsewhere.turn), given.elsewhere.shift * given.elsewhere.length, given.elsewhere.length,
+            given.elsewhere.stress)
+        for scheme, order, elements, width in given.choose_pins():
+            (unknowns, here), (_, there) = (
+                press_pin(clearance, scheme, order, elements, width, place)
+                for place in (rigid_sample.UNMOVED, elsewhere))
+            name = f"{clearance:.0e}, {scheme}, order {order}, {elements}, {width:.0f} degrees"
+            yield Row(f"pin pressed by a force, {name}: pressure", unknowns, here, 0.01, abs(there - here))
+
+
+def press_pin(
+    clearance: float, scheme: str, order: int, elements: int, width: float, place: rigid_sample.Place
+) -> tuple[int, float]:
+    """Unknowns and largest error of the pressures, of all pairs, of a run as a user makes it; width: degrees from the
+    middle of contact to its end."""
+    force = rigid_sample.find_persson_force(np.radians(width), clearance)
+    text = rigid_sample.write_pin(clearance, force, 20.0, elements, place, hub=0.002, edge=300.0, scheme=scheme,
+                                  order=order)
+    with tempfile.TemporaryDirectory() as folder:
+        case = Path(folder) / "pin.toml"
+        case.write_text(text)
+        results = pbem.run(case, Path(folder) / "pin.h5")
+        errors = rigid_sample.compare_pressures(results, force, float(np.radians(width)), 20.0, place)
+    return 2 * len(results.nodes.position), float(np.abs(errors).max())
 
 
 STUDIES: dict[str, Callable[[Range], Iterator[Row]]] = {

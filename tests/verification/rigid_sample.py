@@ -12,6 +12,7 @@ import numpy as np
 from pbem.arrays import Bool
 from pbem.case.build import parse_model
 from pbem.model.model import Model
+from pbem.results.reader import Results
 from tests.verification.proofs.proof import Complex, Real, Solved, line, write_case
 
 YOUNG, POISSON = 1000.0, 0.3
@@ -154,6 +155,22 @@ def find_persson_force(half_width: float, clearance: float) -> float:
     """The force at which the contact has that half-angle (radians)."""
     b = math.tan(0.5 * half_width)
     return PLANE_MODULUS * clearance * math.pi * b**2 * (b**2 + 1) / (2 - math.log(b**2 + 1) - 2 * b**4)
+
+
+def compare_pressures(
+    results: Results, force: float, half_width: float, direction: float, place: Place = UNMOVED
+) -> Real:
+    """Pressures of all pairs of a run of `write_pin` less those of Persson, by the largest of these; force in the
+    model's own units, half_width in radians, direction in degrees."""
+    contact = results.contact["seat"]
+    at = (contact.position @ (1, 1j) - place.shift) / place.size
+    angle = np.angle(at * cmath.exp(-1j * (math.radians(direction) + place.turn)))
+    radius = float(np.abs(at).mean())
+    inside = np.abs(angle) < half_width
+    exact = np.where(inside, evaluate_persson(np.where(inside, angle, 0.0), half_width), 0.0)
+    largest = float(evaluate_persson(np.zeros(1), half_width)[0])
+    found = -np.asarray(contact.traction_n[-1]) * radius / (force * place.stress)
+    return np.asarray((found - exact) / largest)
 
 
 @dataclass(frozen=True)

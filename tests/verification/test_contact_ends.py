@@ -14,33 +14,19 @@ import pytest
 
 import pbem
 from pbem import driver
-from pbem.arrays import Real
 from pbem.case.build import parse_model
 from pbem.errors import CaseError, ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.end_grading import ContactEnd, grade_ends
 from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
 from pbem.solve.problem.step import SilentReporter
-from tests.verification.rigid_sample import UNMOVED, Place, evaluate_persson, find_persson_force, write_pin
+from tests.verification.rigid_sample import UNMOVED, Place, compare_pressures, find_persson_force, write_pin
 
 
 def write(path: Path, *given: Any, **analysis: Any) -> Path:
     """A case file of a pin; see `write_pin`."""
     path.write_text(write_pin(*given, hub=0.002, edge=300.0, **analysis))
     return path
-
-
-def compare_pressures(results: pbem.Results, force: float, half_width: float, direction: float, place: Place) -> Real:
-    """Pressures of all pairs less those of Persson, by the largest; half_width in radians, direction in degrees."""
-    contact = results.contact["seat"]
-    at = (contact.position @ (1, 1j) - place.shift) / place.size
-    angle = np.angle(at * cmath.exp(-1j * (math.radians(direction) + place.turn)))
-    radius = float(np.abs(at).mean())
-    inside = np.abs(angle) < half_width
-    exact = np.where(inside, evaluate_persson(np.where(inside, angle, 0.0), half_width), 0.0)
-    largest = float(evaluate_persson(np.zeros(1), half_width)[0])
-    found = -np.asarray(contact.traction_n[-1]) * radius / (force * place.stress)
-    return np.asarray((found - exact) / largest)
 
 
 @pytest.mark.parametrize(
@@ -64,6 +50,40 @@ def test_pressures_of_a_pin_at_all_pairs(
         results = pbem.run(case, tmp_path / "pin.h5", force=True)
         worst.append(np.abs(compare_pressures(results, force, width, direction, place)).max())
     assert worst[1] < 1e-2 < worst[0]
+
+
+@pytest.mark.parametrize(
+    ("clearance", "elements", "half_width", "scheme", "order"),
+    [(3e-6, 24, 69.3, "DBEM", 1), (2e-4, 24, 39.8, "HST", 2), (3e-5, 32, 12.0, "SST", 2), (7e-3, 48, 78.0, "THST", 3)],
+)
+def test_pressures_of_a_pin_as_the_file_says_nothing_of_ends(
+    tmp_path: Path, clearance: float, elements: int, half_width: float, scheme: str, order: int
+) -> None:
+    width = math.radians(half_width)
+    force = find_persson_force(width, clearance)
+    case = write(tmp_path / "pin.toml", clearance, force, 200.0, elements, UNMOVED, scheme=scheme, order=order)
+    results = pbem.run(case, tmp_path / "pin.h5")
+    assert np.abs(compare_pressures(results, force, width, 200.0)).max() < 1e-2
+
+
+def test_a_large_model_is_solved_again_only_if_that_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pbem.model.end_grading.MOST_UNKNOWNS", 100)
+    notes = []
+
+    class Listener(SilentReporter):
+        def note(self, text: str) -> None:
+            notes.append(text)
+
+    results = pbem.run(write_small(tmp_path / "pin.toml", "auto"), tmp_path / "pin.h5", reporter=Listener())
+    assert results.fractions is None
+    assert sum("unknowns: analysis.grade_contact_ends = true does" in note for note in notes) == 1
+    results = pbem.run(write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5", force=True)
+    assert results.fractions is not None
+    end = ContactEnd("seat", 1 + 0j, ("rim",), 1e-3, 1e-3)
+    found = plan_graded(parse_model(write_pin(1e-3, FORCE, 20.0, 32))[1], [end], 0, 0, 401)
+    assert found is not None and "the run took 401 iterations" in found.note
 
 
 def test_contact_of_round_bodies_ends_as_wide_as_their_pressures_say(tmp_path: Path) -> None:
@@ -104,7 +124,7 @@ def test_contact_of_round_bodies_ends_as_wide_as_their_pressures_say(tmp_path: P
 FORCE = find_persson_force(math.radians(50.0), 1e-3)
 
 
-def write_small(path: Path, graded: bool = True) -> Path:
+def write_small(path: Path, graded: bool | str = True) -> Path:
     return write(path, 1e-3, FORCE, 20.0, 32, steps=2, grade_contact_ends=graded)
 
 
@@ -155,8 +175,9 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     assert not list(tmp_path.glob("pin.h5?*"))
 
 
-def test_rows_of_a_sweep_are_those_of_single_runs(tmp_path: Path) -> None:
-    case = write_small(tmp_path / "pin.toml")
+@pytest.mark.parametrize("graded", [True, "auto"])
+def test_rows_of_a_sweep_are_those_of_single_runs(tmp_path: Path, graded: bool | str) -> None:
+    case = write_small(tmp_path / "pin.toml", graded)
     table = pbem.sweep(case, {"boundary.hub.rigid.fx": [0.8 * FORCE, FORCE]}, ["contact.seat.traction_n.min"])
     for found, push in zip(table["contact.seat.traction_n.min"], (0.8 * FORCE, FORCE), strict=True):
         results = pbem.run(case, tmp_path / "one.h5", force=True, set={"boundary.hub.rigid.fx": push})

@@ -36,6 +36,7 @@ from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.cascade import run_cascade
 from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain, begin_course
+from pbem.solve.nonlinear.damped import can_be_damped, rest_late
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
@@ -120,10 +121,10 @@ def solve_step(
                     raise
                 except ConvergenceError:
                     last = search is searches[-1]
-                    if once or last or not (search.swept or (search.varying and search.unsettled)):
+                    if once or last or search.collapse or not (search.swept or (search.varying and search.unsettled)):
                         raise
         except ConvergenceError:
-            if once or not forcing.used:
+            if once or not forcing.used or any(search.collapse for search in searches):
                 raise
     raise AssertionError("a search without forcing ends with a solution or an error")
 
@@ -242,7 +243,7 @@ def _run_search(
         search.note(proposal, outcome.law_error)
         blocks.move_on(pairs, outcome.settled)
         running.note(search, proposal, outcome.law_error)
-        if search.taken >= most or (hurried and search.is_stuck()):
+        if search.taken >= most or (hurried and search.is_stuck()) or search.collapses():
             raise _end(hold, "iteration limit", proposal, search)
         if left:
             modes, normal_traction, slip, jump = kept
@@ -252,13 +253,14 @@ def _run_search(
             search.go_on_from_smoothed()
             smoothing.begun = True
             continue
-        rest = None if cascade else find_rest(
+        late = not cascade and search.asks_for_rest() and can_be_damped(problem, tangent)
+        rest = None if cascade else rest_late(problem, tangent, memory, load, search) if late else find_rest(
             running, hold, tangent, constraints, modes, memory, load, law, solved, search)
         chosen = cascade.modes if cascade else rest.modes if rest else None
         # The first rank alone knows which pairs hold a body.
         share = broadcast(problem.comm, max(search.globalisation.share, hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
-        if not cascade and not rest and not (share > search.globalisation.share):
+        if not cascade and not rest and not late and not (share > search.globalisation.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
         back = chosen is not None and not rest and search.returns(chosen.fingerprint())
         if back and not go_on_warily(forcing, search):
@@ -291,6 +293,8 @@ def _run_search(
 def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
     """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
     search.unsettled = reason != "no admissible modes"
+    if search.collapse:
+        return ConvergenceError("limit load", search.collapse)
 
     def describe() -> ConvergenceError:
         error = describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)

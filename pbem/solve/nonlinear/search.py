@@ -80,6 +80,9 @@ FEW_IN_ALL, MOST_IN_ALL = 60, 120
 MOST_WIDENED = 2
 # The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
 SWEPT = 4
+# After so many iterations it is asked where the contact comes to rest against dashpots; where bodies do not, a search
+# ends after so many.
+LATE, LATEST = 10, 20
 # Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
 
@@ -119,6 +122,7 @@ class Search:
         self.futile = self.solved = 0
         self.pause = self.paused = 0
         self.widened, self.widening, self.narrow = 0, False, self.group
+        self.collapse = ""  # what moves on, where contacts do not come to rest against dashpots
         self.level = 0
         self.sweeping = self.sweeps
         self.returned = self.just_returned = False
@@ -185,6 +189,14 @@ class Search:
         """Whether in the last LONG iterations no fewer pairs changed than at best in as many or more before."""
         before, lately = self.counts[:-LONG], self.counts[-LONG:]
         return len(before) >= LONG and min(lately) >= max(1, min(before))
+
+    def asks_for_rest(self) -> bool:
+        """Whether the search has taken so long that it is to be asked where the contact comes to rest."""
+        return len(self.counts) == LATE
+
+    def collapses(self) -> bool:
+        """Whether the search has found no equilibrium, and the bodies do not come to rest either."""
+        return bool(self.collapse) and len(self.counts) >= LATEST
 
     def may_sweep(self) -> bool:
         """Whether groups may settle by themselves next: as long as that lets fewer and fewer pairs change."""

@@ -167,10 +167,10 @@ def _advance(
                     attempt.note_try(stage, reached, memory.modes, kind),
                     attempt.note_phase("softly", error=describe_error(error)),
                 ):
-                    solution = solve_softly(
-                        problem, tangent, begin, load, reporter, error, softly and softly["inner"])
-                if solution is not None:
-                    return solution, target, ceiling.pass_by(target)
+                    found = solve_softly(problem, tangent, begin, load, reporter, error, softly and softly["inner"])
+                if isinstance(found, Solution):
+                    return found, target, ceiling.pass_by(target)
+                error = found or error
             if proportional():
                 if balanced < target and error.reason != "free motion":
                     ceiling = ceiling.lower(target, balanced, error)

@@ -14,6 +14,7 @@ from pbem.contact.laws import Memory, find_linear
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError, StopError
 from pbem.solve.nonlinear.checkpoint import Plain, from_plain, to_plain
+from pbem.solve.nonlinear.damped import can_be_damped, describe_run, find_damped
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Iteration, Supervisor
@@ -28,21 +29,40 @@ UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh")
 def solve_softly(
     problem: Problem, tangent: TangentOperator, begin: Memory, load: Load, reporter: Supervisor,
     error: ConvergenceError, resumed: Plain | None = None,
-) -> Solution | None:
-    """A load step whose search has ended with an error, by statuses of softer contacts; None if these do not settle.
+) -> Solution | ConvergenceError | None:
+    """A load step whose search has ended with an error, by statuses of other contacts; None if these do not settle.
 
-    The solution is one of the true laws, found by their own search. Its iterations are those of all contacts. None,
-    too, for crack networks and large models, whose groups settle by themselves, for laws that are not linear in each
-    status, and for other errors. resumed: see solve_step.
+    At first by those of contacts that come to rest against dashpots (see pbem.contact.damped), then by those of softer
+    contacts. The solution is one of the true laws, found by their own search. Its iterations are those of all contacts.
+    A truer error where the bodies do not come to rest. None, too, for crack networks and large models, whose groups
+    settle by themselves, for laws that are not linear in each status, and for other errors. resumed: see solve_step.
     """
     unsettled = error.reason in UNSETTLED or error.unless is not None or resumed is not None
     if not unsettled or tangent.settling.nearby or not find_linear(problem.laws).all():
         return None
+    contacts = (*(soften(problem, softness) for softness in SOFTNESS), problem)
+    damped = resumed if resumed and resumed["damped"] else None
+    if not resumed and can_be_damped(problem, tangent):
+        rest = find_damped(problem, tangent, begin, load)
+        if rest and rest.runs:
+            return describe_run(problem, begin, load, rest.runs)
+        if rest and rest.rest:
+            damped = {"contact": len(SOFTNESS), "modes": to_plain(rest.rest.modes), "iterations": to_plain([]),
+                      "inner": None, "damped": True}
+    found = _follow(problem, tangent, contacts, begin, load, reporter, damped) if damped else None
+    return found or _follow(problem, tangent, contacts, begin, load, reporter, None if damped else resumed)
+
+
+def _follow(
+    problem: Problem, tangent: TangentOperator, contacts: tuple[Problem, ...], begin: Memory, load: Load,
+    reporter: Supervisor, resumed: Plain | None,
+) -> Solution | None:
+    """The solution with the last of some contacts, each of which begins with the statuses of the one before."""
     iterations: list[Iteration] = from_plain(resumed["iterations"]) if resumed else []
     guess = replace(begin, modes=from_plain(resumed["modes"])) if resumed else begin
-    first = resumed["contact"] if resumed else 0
+    first, damped = (resumed["contact"], resumed["damped"]) if resumed else (0, False)
     try:
-        for number, each in enumerate((*(soften(problem, softness) for softness in SOFTNESS), problem)):
+        for number, each in enumerate(contacts):
             if number < first:
                 continue
             inner = resumed["inner"] if resumed and number == first else None
@@ -50,7 +70,7 @@ def solve_softly(
                 found = solve_step(each, tangent, guess, load, reporter, hurried=True, once=True, resumed=inner)
             except StopError as stop:
                 stop.unfinished = stop.unfinished and stop.unfinished.within(
-                    contact=number, modes=to_plain(guess.modes), iterations=to_plain(iterations))
+                    contact=number, modes=to_plain(guess.modes), iterations=to_plain(iterations), damped=damped)
                 raise
             iterations += [replace(one, number=len(iterations) + k) for k, one in enumerate(found.iterations, 1)]
             guess = replace(begin, modes=found.modes)
@@ -59,7 +79,7 @@ def solve_softly(
     if problem.comm.rank == 0:
         reporter.note(
             "Statuses of the contacts did not settle by themselves; they were found with a "
-            "compliance of the contacts that was reduced in steps."
+            f"{'damping' if damped else 'compliance'} of the contacts that was reduced in steps."
         )
     return replace(found, memory=replace(found.memory, modes=begin.modes), iterations=tuple(iterations))
 

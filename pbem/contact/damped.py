@@ -1,0 +1,142 @@
+"""Contact of all pairs that comes to rest: dashpots bear a part of the tractions until nothing moves any more.
+
+A search that looks for the equilibrium at once has nothing to go by where bodies are nearly free, or where there is no
+equilibrium. With dashpots beside the pairs, p of the law = p - k (g - g'), g' the jumps before, every body is held, and
+for any friction the modes of one instant are found by pivoting (pbem.contact.subset). From instant to instant the
+dashpots become weaker. Where the bodies come to rest they carry nothing: that is an equilibrium. Where instead the
+same modes lead on and on, by a motion that grows as 1 / k and that no traction resists, the loads drive a mechanism.
+The method is the proximal point algorithm (R. T. Rockafellar, SIAM J. Control Optim. 14, 1976; theory, 129).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pbem.arrays import Real
+from pbem.contact.complementarity import Response, Subset, pose, solve_in_modes
+from pbem.contact.laws import ModeState, PairState, plastic_slip
+from pbem.contact.modes import Proposal, measure_law_error
+from pbem.contact.running import NEAR, Rest
+from pbem.contact.subset import settle_subset
+
+# Stiffness of the dashpots at first, relative to the median of the pairs' own; the part to which it falls from instant
+# to instant; and how many instants there are. Of a motion that goes on quickly the way may matter: slowly as well.
+SCHEDULES = ((0.1, 0.1, 12), (1.0, 0.4, 30))
+# A motion goes on steadily if it grows as 1 / k but for this part, so many times in turn.
+STEADY, IN_TURN = 0.05, 2
+# So often friction is taken at the slips of the time before, where it changes with slip.
+MOST_TAKEN = 100
+
+Judge = Callable[[ModeState, PairState], Proposal]
+
+
+@dataclass(frozen=True)
+class Damped:
+    """Where all pairs come to rest.
+
+    rest: the equilibrium; None if it was not found. runs: modes in which the bodies move on, whatever the path; None
+    if they do not, or if that was not found out. instants: how many were solved.
+    """
+
+    rest: Rest | None
+    runs: ModeState | None
+    instants: int
+
+
+def come_to_rest(
+    subset: Subset, response: Response, judge: Judge, holds: Callable[[ModeState], bool], before: Real
+) -> Damped:
+    """Follow all pairs (s,) to where they rest, from the jumps g_n, g_s before (s, 2), a length.
+
+    judge: see settle_subset; holds: whether all bodies are held in these modes.
+    """
+    own, instants = _measure_stiffness(response), 0
+    runs: ModeState | None = None
+    for first, part, most in SCHEDULES:
+        stiffness, motion, steady = first * own, np.zeros_like(before), 0
+        modes, present, jumps = subset.modes, response, before / response.length_unit
+        for _ in range(most):
+            found = _solve_instant(replace(subset, modes=modes), present, judge, stiffness, jumps)
+            if found is None:
+                break
+            now, present = found
+            instants, held = instants + 1, holds(now)
+            rest = _stay(replace(subset, modes=now), present, judge) if held else None
+            if rest:
+                return Damped(rest, None, instants)
+            moved, same = present.values[:, 2:] - jumps, now.fingerprint() == modes.fingerprint()
+            off = np.abs(moved - motion / part).max(initial=0.0)
+            # What holds the bodies resists only once it has been strained.
+            goes_on = same and not held and off <= STEADY * np.abs(moved).max(initial=0.0)
+            steady = steady + 1 if goes_on else 0
+            if steady == IN_TURN:
+                break
+            modes, jumps, motion, stiffness = now, present.values[:, 2:], moved, stiffness * part
+        if steady < IN_TURN:
+            return Damped(None, None, instants)
+        runs = modes
+    return Damped(None, runs, instants)
+
+
+def _measure_stiffness(response: Response) -> float:
+    """The median of what the pairs' own jumps do to their own tractions, in the response's units."""
+    tractions, jumps = (response.change[:, k : k + 2].reshape(-1, response.change.shape[2]) for k in (0, 2))
+    return float(np.median(np.abs(np.diag(np.linalg.lstsq(jumps.T, tractions.T, rcond=None)[0]))))
+
+
+def _damp(response: Response, stiffness: float, jumps: Real) -> Response:
+    """The response with dashpots that keep the jumps (s, 2) with a stiffness, all in its units."""
+    values, change = response.values.copy(), response.change.copy()
+    values[:, :2] -= stiffness * (response.values[:, 2:] - jumps)
+    change[:, :2] -= stiffness * response.change[:, 2:]
+    return replace(response, values=values, change=change)
+
+
+def _move(response: Response, d: Real) -> Response:
+    """The response from the states for d on."""
+    return replace(response, values=response.values + response.change @ d)
+
+
+def _solve_instant(
+    subset: Subset, response: Response, judge: Judge, stiffness: float, jumps: Real
+) -> tuple[ModeState, Response] | None:
+    """The modes of one instant, and the response from its states on; None if they are not found.
+
+    Where friction changes with slip the bound is taken at the slips of the last time, as in pbem.contact.running.
+    """
+    for _ in range(MOST_TAKEN):
+        damped = _damp(response, stiffness, jumps)
+        found = settle_subset(subset, damped, judge).modes
+        d = None if found is None else solve_in_modes(pose(subset, damped), found)
+        if found is None or d is None:
+            return None
+        subset, response = replace(subset, modes=found), _move(response, d)
+        if _fulfils(subset, _damp(response, stiffness, jumps)):
+            return found, response
+    return None
+
+
+def _stay(subset: Subset, response: Response, judge: Judge) -> Rest | None:
+    """The equilibrium in the modes of the subset without dashpots; None if the judge does not leave them as they are.
+    """
+    for _ in range(MOST_TAKEN):
+        d = solve_in_modes(pose(subset, response), subset.modes)
+        if d is None:
+            return None
+        response = _move(response, d)
+        state = response.evaluate(np.zeros_like(d))
+        if judge(subset.modes, state).changed.any():
+            return None
+        if _fulfils(subset, response):
+            return Rest(subset.modes, state.p_n, plastic_slip(subset.laws, state))
+    return None
+
+
+def _fulfils(subset: Subset, response: Response) -> bool:
+    """Whether friction is what it is at the slips of the response's states."""
+    state = response.evaluate(np.zeros(response.change.shape[2]))
+    return measure_law_error(
+        subset.laws, subset.modes, state, subset.memory, subset.pressure, response.traction_unit) <= NEAR

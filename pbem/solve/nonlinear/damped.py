@@ -1,0 +1,74 @@
+"""The modes of contacts that come to rest against dashpots, where the search for those of a load step does not settle.
+
+See pbem.contact.damped. A search that takes long asks for them once and goes on from there; where bodies do not come to
+rest it soon ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.contact.complementarity import take_subset
+from pbem.contact.damped import Damped, come_to_rest
+from pbem.contact.laws import OPEN, STICK, Memory, ModeState, find_pivoting
+from pbem.contact.loads import Load
+from pbem.contact.modes import linearise
+from pbem.contact.running import Rest, find_running
+from pbem.errors import ConvergenceError
+from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.judging import make_judge
+from pbem.solve.nonlinear.search import GLOBALISATIONS, Search
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.response import find_response
+from pbem.solve.problem.tangent import TangentOperator
+
+# Larger models are not asked: pivoting takes a time that grows with the cube of the number of pairs, and more.
+MOST_PAIRS = 300
+
+
+def can_be_damped(problem: Problem, tangent: TangentOperator) -> bool:
+    """Whether `find_damped` can be asked: for laws whose contact can be pivoted, of models that are not too large."""
+    laws = problem.laws
+    pivots = (find_pivoting(laws) | find_running(laws)).all() and not laws.follows.any()
+    return bool(pivots) and 0 < laws.count <= MOST_PAIRS and not tangent.settling.nearby
+
+
+def find_damped(problem: Problem, tangent: TangentOperator, begin: Memory, load: Load) -> Damped | None:
+    """Where the contact comes to rest under a load, from the memory of the last step; None if that operator is singular
+    in which all pairs stick. Two solutions for each pair with it; all ranks together.
+    """
+    laws = problem.laws
+    modes = ModeState(np.where(laws.parted, OPEN, STICK).astype(np.int8), begin.modes.sign)
+    law = linearise(laws, modes, np.zeros(laws.count), begin.slip, begin, load.pressure, problem.traction_scale)
+    hold, pairs = Hold(problem, begin, load), np.arange(laws.count)
+    constraints = hold.release(problem.constrain(law, load), modes)
+    try:
+        solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
+        response = find_response(problem, tangent, constraints, load, law, solved, pairs)
+    except ConvergenceError:
+        return None
+    subset = take_subset(laws, begin, load.pressure, begin.modes, pairs)
+    judge = make_judge(problem, solved, GLOBALISATIONS[0])
+    before = np.stack([begin.opening, begin.slip], axis=1)
+    return problem.decide(lambda: come_to_rest(
+        subset, response, lambda m, s: judge(laws, m, s, begin, load.pressure),
+        lambda now: not hold.leaves_free(now), before,
+    ))  # fmt: skip
+
+
+def describe_run(problem: Problem, begin: Memory, load: Load, modes: ModeState) -> ConvergenceError:
+    """The error of a contact that does not come to rest but moves on in these modes; that of the first rank."""
+    def describe() -> ConvergenceError:
+        free = Hold(problem, begin, load).describe_free_motion(modes)
+        moves = free.detail.split("; ")[0] if free else "nothing in the present contact stops them"
+        return ConvergenceError("limit load", f"bodies that dashpots slow down move on and come to no rest: {moves}")
+
+    return problem.decide(describe)
+
+
+def rest_late(problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, search: Search) -> Rest | None:
+    """Where the contact of a search that takes long comes to rest; the search is told if it does not."""
+    damped = find_damped(problem, tangent, memory, load)
+    if damped and damped.runs:
+        search.collapse = describe_run(problem, memory, load, damped.runs).detail
+    return damped.rest if damped else None

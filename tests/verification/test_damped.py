@@ -1,0 +1,82 @@
+"""Contacts that come to rest against dashpots: at the true equilibrium below the largest load, never beyond it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbem.case.build import parse_model
+from pbem.contact.damped import Damped
+from pbem.contact.laws import SLIP, STICK, commit, plastic_slip, start_memory
+from pbem.mesh.generate import generate_mesh
+from pbem.parallel import world
+from pbem.solve.nonlinear.damped import can_be_damped, describe_run, find_damped
+from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.system.assembly import assemble_problem
+from scripts.torture.kinds import KINDS
+from scripts.torture.runs import run_sample
+from tests.verification.test_limit_load import write_pushed_block
+from tests.verification.test_settling import Listener
+
+
+def push(shear: float, law: dict[str, float], unit: float = 1.0, shift: float = 0.0,
+         own: bool = False) -> tuple[Damped, Solution | None, str]:
+    """Where the block rests that was pressed and is pushed; with its solution (own), and what moves on."""
+    model = parse_model(write_pushed_block(shear, law, unit, shift))[1]
+    problem, listener = assemble_problem(model, generate_mesh(model), world), Listener()
+    tangent, memory = problem.make_tangent(), start_memory(problem.laws)
+    pressed, pushed = problem.evaluate_load(0, 1.0), problem.evaluate_load(1, 1.0)
+    done = solve_step(problem, tangent, memory, pressed, listener)
+    memory = commit(problem.laws, done.memory, done.modes, done.pairs, pressed.pressure)
+    assert can_be_damped(problem, tangent)
+    found = find_damped(problem, tangent, memory, pushed)
+    assert found is not None
+    solution = solve_step(problem, tangent, memory, pushed, listener) if own else None
+    if solution and found.rest:
+        np.testing.assert_allclose(found.rest.slip, plastic_slip(problem.laws, solution.pairs), atol=1e-8 * unit)
+    return found, solution, describe_run(problem, memory, pushed, found.runs).detail if found.runs else ""
+
+
+@pytest.mark.parametrize("law", [
+    {"friction": 0.25}, {"friction": 0.25, "cohesion": 0.02},
+    {"friction": 0.3, "friction_dynamic": 0.25, "slip_distance": 0.01},
+])  # fmt: skip
+@pytest.mark.parametrize(("unit", "shift"), [(1.0, 0.0), (1e3, 1e3)])
+def test_rest_is_the_equilibrium(law: dict[str, float], unit: float, shift: float) -> None:
+    found, solution, _ = push(0.2, law, unit, shift, own=True)
+    assert found.rest and found.runs is None and solution
+    assert {SLIP, STICK} <= set(solution.modes.mode)
+    np.testing.assert_array_equal(found.rest.modes.mode, solution.modes.mode)
+    np.testing.assert_allclose(found.rest.normal_traction, solution.pairs.p_n, atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+@pytest.mark.parametrize(("law", "largest", "motion"), [
+    ({"friction": 0.25}, 0.25, "translation"),
+    ({"friction": 0.25, "cohesion": 0.05}, 0.3, "translation"),
+    ({"friction": 0.25, "friction_dynamic": 0.2, "slip_distance": 1e-9}, 0.25, "translation"),
+    # About an edge at half its width of 2, by a push at its height of 1.
+    ({"friction": 3.0}, 1.0, "rotation"),
+])  # fmt: skip
+def test_a_block_moves_on_beyond_the_largest_push(
+    law: dict[str, float], largest: float, motion: str, unit: float
+) -> None:
+    """The largest push from balance: friction times the pressure of 1; meshes know where it topples to 1e-2."""
+    beyond, _, moves = push(1.03 * largest, law, unit)
+    assert beyond.rest is None
+    assert beyond.runs is not None
+    assert motion in moves
+    if "friction_dynamic" not in law:
+        below, _, _ = push(0.97 * largest, law, unit)
+        assert below.rest is not None
+
+
+@pytest.mark.parametrize("seed", [91448, 93152, 81044, 70100])
+def test_walls_settle_or_end_at_a_limit_load(seed: int, tmp_path: Path) -> None:
+    record = run_sample(seed, 0, tmp_path, tuple(KINDS))
+    assert record.status == "limit load"
+    assert max(record.iterations, default=0) <= 25
+    assert record.wasted <= 25 * (record.halved + 1)
+    assert not record.faults

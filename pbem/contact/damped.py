@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.arrays import Real
-from pbem.contact.complementarity import Response, Subset, pose, solve_in_modes
+from pbem.contact.complementarity import Response, Subset, find_compliance, pose, solve_in_modes
 from pbem.contact.laws import ModeState, PairState, plastic_slip
 from pbem.contact.modes import Proposal, measure_law_error
 from pbem.contact.running import NEAR, Rest
@@ -25,10 +25,13 @@ from pbem.contact.subset import settle_subset
 # Stiffness of the dashpots at first, relative to the median of the pairs' own; the part to which it falls from instant
 # to instant; and how many instants there are. Of a motion that goes on quickly the way may matter: slowly as well.
 SCHEDULES = ((0.1, 0.1, 12), (1.0, 0.4, 30))
+# Dashpots that hold all bodies, and change nothing of what single pairs do.
+SOFTEST = 1e-4
 # A motion goes on steadily if it grows as 1 / k but for this part, so many times in turn.
 STEADY, IN_TURN = 0.05, 2
-# So often friction is taken at the slips of the time before, where it changes with slip.
-MOST_TAKEN = 100
+# Problems of contact at most, of so many pairs, as in pbem.contact.running; of more pairs fewer. Friction that changes
+# with slip is taken at the slips of the problem before, in one instant so often at most.
+MOST_SOLVED, OF_PAIRS, MOST_TAKEN = 1000, 100, 100
 
 Judge = Callable[[ModeState, PairState], Proposal]
 
@@ -51,18 +54,22 @@ def come_to_rest(
 ) -> Damped:
     """Follow all pairs (s,) to where they rest, from the jumps g_n, g_s before (s, 2), a length.
 
-    judge: see settle_subset; holds: whether all bodies are held in these modes.
+    judge: see settle_subset; holds: whether all bodies are held in these modes. Nothing is found on meshes on which
+    single pairs give way in the wrong sense.
     """
     own, instants = _measure_stiffness(response), 0
+    if not _is_sound(subset, _damp(response, SOFTEST * own, response.values[:, 2:])):
+        return Damped(None, None, 0)
     runs: ModeState | None = None
+    left = round(MOST_SOLVED * min(OF_PAIRS / subset.laws.count, 1.0) ** 2)
     for first, part, most in SCHEDULES:
         stiffness, motion, steady = first * own, np.zeros_like(before), 0
         modes, present, jumps = subset.modes, response, before / response.length_unit
         for _ in range(most):
-            found = _solve_instant(replace(subset, modes=modes), present, judge, stiffness, jumps)
+            found = _solve_instant(replace(subset, modes=modes), present, judge, stiffness, jumps, left)
             if found is None:
                 break
-            now, present = found
+            now, present, left = found
             instants, held = instants + 1, holds(now)
             rest = _stay(replace(subset, modes=now), present, judge) if held else None
             if rest:
@@ -79,6 +86,13 @@ def come_to_rest(
             return Damped(None, None, instants)
         runs = modes
     return Damped(None, runs, instants)
+
+
+def _is_sound(subset: Subset, damped: Response) -> bool:
+    """Whether no single pair opens under compression, or slips against the shear, as on meshes that carry no contact.
+    """
+    compliance, _ = find_compliance(pose(subset, damped))
+    return compliance is not None and bool((np.diag(compliance) < 0).all())
 
 
 def _measure_stiffness(response: Response) -> float:
@@ -101,13 +115,13 @@ def _move(response: Response, d: Real) -> Response:
 
 
 def _solve_instant(
-    subset: Subset, response: Response, judge: Judge, stiffness: float, jumps: Real
-) -> tuple[ModeState, Response] | None:
-    """The modes of one instant, and the response from its states on; None if they are not found.
+    subset: Subset, response: Response, judge: Judge, stiffness: float, jumps: Real, left: int
+) -> tuple[ModeState, Response, int] | None:
+    """The modes of one instant, the response from its states on, and how many problems are left; None if not found.
 
     Where friction changes with slip the bound is taken at the slips of the last time, as in pbem.contact.running.
     """
-    for _ in range(MOST_TAKEN):
+    for taken in range(1, min(left, MOST_TAKEN) + 1):
         damped = _damp(response, stiffness, jumps)
         found = settle_subset(subset, damped, judge).modes
         d = None if found is None else solve_in_modes(pose(subset, damped), found)
@@ -115,7 +129,7 @@ def _solve_instant(
             return None
         subset, response = replace(subset, modes=found), _move(response, d)
         if _fulfils(subset, _damp(response, stiffness, jumps)):
-            return found, response
+            return found, response, left - taken
     return None
 
 

@@ -35,7 +35,7 @@ def can_be_damped(problem: Problem, tangent: TangentOperator) -> bool:
 
 def find_damped(problem: Problem, tangent: TangentOperator, begin: Memory, load: Load) -> Damped | None:
     """Where the contact comes to rest under a load, from the memory of the last step; None if that operator is singular
-    in which all pairs stick. Two solutions for each pair with it; all ranks together.
+    in which all pairs stick. Two solutions for each pair with it; all ranks together. (theory, 129)
     """
     laws = problem.laws
     modes = ModeState(np.where(laws.parted, OPEN, STICK).astype(np.int8), begin.modes.sign)

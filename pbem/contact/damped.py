@@ -54,8 +54,8 @@ def come_to_rest(
 ) -> Damped:
     """Follow all pairs (s,) to where they rest, from the jumps g_n, g_s before (s, 2), a length.
 
-    (theory, 129) judge: see settle_subset; holds: whether all bodies are held in these modes. Nothing is found on meshes
-    on which single pairs give way in the wrong sense.
+    judge: see settle_subset; holds: whether all bodies are held in these modes. Nothing is found on meshes on which
+    single pairs give way in the wrong sense. (theory, 129)
     """
     own, instants = _measure_stiffness(response), 0
     if not _is_sound(subset, _damp(response, SOFTEST * own, response.values[:, 2:])):

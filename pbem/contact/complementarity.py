@@ -251,6 +251,10 @@ def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:
         return right
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
-    found = dgesvx(matrix, right[:, None])
+    # Rows are of two kinds, tractions and jumps; a column of nothing but rounding must stay small.
+    size = np.abs(matrix).max(axis=1)
+    if not (size > 0).all():
+        return None
+    found = dgesvx(matrix / size[:, None], (right / size)[:, None], fact="N")
     d, condition = np.asarray(found[7])[:, 0], float(found[8])
     return d if condition >= REGULAR and np.isfinite(d).all() else None

@@ -163,7 +163,7 @@ def test_modes_that_free_a_body_are_not_judged_by_its_rounding(cohesion: float, 
     assert found.modes is None and not found.exhaustive
 
 
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_a_body_that_all_its_pairs_let_slide_has_no_solution_among_rounding(scale: float) -> None:
     # Three pairs pressed with 1 on a body whose motion along them nothing else resists: their shears are balanced.
     subset = pose(np.full(3, 0.5), np.zeros(3))
@@ -181,6 +181,17 @@ def test_a_body_that_all_its_pairs_let_slide_has_no_solution_among_rounding(scal
     # 0.2 - scale * held * slip = 0.5 at each of them.
     assert found is not None
     np.testing.assert_allclose(found[1::2], -0.3 / (scale * 1e-5), rtol=1e-8)
+
+
+def test_an_unknown_that_changes_nothing_but_rounding_is_not_solved_for() -> None:
+    subset = pose(np.full(2, 0.5), np.zeros(2))
+    modes = ModeState(np.full(2, SLIP, dtype=np.int8), np.ones(2))
+    random = np.random.default_rng(5)
+    change = random.normal(size=(2, 4, 4))
+    values = np.tile([-1.0, 0.2, 0.1, 0.0], (2, 1))
+    assert solve_in_modes(pose_problem(subset, Response(values, change, 1.0, 1.0)), modes) is not None
+    change[:, :, 3] *= 1e-15
+    assert solve_in_modes(pose_problem(subset, Response(values, change, 1.0, 1.0)), modes) is None
 
 
 @pytest.mark.parametrize("size", [2.0**-30, 2.0**30])

@@ -19,15 +19,26 @@ def find_case(name: str) -> Path:
     """
     if os.path.isfile(name):  # also of names that no file can have
         return Path(name)
-    bundled = list_bundled_cases()
-    stem = name.removesuffix(".toml")
-    for each in (stem, GALLERY + stem):
-        if each in bundled:
-            return bundled[each]
+    found = find_bundled(name)
+    if found is not None:
+        return found
+    bundled, stem = list_bundled_cases(), name.removesuffix(".toml")
     names = [each.removeprefix(GALLERY) for each in bundled]
     near = difflib.get_close_matches(stem.removeprefix(GALLERY), names, n=1, cutoff=0.6)
     hint = f" (did you mean '{near[0]}'?)" if near else ""
     raise CaseError(name, (Fault("CASE", f"'{name}', which is no file", _describe_cases(bundled) + hint),))
+
+
+def locate(source: str | os.PathLike[str]) -> Path:
+    """The path of a file, or of a case of the program where there is no file but one of that name among them."""
+    path = Path(source)
+    return path if os.path.isfile(path) else find_bundled(str(source)) or path
+
+
+def find_bundled(name: str) -> Path | None:
+    """The path of a case that comes with the program, None where there is none of this name."""
+    bundled, stem = list_bundled_cases(), name.removesuffix(".toml")
+    return bundled.get(stem, bundled.get(GALLERY + stem))
 
 
 def _describe_cases(bundled: dict[str, Path]) -> str:

@@ -73,16 +73,17 @@ def run(
 ) -> Results:
     """Run a case and return its results.
 
-    case: path of a TOML file, a pbem.Case, or its tables as a dictionary. output: path of the result file; by default
-    the name of the case file with .h5 (case.h5 if there is none), in the working directory. resume: continue after the
-    last step in the file. force: replace existing results; without either, an existing file is refused. petsc: PETSc
-    options without prefix, which override the [petsc] table of the case. operator: "auto", "dense" or "hierarchical",
-    overrides solver.operator of the case; it is stored in the configuration in the result file. reporter: receives the
-    progress, on the first rank only. set: values to override, as in `Case.replace`; the result file stores them
-    separately from the case, a resumed run uses the stored values, and other values are refused. comm: the MPI
-    communicator whose ranks compute the case together, by default all ranks; each of them has to call this and receives
-    the results. With MPI.COMM_SELF each rank computes a separate case and writes a separate file. label: function that
-    names set values in messages. kept: operators and factors of earlier runs, for cases that share them.
+    case: path of a TOML file, name of a case of the program, a pbem.Case, or its tables as a dictionary. output: path
+    of the result file; by default the name of the case file with .h5 (case.h5 if there is none), in the working
+    directory. resume: continue after the last step in the file. force: replace existing results; without either, an
+    existing file is refused. petsc: PETSc options without prefix, which override the [petsc] table of the case.
+    operator: "auto", "dense" or "hierarchical", overrides solver.operator of the case; it is stored in the
+    configuration in the result file. reporter: receives the progress, on the first rank only. set: values to override,
+    as in `Case.replace`; the result file stores them separately from the case, a resumed run uses the stored values,
+    and other values are refused. comm: the MPI communicator whose ranks compute the case together, by default all
+    ranks; each of them has to call this and receives the results. With MPI.COMM_SELF each rank computes a separate case
+    and writes a separate file. label: function that names set values in messages. kept: operators and factors of
+    earlier runs, for cases that share them.
 
     Raises LaunchError (incompatible ranks, libraries or threads), CaseError (all faults of the case), ResultFileError
     (the output cannot be written, exists already, or belongs to another case), ConvergenceError (the file then holds

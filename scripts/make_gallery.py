@@ -150,7 +150,7 @@ def write_snippet(case: GalleryCase) -> str:
     steps = textwrap.dedent(cut(body[0], body[-1]))
     steps = re.sub(r"^return ", "numbers = ", steps, flags=re.MULTILINE)
     sorted_imports = sorted(set(imports), key=lambda line: (line.split()[1].startswith("pbem"), line.split()[1]))
-    run = f'results = pbem.run("cases/gallery/{case.name}.toml")'
+    run = f'results = pbem.run("{case.name}")'
     return "\n".join([*sorted_imports, "", *others, *([""] if others else []), run, steps, "print(numbers)"]) + "\n"
 
 
@@ -282,6 +282,8 @@ come with the program and can be run by name in any folder:
     pbem check {cases[0].name}             # the model, and the automatic choices
     pbem run {cases[0].name}               # also: pbem run gallery/{cases[0].name}
     pbem plot {cases[0].name}.h5
+
+In Python, `pbem.run("{cases[0].name}")` runs it, and `pbem.Case.read("{cases[0].name}")` is the case to go on from.
 
 The folder `cases/gallery` of the sources has a page for each, NAME.md: problem, source, case, the same in
 Python, pictures, and the numbers to expect. To start your own case, copy NAME.toml.

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from pbem.bundled import locate
 from pbem.case.case import Case
 from pbem.case.changed import ChangedDraft, Label, change_draft, label_key, label_option
 from pbem.case.overrides import read_overrides, write_overrides
@@ -22,7 +23,7 @@ from pbem.model.build import build_model, examine, limit_faults
 from pbem.model.model import Model
 from pbem.model.recall import Recall
 
-# What a model can be made from: a case, its tables, or the path of its file.
+# What a model can be made from: a case, its tables, the path of its file, or the name of one of the program's.
 Source = description.Case | Mapping[str, Any] | str | os.PathLike[str]
 
 
@@ -86,7 +87,7 @@ def find_file(source: Source) -> Path | None:
     """The path of the case file, None of a case that was made by calls."""
     if isinstance(source, description.Case):
         return None if source.source == description.UNNAMED else Path(source.source)
-    return None if isinstance(source, Mapping) else Path(source)
+    return None if isinstance(source, Mapping) else locate(source)
 
 
 def make_checked_model(
@@ -107,8 +108,8 @@ def make_checked_model(
     elif isinstance(source, Mapping):
         name, model = description.UNNAMED, describe_model(source, changes, recall)
     else:
-        name = str(source)
-        model = _build_text(read_case_text(source), name, changes, label, recall)[1]
+        name = str(locate(source))
+        model = _build_text(read_case_text(name), name, changes, label, recall)[1]
     return _take_laws(model, name)
 
 

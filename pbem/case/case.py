@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
+from pbem.bundled import locate
 from pbem.case.changed import change_draft, label_key
 from pbem.case.reader import parse_draft, read_case_text
 from pbem.case.writer import write_tables
@@ -31,8 +32,10 @@ class Case(description.Case):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Self:
-        """Read a case file. Raises CaseError with all faults of its tables and keys, each with its line."""
-        return cls.parse(read_case_text(path), str(path))
+        """Read a case file, or a case of the program by its name. Raises CaseError with all faults of its tables and
+        keys, each with its line."""
+        file = locate(path)
+        return cls.parse(read_case_text(file), str(file))
 
     @classmethod
     def parse(cls, text: str, source: str = description.UNNAMED) -> Self:

@@ -12,8 +12,8 @@ from pathlib import Path
 # The path of the data: a part imports those before it, never those after it.
 # The package itself comes last: it offers what they define.
 ORDER = (
-    "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "case", "importing", "solve", "results",
-    "progress", "passes", "driver", "sweeps", "bundled", "terminal", "make_command", "import_command", "check_command",
+    "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "bundled", "case", "importing", "solve",
+    "results", "progress", "passes", "driver", "sweeps", "terminal", "make_command", "import_command", "check_command",
     "run_command", "sweep_command", "export_command", "info_command", "plot_command", "pages", "cli", "__main__",
     "__init__",
 )

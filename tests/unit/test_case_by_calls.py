@@ -298,3 +298,16 @@ def test_circles_and_expressions_without_a_case() -> None:
     assert isinstance(wave, Curve) and len(wave.legs) == 4 and wave.end == pytest.approx(1 + 0j)
     wrong = draw_expression("wave", ("t", "1/(t - 0.5)"), Division(4))
     assert isinstance(wrong, Fault) and wrong.path == ("curves", "wave", "expression") and "t = 0.5" in wrong.found
+
+
+def test_cases_of_the_program_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In an empty folder; a file of that name there comes first."""
+    monkeypatch.chdir(tmp_path)
+    case = pbem.Case.read("kelvin_point")
+    assert case.title and case.text == pbem.Case.read("gallery/kelvin_point.toml").text
+    results = pbem.run("kelvin_point")
+    assert Path("kelvin_point.h5").exists() and results.title == case.title
+    Path("kelvin_point").write_text(case.text.replace(case.title, "Mine"))
+    assert pbem.Case.read("kelvin_point").title == "Mine"
+    with pytest.raises(pbem.CaseError, match="no such file"):
+        pbem.run("kelvin_points")

@@ -44,6 +44,8 @@ CONSTANTS = ("TITLE", "SUBJECT", "PROBLEM", "SOURCE", "EXPECTED", "PICTURES")
 LARGEST, LARGEST_SUM = 60_000, 2_000_000
 COLOURS, DPI, WIDTH = (128, 64, 32, 16), 100, 17.8  # of a picture: as many as fit; dots per inch, cm
 DIGITS = 6
+# Of those that are known to all of them.
+MORE_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,8 @@ def write_page(case: GalleryCase, measured: Measured) -> str:
     rows = []
     for name, (value, tolerance) in case.expected.items():
         found = measured.values[name]
-        rows.append(f"| {name} | {value:.{DIGITS}g} | {found} | {_describe_difference(float(found), value)} | "
+        digits = DIGITS if tolerance > 10.0 ** (1 - DIGITS) else MORE_DIGITS
+        rows.append(f"| {name} | {value:.{digits}g} | {found} | {_describe_difference(float(found), value)} | "
                     f"{tolerance:g} |")
     return "\n".join([
         f"# {module.TITLE}\n",

@@ -69,6 +69,20 @@ def test_inclusion_that_changes_its_shape(tmp_path: Path) -> None:
     np.testing.assert_allclose(results.interior.stress[-1][0], exact, atol=1e-4 * np.abs(exact).max())
 
 
+def test_inclusion_that_swells_more_on_one_side(tmp_path: Path) -> None:
+    """exx = eyy = g X in a plane of the same material: stresses from the potential A (X r^2 - 2 a^2 X) inside and
+    -A a^4 X/r^2 outside, A = g/(8 (1 - nu)), by 2 G (d_ij - delta_ij laplace)."""
+    material, (x, y), radius, by = {"young": 3e3, "poisson": 0.2}, (30.0, -7.0), 2.0, 1e-3
+    strain = {"expression": f"{by}*(x - {x})"}
+    case = make_inclusion(complex(x, y), radius, material, 2, eigenstrain={"core": {"exx": strain, "eyy": strain}})
+    results = pbem.run(case, tmp_path / "graded.h5")
+    size = 2 * shear_modulus(material) * by / (8 * (1 - 0.2))
+    inside = np.array([-2 * 0.3, -6 * 0.3, 2 * -0.5]) * radius * size  # at (0.3, -0.5) a
+    np.testing.assert_allclose(results.interior.stress[-1][0], inside, atol=2e-5 * np.abs(inside).max())
+    # At (0, 2) a: x/r^2 has d_xx = d_yy = 0 there, and d_xy = -2/y^3.
+    np.testing.assert_allclose(results.interior.stress[-1][1], [0.0, 0.0, size * radius / 4], atol=1e-5 * size * radius)
+
+
 def make_ring(plane: str, **more: Any) -> dict[str, Any]:
     return {
         "materials": {"steel": {"young": 2.1e5, "poisson": 0.3, "plane": plane, "expansion": 1.1e-5}},

@@ -60,12 +60,12 @@ def close_all(laws: PairLaws, modes: ModeState) -> ModeState:
 
 def linearise_smoothly(
     laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real, traction_scale: float,
-    width: float, proximal: Real,
+    width: float | Real, proximal: Real,
 ) -> Linearisation:
     """The tangents of the smoothed laws of pairs (m,) at a state; others are closed, or open for good.
 
-    width: e, a stress. proximal (m,): stiffness against the change of the jumps, stress/length; what it bears is part
-    of the tractions, see `take_off_proximal`. (theory, 122, 123, 127)
+    width: e, a stress, of all or of each. proximal (m,): stiffness against the change of the jumps, stress/length; what
+    it bears is part of the tractions, see `take_off_proximal`. (theory, 122, 123, 127)
     """
     r, k, scale = laws.stiffness, proximal, traction_scale
     x, y = _try(laws, state, memory, pressure)
@@ -124,13 +124,17 @@ def read_modes(
     return follow_leaders(laws, ModeState(mode, np.where(y < 0, -1.0, 1.0)))
 
 
-def measure_violation(laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real) -> Real:
-    """By how much the tractions of pairs (m,) are off from what the true laws make of their trial values: the sum along
-    n and s (stress; zero of pairs that are not smoothed). (theory, 122, 123 with e = 0)"""
+def measure_violation(
+    laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real, width: float | Real = 0.0
+) -> Real:
+    """By how much the tractions of pairs (m,) are off from what the laws make of their trial values: the sum along n
+    and s (stress; zero of pairs that are not smoothed). width: e, of the smoothed laws; 0 of the true ones. (theory,
+    122, 123)"""
     x, y = _try(laws, state, memory, pressure)
-    held = np.maximum(x, 0.0)
+    held, _ = _smooth_maximum(x, width)
     bound = _find_bound(laws, held, memory, pressure).bound
-    off = np.abs(-(state.p_n + pressure) - held) + np.abs(state.p_s - np.clip(y, -bound, bound))
+    along = y - _smooth_maximum(y - bound, width)[0] + _smooth_maximum(-y - bound, width)[0]
+    off = np.abs(-(state.p_n + pressure) - held) + np.abs(state.p_s - along)
     return np.asarray(np.where(smooth, off, 0.0))
 
 
@@ -150,9 +154,9 @@ def _find_bound(laws: PairLaws, held: Real, memory: Memory, pressure: Real) -> S
     return evaluate_strength(laws, -held - pressure, memory.look_ahead(np.zeros(laws.count)), pressure)
 
 
-def _smooth_maximum(values: Real, width: float) -> tuple[Real, Real]:
+def _smooth_maximum(values: Real, width: float | Real) -> tuple[Real, Real]:
     """Of values and zero, and its slope, which is between 0 and 1 (theory, 122)."""
-    root = np.sqrt(values * values + 4 * width * width)
+    root = np.maximum(np.sqrt(values * values + 4 * width * width), np.finfo(float).tiny)
     # Without cancellation where a value is far below zero.
     result = np.where(values > 0, 0.5 * (values + root), 2 * width * width / (root + np.abs(values)))
     return result, result / root

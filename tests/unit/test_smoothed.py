@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from pbem.contact.smoothed import (
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import newton, smooth_search
 from pbem.solve.nonlinear.newton import solve_step
-from pbem.solve.nonlinear.smooth_search import FIRST, LEAST, SmoothSearch
+from pbem.solve.nonlinear.smooth_search import FALL, FIRST, LEAST, LEAST_FALL, OFF, SmoothSearch
 from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over
@@ -254,36 +255,64 @@ def test_limits_hold_for_iterations_with_smoothed_laws_too(
     assert search_once(text, 1)[::2] == (1, "iteration limit")
 
 
-def test_smoothing_ends_before_a_width_that_leads_away(
+def record_widths(monkeypatch: pytest.MonkeyPatch) -> list[Real]:
+    """The widths (m,) that laws are linearised with from now on."""
+    widths: list[Real] = []
+
+    def record(*arguments: Any) -> Linearisation:
+        widths.append(arguments[6])
+        return linearise_smoothly(*arguments)
+
+    monkeypatch.setattr(smooth_search, "linearise_smoothly", record)
+    return widths
+
+
+def test_the_width_falls_where_few_pairs_are_off_their_laws(
     many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[ModeState] = []
-    violations: list[float] = []
+    widths, parts = record_widths(monkeypatch), [1.0, 2 * OFF, OFF, 0.25 * OFF, 0.0]
 
-    def read(*arguments: Any) -> ModeState:
-        asked.append(read_modes(*arguments))
-        return asked[-1]
+    def count(search: SmoothSearch, *arguments: Any) -> float:
+        return (parts.pop(0) if parts else 0.0) * len(search.smooth)
 
-    def measure_badly(*arguments: Any) -> Real:
-        violation = measure_violation(*arguments)
-        violations.append(float(violation.mean()))
-        return violation if len(violations) != 5 else violation + 3 * violations[0]
-
-    found: list[ModeState] = []
-    find = SmoothSearch.find
-
-    def listen(search: SmoothSearch, *arguments: Any) -> tuple[ModeState, PairState]:
-        result = find(search, *arguments)
-        found.append(result[0])
-        return result
-
-    monkeypatch.setattr(smooth_search, "read_modes", read)
-    monkeypatch.setattr(smooth_search, "measure_violation", measure_badly)
-    monkeypatch.setattr(SmoothSearch, "find", listen)
+    monkeypatch.setattr(SmoothSearch, "_count_off", count)
     march_over(grow_branches(0, 6))
-    # The first is of the state where it begins.
-    assert len(asked) == 4 and len(violations) == 5 and violations[-1] < 0.01 * violations[0]
-    assert found[0].fingerprint() == asked[2].fingerprint() != asked[3].fingerprint()
+    falls = [float((new / old).mean()) for old, new in pairwise(widths)]
+    np.testing.assert_allclose(falls[:5], [1.0, 1.0, FALL, 0.5 * FALL, LEAST_FALL * FALL], rtol=1e-12)
+    assert min(falls) > 0.99 * LEAST_FALL * FALL and falls[-1] > LEAST_FALL * FALL  # as far as the narrowest
+
+
+def test_short_pairs_have_the_same_product_of_force_and_opening(
+    many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widths, text = record_widths(monkeypatch), grow_branches(0, 6)
+    march_over(text)
+    problem = assemble(text)
+    weight = problem.mesh.pairs.weight
+    mean = weight[~problem.laws.follows].mean()
+    assert at_once and weight.min() < 0.5 * mean
+    for width in widths:
+        # The hyperbola is pressure times opening = width^2 / r.
+        np.testing.assert_allclose(width**2 * np.minimum(weight, mean), width.min() ** 2 * mean, rtol=1e-12)
+
+
+def test_pairs_that_are_off_are_counted_by_their_own_widths() -> None:
+    laws, memory, pressure = make_case()
+    everywhere, widths = np.ones(COUNT, dtype=bool), np.geomspace(0.1, 3.0, COUNT)
+    random = np.random.default_rng(5)
+    x, y = random.normal(size=(2, COUNT)) * 2
+    # Roots of P^2 - x P - e^2 = 0 for the contact pressure, and of friction for each sense.
+    pressed = np.array([np.roots([1.0, -a, -(e**2)]).max() for a, e in zip(x, widths, strict=True)])
+    above, below = (
+        np.array([np.roots([1.0, -a, -(e**2)]).max() for a, e in zip(sense * y - 0.6 * pressed, widths, strict=True)])
+        for sense in (1.0, -1.0)
+    )
+    friction = y - above + below
+    state = PairState(-pressed - pressure, friction, (pressed - x) / laws.stiffness,
+                      memory.slip + (y - friction) / laws.stiffness)
+    np.testing.assert_allclose(
+        measure_violation(laws, everywhere, state, memory, pressure, widths), 0.0, rtol=0, atol=1e-12)
+    assert (measure_violation(laws, everywhere, state, memory, pressure) > 1e-3).any()
 
 
 def test_the_violation_is_what_the_laws_are_off() -> None:

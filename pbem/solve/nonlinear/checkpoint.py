@@ -39,7 +39,7 @@ GIVEN = {
     "hold": ("problem", "memory", "load", "settled", "floating"),
     "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
-    "smoothing": ("_problem", "_memory", "_load", "smooth"),
+    "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape"),
     "blocks": ("_problem", "_smooth"),
 }
 

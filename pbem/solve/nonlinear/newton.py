@@ -52,7 +52,7 @@ from pbem.solve.nonlinear.search import (
     go_on_warily,
     list_searches,
 )
-from pbem.solve.nonlinear.smooth_search import CLOSELY, SmoothSearch
+from pbem.solve.nonlinear.smooth_search import CLOSELIEST, SmoothSearch
 from pbem.solve.nonlinear.unsettled import describe_unsettled
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
@@ -194,7 +194,7 @@ def _run_search(
         constraints = hold.release(problem.constrain(law, load), modes)
         part = forcing.choose(search.level > 0)
         try:
-            solved = tangent.solve(constraints, load, law, min(part, CLOSELY) if search.smoothed else part)
+            solved = tangent.solve(constraints, load, law, min(part, CLOSELIEST) if search.smoothed else part)
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN

@@ -3,9 +3,11 @@
 In open fractures hang thin blocks that single pairs hold. What holds them changes from one iteration to the next, they
 turn by a multiple of what there is room for, and take the statuses of all around with them. Under smoothed laws every
 pair holds what is near to it, the more the nearer it comes: blocks stay where there is room for them, and the solutions
-change little from one width to the next, which follows from how far the true laws are from holding (X. Chen, Math.
-Programming 134, 2012, reviews such methods). From the statuses of the last the search goes on with the true laws; of
-the smoothed ones nothing is left but where it begins.
+change little from one width to the next (X. Chen, Math. Programming 134, 2012, reviews such methods). Short pairs have
+larger widths, which makes the hyperbola a barrier of the same weight for each: Newton's method converges from one width
+to the next only so (Y. Nesterov, A. Nemirovskii, Interior-point polynomial algorithms, 1994: barriers must not be less
+curved than they rise steeply). From the statuses of the last width the search goes on with the true laws; of the
+smoothed ones nothing is left but where it begins.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pbem.arrays import Real
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
@@ -40,31 +43,38 @@ FIRST = 4
 MANY, LEAST = 0.03, 60
 # or, after any number of iterations, as many times as many as at best before.
 SOARED = 2
-# The width is this part of the mean violation of the true laws, and at least this part of the largest traction: with
-# less, blocks that touch nothing would be held by nothing but rounding.
+# The first width is this part of the mean violation of the true laws; the last one this part of the largest traction:
+# with less, blocks that touch nothing would be held by nothing but rounding.
 WIDTH, NARROWEST = 0.1, 1e-6
+# It falls to this part of itself after an iteration that leaves this part of all pairs off the smoothed laws by more
+# than their width, not if more are; if fewer are, to less by the root of how many fewer, at least so many times as much.
+FALL, OFF, LEAST_FALL = 0.3, 0.05, 0.1
+# Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
+MOST_WIDENED = 1e3
 # The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
 # where tangents cancel these, and so little that blocks hardly feel it.
 PROXIMAL = 1e-5
-# It ends after so many iterations, or one in which no more than this part of all pairs, or so many, change.
-LONGEST, FEW, FEWEST = 14, 1e-3, 10
-# Where the violation grows by more than this, a system was all but singular: it ends with what was before. The first
-# pairs that a block comes to touch as the width falls make it grow by less.
-WORSE = 10.0
-# The part of the residual that is left: blocks that are nearly free move by far more than it tells.
+# It ends after so many iterations, or one with the last width in which no more than this part of all pairs, or so many,
+# change.
+LONGEST, FEW, FEWEST = 40, 1e-3, 10
+# The part of the residual that is left, as blocks that are nearly free move by far more than it tells: for the first
+# width, for narrower ones less, by the root of how much narrower they are, ...
 CLOSELY = 1e-3
+# ... and in the iterations with the true laws that follow.
+CLOSELIEST = 1e-5
 
 
 @dataclass(frozen=True)
 class SmoothCourse:
     """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, the
-    modes that hold all bodies, the largest traction of the first state, and the violation of the true laws (stress)."""
+    modes that hold all bodies, the largest traction of the first state, the first width and the present (stress)."""
 
     modes: ModeState
     state: PairState
     holding: ModeState
     largest: float
-    violation: float
+    first: float
+    width: float
 
 
 class SmoothSearch:
@@ -83,6 +93,16 @@ class SmoothSearch:
         self.taken = 0  # iterations so far
         self.begun = False  # whether `find` is to be asked, or has not ended yet
         self._course: SmoothCourse | None = None
+        self._shape = self._shape_widths()
+
+    def _shape_widths(self) -> Real:
+        """By what the width of each pair (m,) is multiplied: short ones have the others' product of force and opening
+        (theory, 122)."""
+        weight = self._problem.mesh.pairs.weight
+        if not self._allowed:
+            return np.ones(len(weight))
+        mean = float(weight[self.smooth].mean())
+        return np.asarray(np.sqrt(mean / np.clip(weight, mean / MOST_WIDENED**2, mean)))
 
     def begins(self, counts: Sequence[int], state: PairState) -> bool:
         """Whether laws are to be smoothed after an iteration, by the numbers of pairs that changed in those so far.
@@ -112,40 +132,40 @@ class SmoothSearch:
         if self._course is None:
             self._course = self._start(modes)
         modes, state, holding = self._course.modes, self._course.state, self._course.holding
-        largest, violation = self._course.largest, self._course.violation
+        largest, first, width = self._course.largest, self._course.first, self._course.width
         proximal = PROXIMAL * problem.laws.own_stiffness
         for taken in range(self.taken, min(LONGEST, most)):
-            self._course = SmoothCourse(modes, state, holding, largest, violation)
+            self._course = SmoothCourse(modes, state, holding, largest, first, width)
             pause()
-            width = max(WIDTH * violation, NARROWEST * largest)
             if not 0 < width < np.inf:
                 break
             begin = time.perf_counter()
             law = linearise_smoothly(
-                problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale, width,
+                problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale, width * self._shape,
                 proximal,
             )
             constraints = hold.release(problem.constrain(law, load), holding)
+            closely = max(CLOSELY * np.sqrt(width / first), CLOSELIEST)
             try:
-                solved = tangent.solve(constraints, load, law, min(forcing.choose(False), CLOSELY))
+                solved = tangent.solve(constraints, load, law, min(forcing.choose(False), closely))
             except ConvergenceError:
                 if not taken:
                     raise
                 return modes, state
             forcing.used |= solved.loosely
             found = evaluate_pairs(problem.mesh, law, solved.unknowns)
-            before, former, state = modes, state, take_off_proximal(
-                problem.laws, self.smooth, found, state, proximal)
-            last = violation
-            modes, violation = problem.decide(lambda at=state: (  # type: ignore[misc]
-                read_modes(problem.laws, self.smooth, at, memory, load.pressure), self._measure(at)))
+            before, state = modes, take_off_proximal(problem.laws, self.smooth, found, state, proximal)
+            modes, off = problem.decide(lambda at=state, e=width: (  # type: ignore[misc]
+                read_modes(problem.laws, self.smooth, at, memory, load.pressure), self._count_off(at, e)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
-            if taken and violation > WORSE * last:
-                return before, former
-            if taken and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
+            narrowest = NARROWEST * largest
+            if width <= narrowest and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
                 break
+            if off <= OFF * len(changed):
+                part = FALL * max(np.sqrt(off / (OFF * len(changed))), LEAST_FALL)
+                width = max(part * width, narrowest)
         return modes, state
 
     def _start(self, modes: ModeState) -> SmoothCourse:
@@ -153,11 +173,18 @@ class SmoothSearch:
         assert first is not None
         largest, violation = problem.decide(lambda: (
             float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
-        return SmoothCourse(modes, first, close_all(problem.laws, modes), largest, violation)
+        width = max(WIDTH * violation, NARROWEST * largest)
+        return SmoothCourse(modes, first, close_all(problem.laws, modes), largest, width, width)
 
     def _measure(self, state: PairState) -> float:
         """The mean violation of the true laws along all pairs (stress)."""
-        problem = self._problem
-        weight = np.where(self.smooth, problem.mesh.pairs.weight, 0.0)
-        off = measure_violation(problem.laws, self.smooth, state, self._memory, self._load.pressure)
-        return float(weight @ off / weight.sum())
+        weight = np.where(self.smooth, self._problem.mesh.pairs.weight, 0.0)
+        return float(weight @ self._find_violation(state, 0.0) / weight.sum())
+
+    def _count_off(self, state: PairState, width: float) -> int:
+        """The number of pairs that are off their smoothed laws by more than their width."""
+        return int(np.count_nonzero(self._find_violation(state, width) > width * self._shape))
+
+    def _find_violation(self, state: PairState, width: float) -> Real:
+        return measure_violation(
+            self._problem.laws, self.smooth, state, self._memory, self._load.pressure, width * self._shape)

@@ -47,7 +47,7 @@ SOARED = 2
 # with less, blocks that touch nothing would be held by nothing but rounding.
 WIDTH, NARROWEST = 0.1, 1e-6
 # It falls to this part of itself after an iteration that leaves this part of all pairs off the smoothed laws by more
-# than their width, not if more are; if fewer are, to less by the root of how many fewer, at least so many times as much.
+# than their width, not if more are; if fewer are, to less by the root of how many fewer, at least so many times that.
 FALL, OFF, LEAST_FALL = 0.3, 0.05, 0.1
 # Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
 MOST_WIDENED = 1e3

@@ -23,7 +23,7 @@ from pbem.contact.smoothed import (
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import newton, smooth_search
 from pbem.solve.nonlinear.newton import solve_step
-from pbem.solve.nonlinear.smooth_search import FALL, FIRST, LEAST, LEAST_FALL, OFF, SmoothSearch
+from pbem.solve.nonlinear.smooth_search import FALL, FEWER, FIRST, LEAST, LEAST_FALL, OFF, SmoothSearch, Width
 from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over
@@ -280,6 +280,22 @@ def test_the_width_falls_where_few_pairs_are_off_their_laws(
     falls = [float((new / old).mean()) for old, new in pairwise(widths)]
     np.testing.assert_allclose(falls[:5], [1.0, 1.0, FALL, 0.5 * FALL, LEAST_FALL * FALL], rtol=1e-12)
     assert min(falls) > 0.99 * LEAST_FALL * FALL and falls[-1] > LEAST_FALL * FALL  # as far as the narrowest
+
+
+def test_the_width_rises_again_where_no_fewer_pairs_come_to_be_off() -> None:
+    width = Width(1.0, 2.0, 1e-3, 10.0)
+    same = width.choose_next(40).choose_next(40)
+    assert same.value == 1.0 and same.choose_next(39).choose_next(41).value == 1.0
+    risen = same.choose_next(50)
+    np.testing.assert_allclose([risen.value, risen.most], [min(1 / FALL, 2.0), FEWER * 10.0])
+    # As far as the first one; to fall again takes fewer.
+    assert risen.choose_next(9).value == risen.value > risen.choose_next(2).value
+    first = Width(2.0, 2.0, 1e-3, 10.0)
+    assert first.choose_next(40).choose_next(41).choose_next(42).value == 2.0
+    # With the last one it stays until pairs no longer come to be on their laws.
+    last = Width(1e-3, 2.0, 1e-3, 10.0)
+    assert [last.choose_next(k).value for k in (0, 5)] == [1e-3, 1e-3]
+    assert last.choose_next(0).choose_next(0).choose_next(0).value > 1e-3
 
 
 def test_short_pairs_have_the_same_product_of_force_and_opening(

@@ -22,14 +22,14 @@ from pbem.contact.separating import begin_jump
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.hold import Hold
-from pbem.solve.nonlinear.smooth_search import SmoothCourse
+from pbem.solve.nonlinear.smooth_search import SmoothCourse, Width
 from pbem.solve.problem.step import Iteration, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
 
 Plain = Mapping[str, Any]
 
 # What stands for itself in plain data by the names of its fields.
-KINDS = {kind.__name__: kind for kind in (ModeState, PairState, Linearisation, Settled, SmoothCourse,
+KINDS = {kind.__name__: kind for kind in (ModeState, PairState, Linearisation, Settled, SmoothCourse, Width,
                                           Iteration)}
 KIND = "kind"
 # Attributes of the parts of a search that they are made with, or that count within an iteration only.

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,9 @@ WIDTH, NARROWEST = 0.1, 1e-6
 # It falls to this part of itself after an iteration that leaves this part of all pairs off the smoothed laws by more
 # than their width, not if more are; if fewer are, to less by the root of how many fewer, at least so many times that.
 FALL, OFF, LEAST_FALL = 0.3, 0.05, 0.1
+# Where in so many iterations with one width no fewer pairs were off than at best before, the last one was too wide a
+# step: the width rises again as far as it falls at most where OFF are off, and to fall it takes so many times as few.
+STALLED, FEWER = 2, 0.3
 # Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
 MOST_WIDENED = 1e3
 # The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
@@ -65,16 +68,41 @@ CLOSELIEST = 1e-5
 
 
 @dataclass(frozen=True)
+class Width:
+    """A width (stress), the first one and the last one, and what it was like with it.
+
+    fewest: pairs that were off their laws after an iteration with it, at best; stalled: iterations since then; most: so
+    many pairs may be off for it to fall.
+    """
+
+    value: float
+    first: float
+    last: float
+    most: float
+    fewest: float = np.inf
+    stalled: int = 0
+
+    def choose_next(self, off: int) -> Width:
+        """The width of the next iteration, after one that leaves so many pairs off. (theory, 122)"""
+        if off <= self.most and self.value > self.last:
+            part = FALL * max(float(np.sqrt(off / self.most)), LEAST_FALL)
+            return replace(self, value=max(part * self.value, self.last), fewest=np.inf, stalled=0)
+        stalled = 0 if off < self.fewest else self.stalled + 1
+        if stalled < STALLED or self.value == self.first:
+            return replace(self, fewest=min(off, self.fewest), stalled=stalled)
+        risen = min(self.value / FALL, self.first)
+        return replace(self, value=risen, most=FEWER * self.most, fewest=np.inf, stalled=0)
+
+
+@dataclass(frozen=True)
 class SmoothCourse:
     """What an iteration with smoothed laws begins with: modes, the state of all pairs that they were read from, the
-    modes that hold all bodies, the largest traction of the first state, the first width and the present (stress)."""
+    modes that hold all bodies, and the width."""
 
     modes: ModeState
     state: PairState
     holding: ModeState
-    largest: float
-    first: float
-    width: float
+    width: Width
 
 
 class SmoothSearch:
@@ -132,20 +160,20 @@ class SmoothSearch:
         if self._course is None:
             self._course = self._start(modes)
         modes, state, holding = self._course.modes, self._course.state, self._course.holding
-        largest, first, width = self._course.largest, self._course.first, self._course.width
+        width = self._course.width
         proximal = PROXIMAL * problem.laws.own_stiffness
         for taken in range(self.taken, min(LONGEST, most)):
-            self._course = SmoothCourse(modes, state, holding, largest, first, width)
+            self._course = SmoothCourse(modes, state, holding, width)
             pause()
-            if not 0 < width < np.inf:
+            if not 0 < width.value < np.inf:
                 break
             begin = time.perf_counter()
             law = linearise_smoothly(
-                problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale, width * self._shape,
-                proximal,
+                problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale,
+                width.value * self._shape, proximal,
             )
             constraints = hold.release(problem.constrain(law, load), holding)
-            closely = max(CLOSELY * np.sqrt(width / first), CLOSELIEST)
+            closely = max(CLOSELY * np.sqrt(width.value / width.first), CLOSELIEST)
             try:
                 solved = tangent.solve(constraints, load, law, min(forcing.choose(False), closely))
             except ConvergenceError:
@@ -155,17 +183,14 @@ class SmoothSearch:
             forcing.used |= solved.loosely
             found = evaluate_pairs(problem.mesh, law, solved.unknowns)
             before, state = modes, take_off_proximal(problem.laws, self.smooth, found, state, proximal)
-            modes, off = problem.decide(lambda at=state, e=width: (  # type: ignore[misc]
+            modes, off = problem.decide(lambda at=state, e=width.value: (  # type: ignore[misc]
                 read_modes(problem.laws, self.smooth, at, memory, load.pressure), self._count_off(at, e)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
-            narrowest = NARROWEST * largest
-            if width <= narrowest and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
+            if width.value <= width.last and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
                 break
-            if off <= OFF * len(changed):
-                part = FALL * max(np.sqrt(off / (OFF * len(changed))), LEAST_FALL)
-                width = max(part * width, narrowest)
+            width = width.choose_next(off)
         return modes, state
 
     def _start(self, modes: ModeState) -> SmoothCourse:
@@ -173,8 +198,10 @@ class SmoothSearch:
         assert first is not None
         largest, violation = problem.decide(lambda: (
             float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
-        width = max(WIDTH * violation, NARROWEST * largest)
-        return SmoothCourse(modes, first, close_all(problem.laws, modes), largest, width, width)
+        last = NARROWEST * largest
+        begin = max(WIDTH * violation, last)
+        width = Width(begin, begin, last, OFF * problem.laws.count)
+        return SmoothCourse(modes, first, close_all(problem.laws, modes), width)
 
     def _measure(self, state: PairState) -> float:
         """The mean violation of the true laws along all pairs (stress)."""

@@ -20,7 +20,8 @@ class Ceiling:
 
     failed: the least one at which a try failed that was not reached since; free: the least one at which a body was
     found to move freely, or nothing to balance the loads once bonds had failed; balanced: the largest one at which
-    forces in the contacts could balance the loads. Infinity if none. error: of the last try that failed, at `tried`.
+    forces in the contacts could balance the loads; slides: the one at which bodies slide under the pressures that were
+    reached. Infinity if none. error: of the last try that failed, at `tried`.
     """
 
     failed: float = np.inf
@@ -28,6 +29,7 @@ class Ceiling:
     balanced: float = np.inf
     tried: float = 0.0
     error: ConvergenceError | None = None
+    slides: float = np.inf
 
     def choose(self, reached: float, planned: float, least: float) -> float:
         """The fraction to try next: one that failed is tried again from nearer, and none above it before.
@@ -40,7 +42,13 @@ class Ceiling:
             target = middle if middle - reached >= least else self.free
         if self.balanced < target:
             target = reached + max(SAFE * (self.balanced - reached), least)
+        if self.slides < target:
+            target = reached + max(SAFE * (self.slides - reached), least)
         return target
+
+    def is_sliding(self, reached: float, target: float, least: float) -> bool:
+        """Whether hardly anything is left between what was reached and what makes bodies slide."""
+        return self.slides <= target and self.slides - reached < max(least, NEAR * self.slides)
 
     def is_reached(self, reached: float, target: float, least: float) -> bool:
         """Whether hardly anything is left between what was reached and what cannot be.

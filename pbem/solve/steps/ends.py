@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbem.arrays import Real
 from pbem.contact.cohesive import SEPARATION
 from pbem.contact.laws import Memory, resists_slip
 from pbem.contact.separating import find_bonded
@@ -11,7 +12,7 @@ from pbem.errors import ConvergenceError
 from pbem.solve.problem.given import is_driven
 from pbem.solve.problem.problem import Problem
 from pbem.solve.steps.ceiling import Ceiling
-from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
+from pbem.solve.steps.limit_load import Former, can_balance, find_balanced_fraction, find_held, find_sliding_fraction
 
 # Reasons for which a step without equilibrium can fail.
 UNSETTLED = ("iteration limit", "mode cycle", "singular tangent", "no admissible modes")
@@ -76,6 +77,41 @@ def end_at_limit(
         why = some if error.reason == "limit load" else f"{_describe_bound(ceiling.balanced)}; {why}"
     return ConvergenceError(
         "limit load", f"limit load reached at fraction {reached:.6g} of stage {name!r}: {why}; {BEYOND}"
+    )
+
+
+# Joints that carry this part of what their friction holds are named where bodies slide.
+USED_UP = 0.9
+
+
+def find_sliding(
+    problem: Problem, memory: Memory, former: Former | None, stage: int, reached: float, target: float
+) -> float:
+    """The fraction at which bodies slide under the pressures that were reached, as the first rank finds it; infinite if
+    they do not up to the target."""
+    found = problem.decide(lambda: find_sliding_fraction(problem, memory, former, stage, reached, target))
+    return np.inf if found is None or found <= reached else found
+
+
+def end_by_sliding(
+    problem: Problem, memory: Memory, former: Former | None, stage: int, reached: float, slides: float,
+    traction_s: Real,
+) -> ConvergenceError:
+    """The error where friction is used up; traction_s (m,): of the pairs at the fraction that was reached."""
+    held = find_held(problem, memory, former, stage, reached, slides)
+    assert held is not None
+    pairs, names = problem.mesh.pairs, []
+    for number, name in enumerate(problem.mesh.interface_names):
+        own = (pairs.interface == number) & ~pairs.crack
+        most = float(pairs.weight[own] @ held.bound[own])
+        if most > 0 and pairs.weight[own] @ np.abs(traction_s[own]) >= USED_UP * most:
+            names.append(repr(name))
+    where = f" on {', '.join(names)}" if names else ""
+    name = problem.model.stages[stage].name
+    return ConvergenceError(
+        "limit load",
+        f"limit load reached at fraction {reached:.6g} of stage {name!r}: bodies slide{where}, as under the pressures "
+        f"in the contacts friction bears no more than the loads at {slides:.6g}; {BEYOND}",
     )
 
 

@@ -48,6 +48,59 @@ def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -
 
 
 @dataclass(frozen=True)
+class Former:
+    """The step before the last one, in the same stage: its fraction, and the normal tractions of the pairs (m,)."""
+
+    fraction: float
+    normal_traction: Real
+
+
+@dataclass(frozen=True)
+class Held:
+    """What friction and cohesion hold of each pair, stresses >= 0 (m,): at the fraction that was reached, and at the
+    target less that."""
+
+    bound: Real
+    rise: Real
+
+
+def find_held(
+    problem: Problem, memory: Memory, former: Former | None, stage: int, reached: float, target: float
+) -> Held | None:
+    """With the normal tractions that were reached, which go on as from the step before it; None if not known."""
+    loads = [problem.evaluate_load(stage, factor).pressure for factor in (reached, target)]
+    if any(load.any() for load in loads) or any(
+        group.law.find_strongest(group.parameters) is None for group in problem.laws.strengths
+    ):
+        return None
+    friction, cohesion = _find_strongest(problem.laws, memory)
+    bound = cohesion + friction * np.maximum(-memory.normal_traction, 0.0)
+    rise = np.zeros_like(bound)
+    if former is not None and former.fraction < reached:
+        ahead = (target - reached) / (reached - former.fraction)
+        rise = friction * (former.normal_traction - memory.normal_traction) * ahead
+    return Held(bound, np.maximum(rise, -bound))
+
+
+def find_sliding_fraction(
+    problem: Problem, memory: Memory, former: Former | None, stage: int, reached: float, target: float
+) -> float | None:
+    """The fraction of a stage beyond which bodies slide if the pressures in the contacts stay what they are, or go on
+    as from the step before (`former`): forces across the faces may be any there (theory, 57, with their friction as a
+    cohesion). None if none of [reached, target] is such, or if it is not known.
+
+    Pressures are given, as slip under Coulomb's law does not open faces: a bound that leaves them free would let a
+    ring press itself onto its shaft.
+    """
+    held = find_held(problem, memory, former, stage, reached, target)
+    if held is None or not held.bound.any():
+        return None
+    solved = _solve(problem, memory, stage, reached, target, held)
+    share = solved.share if solved else None
+    return None if share is None or share > 1 - ROUNDING else reached + share * (target - reached)
+
+
+@dataclass(frozen=True)
 class _Solved:
     """The largest share of a change of loads that is balanced, None if no share is; certain: whether that is so."""
 
@@ -55,8 +108,11 @@ class _Solved:
     certain: bool
 
 
-def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target: float) -> _Solved | None:
-    """For the change from one fraction of a stage to another one; None where the programme cannot be posed."""
+def _solve(
+    problem: Problem, memory: Memory, stage: int, reached: float, target: float, held: Held | None = None
+) -> _Solved | None:
+    """For the change from one fraction of a stage to another one; None where the programme cannot be posed. held: what
+    bounds the shear tractions in place of friction."""
     mesh, laws = problem.mesh, problem.laws
     finite = np.array([not region.infinite for region in problem.model.regions])
     if laws.count > MOST_PAIRS or not finite.any() or not (~mesh.pairs.crack).any():
@@ -72,7 +128,7 @@ def _solve(problem: Problem, memory: Memory, stage: int, reached: float, target:
     size = max(np.abs(before).max(), np.abs(after).max())
     if not size > 0:
         return _Solved(1.0, True)
-    return _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size)
+    return _maximise(problem, memory, loads, matrix, before / size, (after - before) / size, size, held)
 
 
 def _sum_up(
@@ -110,7 +166,7 @@ def _sum_up(
 
 def _maximise(
     problem: Problem, memory: Memory, loads: list[Load], matrix: sparse.csr_matrix, constant: Real, change: Real,
-    size: float,
+    size: float, held: Held | None,
 ) -> _Solved:
     """The largest share of the change that is balanced (theory, 57).
 
@@ -149,6 +205,8 @@ def _maximise(
         (build([(one, at_s), (friction, at_n), (inside * rise, last)]), cohesion / scale - inside * pressure),
         (build([(-one, at_s), (friction, at_n), (inside * rise, last)]), cohesion / scale - inside * pressure),
     ]
+    if held is not None:
+        bounds = [(build([(sign * one, at_s), (-held.rise / scale, last)]), held.bound / scale) for sign in (1, -1)]
     above = sparse.vstack([rows[own] for rows, _ in bounds])
     most = np.concatenate([values[own] for _, values in bounds])
     low[at_s[parted]] = high[at_s[parted]] = 0.0

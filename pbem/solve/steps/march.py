@@ -21,7 +21,18 @@ from pbem.solve.problem.step import ContactState, Step, Supervisor, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.steps.attempt import Attempt, take_up
 from pbem.solve.steps.ceiling import SAFE, Ceiling
-from pbem.solve.steps.ends import end_at_limit, end_at_rest, end_march, find_balanced, find_reason, refuse_load
+from pbem.solve.steps.ends import (
+    UNSETTLED,
+    end_at_limit,
+    end_at_rest,
+    end_by_sliding,
+    end_march,
+    find_balanced,
+    find_reason,
+    find_sliding,
+    refuse_load,
+)
+from pbem.solve.steps.limit_load import Former
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.steps.softly import solve_softly
@@ -47,6 +58,14 @@ class Start:
     factor: float
     memory: Memory
     contact: ContactState
+
+
+@dataclass(frozen=True)
+class Course:
+    """Of the state that a step begins with: the step before it in its stage, if any, and the shear tractions (m,)."""
+
+    former: Former | None
+    traction_s: Real
 
 
 def start_from_rest(problem: Problem) -> Start:
@@ -93,12 +112,14 @@ def march(
                 memory = begin_stage(whole, stage, memory, contact)
             if reached < 1.0:
                 problem, tangent = arranged.enter(stage, reached, contact)
-            ceiling = Ceiling()
+            ceiling, former = Ceiling(), None
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
                 attempt = take_up(unfinished, stage, reached, planned, type(tangent).__name__) or Attempt(ceiling)
+                course = Course(former, contact.traction_s)
+                former = Former(reached, memory.normal_traction)
                 solution, reached, ceiling = _advance(
-                    problem, tangent, memory, stage, reached, planned, attempt, reporter, guess
+                    problem, tangent, memory, stage, reached, planned, attempt, reporter, guess, course
                 )
                 unfinished = None
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
@@ -130,15 +151,22 @@ def free_at_last(problem: Problem, steps: Iterator[Step]) -> Iterator[Step]:
 
 def _advance(
     problem: Problem, tangent: TangentOperator, memory: Memory, stage: int, reached: float, planned: float,
-    attempt: Attempt, reporter: Supervisor, guess: Guess | None,
+    attempt: Attempt, reporter: Supervisor, guess: Guess | None, course: Course,
 ) -> tuple[Solution, float, Ceiling]:
     """One converged step towards the planned fraction of the stage; returns it, the fraction reached, and the ceiling.
 
     Raises ConvergenceError: of the last try, or "limit load".
     """
     least, ceiling, kind = problem.model.solver.min_step, attempt.ceiling, type(tangent).__name__
-    if attempt.target is None and ceiling.error is not None and ceiling.is_reached(reached, planned, least):
-        raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
+    if attempt.target is None and ceiling.slides < np.inf:  # with the pressures that are known now
+        ceiling = replace(ceiling, slides=find_sliding(problem, memory, course.former, stage, reached, 1.0))
+        attempt = replace(attempt, ceiling=ceiling)
+    if attempt.target is None and ceiling.error is not None:
+        if ceiling.is_reached(reached, planned, least):
+            raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
+        if course.former is not None and ceiling.is_sliding(reached, planned, least):
+            raise end_by_sliding(
+                problem, memory, course.former, stage, reached, ceiling.slides, course.traction_s)
     attempt = attempt.aim(ceiling.choose(reached, planned, least))
     proportional = cache(lambda: is_proportional(problem, memory, stage, reached))  # what a right guess never asks
     while True:
@@ -147,7 +175,7 @@ def _advance(
         with attempt.note_try(stage, reached, memory.modes, kind):
             reporter.start_step(stage, reached, target)
         refuse_without_value(problem, stage, reached, target)
-        load, hurried = problem.evaluate_load(stage, target), ceiling.balanced < np.inf
+        load, hurried = problem.evaluate_load(stage, target), min(ceiling.balanced, ceiling.slides) < np.inf
         begin = replace(memory, duration=problem.model.stages[stage].duration * (target - reached))
         try:
             with attempt.note_try(stage, reached, memory.modes, kind):
@@ -161,7 +189,10 @@ def _advance(
         except ConvergenceError as failure:
             error = find_reason(problem, memory, stage, target, failure)
             balanced = find_balanced(problem, memory, stage, reached, target)
-            if balanced >= target and not hurried:
+            slides = np.inf
+            if balanced >= target and error.reason in UNSETTLED and not proportional():
+                slides = find_sliding(problem, memory, course.former, stage, reached, 1.0)
+            if balanced >= target and not hurried and slides > target:
                 softly = attempt.find_phase("softly")
                 with (
                     attempt.note_try(stage, reached, memory.modes, kind),
@@ -176,10 +207,14 @@ def _advance(
                     ceiling = ceiling.lower(target, balanced, error)
                     raise end_at_limit(problem, stage, reached, ceiling, error) from failure
                 raise end_at_rest(problem, stage, target, error) from failure
-            ceiling = ceiling.lower(target, balanced, error)
+            ceiling = replace(ceiling.lower(target, balanced, error), slides=slides)
             if ceiling.is_reached(reached, target, least):
                 raise end_at_limit(problem, stage, reached, ceiling, error) from failure
-            half = SAFE * (balanced - reached) if balanced < target else 0.5 * (target - reached)
+            if course.former is not None and ceiling.is_sliding(reached, target, least):
+                raise end_by_sliding(
+                    problem, memory, course.former, stage, reached, slides, course.traction_s) from failure
+            lowest = min(balanced, slides)
+            half = SAFE * (lowest - reached) if lowest < target else 0.5 * (target - reached)
             if half < least:
                 raise end_march(problem, memory, stage, reached, target, error) from failure
             reporter.reject(error.reason, error.detail)

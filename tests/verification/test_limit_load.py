@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -269,3 +271,49 @@ def test_rigid_tools_bear_what_holds_them_and_no_more_than_forces_give(
         }
     )  # fmt: skip
     assert find(text) == pytest.approx(0.25 / 0.7, rel=1e-2)
+
+
+def write_press_fit(beyond: float, unit: float, stress: float, steps: int, law: dict[str, float]) -> tuple[str, float]:
+    """A ring shrunk on a shaft, then turned by so many times the torque that their joint bears (Lame: uniform pressure
+    p, torque 2 pi r^2 (friction p + cohesion)), and the fraction of the turn that is the limit."""
+    inner, radius, outer, depth, young, poisson = 8.0, 30.0, 55.0, 0.021, 205000.0 * stress, 0.29
+    flexible = (outer**2 + radius**2) / (outer**2 - radius**2) + (radius**2 + inner**2) / (radius**2 - inner**2)
+    pressure = young * depth / (radius * flexible)
+    cohesion = law.get("cohesion", 0.0) * pressure
+    torque = 2 * math.pi * (radius * unit) ** 2 * (law["friction"] * pressure + cohesion)
+    center = [412.5 * unit, -77.25 * unit]
+    circles = {"hub": (inner, 16), "fit": (radius, 32), "out": (outer, 24)}
+    turn = {name: {"force": {"moment": sign * beyond * torque}} for name, sign in (("hub", 1.0), ("out", -1.0))}
+    rest = {name: {"force": {"moment": 0.0, "how": "linear"}} for name in turn}
+    return write_case({
+        "materials": {"m": {"young": young, "poisson": poisson, "plane": "stress"}},
+        "curves": {name: {"center": center, "radius": r * unit, "elements": n} for name, (r, n) in circles.items()},
+        "regions": {"shaft": {"material": "m", "boundary": ["hub", "fit"]},
+                    "ring": {"material": "m", "boundary": ["fit", "out"]}},
+        "interfaces": {"fit": {"law": "coulomb", "gap": -depth * unit, **law, "cohesion": cohesion}},
+        "boundary": rest,
+        "stages": [{"name": "fit", "steps": 1}, {"name": "turn", "steps": steps, "boundary": turn}],
+    }), 1 / beyond  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("beyond", "unit", "stress", "steps", "law"),
+    [
+        (1.25, 1.0, 1.0, 4, {"friction": 0.15}),
+        (3.0, 1e-3, 1e6, 1, {"friction": 0.4}),
+        (1.07, 1.0, 1e-3, 3, {"friction": 0.1, "cohesion": 0.2}),
+    ],
+)
+def test_a_ring_slips_on_its_shaft_at_the_torque_of_friction(
+    beyond: float, unit: float, stress: float, steps: int, law: dict[str, float]
+) -> None:
+    text, limit = write_press_fit(beyond, unit, stress, steps, law)
+    model = parse_model(text)[1]
+    listener = Listener()
+    problem = assemble_problem(model, generate_mesh(model), world)
+    with pytest.raises(ConvergenceError, match=r"limit load reached .*(bodies slide on 'fit'|rotation)") as caught:
+        list(march.march(problem, listener))
+    # Where it came to, and where friction was found to be used up, or a body free.
+    found = [float(each) for each in re.findall(r"(?:fraction|loads at|: at) ([0-9.]+)", str(caught.value))]
+    assert found[1] == pytest.approx(limit, rel=2e-3) and 0.97 * found[1] <= found[0] < limit
+    assert listener.tried <= steps + 5 and len(listener.rejected) <= 2

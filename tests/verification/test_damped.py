@@ -80,3 +80,10 @@ def test_walls_settle_or_end_at_a_limit_load(seed: int, tmp_path: Path) -> None:
     assert max(record.iterations, default=0) <= 25
     assert record.wasted <= 25 * (record.halved + 1)
     assert not record.faults
+
+
+def test_smooth_discs_that_nothing_moves_do_not_move_on(tmp_path: Path) -> None:
+    """In holes that open around them they are in equilibrium wherever they lie: only errors of the mesh turn them."""
+    record = run_sample(94169, 0, tmp_path, tuple(KINDS))
+    assert record.status == "settled"
+    assert not record.faults

@@ -6,6 +6,8 @@ rest it soon ends.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbem.contact.complementarity import take_subset
@@ -18,6 +20,7 @@ from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.judging import make_judge
 from pbem.solve.nonlinear.search import GLOBALISATIONS, Search
+from pbem.solve.problem.given import is_driven
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import find_response
 from pbem.solve.problem.tangent import TangentOperator
@@ -50,10 +53,17 @@ def find_damped(problem: Problem, tangent: TangentOperator, begin: Memory, load:
     subset = take_subset(laws, begin, load.pressure, begin.modes, pairs)
     judge = make_judge(problem, solved, GLOBALISATIONS[0])
     before = np.stack([begin.opening, begin.slip], axis=1)
-    return problem.decide(lambda: come_to_rest(
-        subset, response, lambda m, s: judge(laws, m, s, begin, load.pressure),
-        lambda now: not hold.leaves_free(now), before,
-    ))  # fmt: skip
+
+    def follow() -> Damped:
+        found = come_to_rest(
+            subset, response, lambda m, s: judge(laws, m, s, begin, load.pressure),
+            lambda now: not hold.leaves_free(now), before,
+        )  # fmt: skip
+        # Smooth bodies that no load moves are turned by errors of the mesh, where nothing resists that.
+        driven = found.runs is not None and is_driven(problem, load, hold.list_free(found.runs))
+        return found if driven else replace(found, runs=None)
+
+    return problem.decide(follow)
 
 
 def describe_run(problem: Problem, begin: Memory, load: Load, modes: ModeState) -> ConvergenceError:

@@ -253,14 +253,18 @@ def _run_search(
             search.go_on_from_smoothed()
             smoothing.begun = True
             continue
-        late = not cascade and search.asks_for_rest() and can_be_damped(problem, tangent)
-        rest = None if cascade else rest_late(problem, tangent, memory, load, search) if late else find_rest(
-            running, hold, tangent, constraints, modes, memory, load, law, solved, search)
+        rest = None
+        if not cascade and search.asks_for_rest() and can_be_damped(problem, tangent):
+            rest = rest_late(problem, tangent, memory, load, search)
+            if not rest:
+                tangent.solve(constraints, load, law)  # it is asked for responses again
+        if not cascade and not rest:
+            rest = find_rest(running, hold, tangent, constraints, modes, memory, load, law, solved, search)
         chosen = cascade.modes if cascade else rest.modes if rest else None
         # The first rank alone knows which pairs hold a body.
         share = broadcast(problem.comm, max(search.globalisation.share, hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
-        if not cascade and not rest and not late and not (share > search.globalisation.share):
+        if not cascade and not rest and not (share > search.globalisation.share):
             chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
         back = chosen is not None and not rest and search.returns(chosen.fingerprint())
         if back and not go_on_warily(forcing, search):

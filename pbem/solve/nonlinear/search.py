@@ -82,7 +82,7 @@ MOST_WIDENED = 2
 SWEPT = 4
 # After so many iterations it is asked where the contact comes to rest against dashpots; where bodies do not, a search
 # ends after so many.
-LATE, LATEST = 10, 20
+LATE, LATEST = 16, 24
 # Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
 

@@ -190,7 +190,7 @@ def _advance(
             error = find_reason(problem, memory, stage, target, failure)
             balanced = find_balanced(problem, memory, stage, reached, target)
             slides = np.inf
-            if balanced >= target and error.reason in UNSETTLED and not proportional():
+            if balanced >= target and error.reason in (*UNSETTLED, "limit load") and not proportional():
                 slides = find_sliding(problem, memory, course.former, stage, reached, 1.0)
             if balanced >= target and not hurried and slides > target:
                 softly = attempt.find_phase("softly")

@@ -116,7 +116,7 @@ def main() -> int:
             map(int, options.seeds.split(",")), map(int, options.ranks.split(","))]  # fmt: skip
     settings = list(itertools.product(*axes))
     rows: list[dict] = []
-    waiting = {ranks: Ranks(ranks) for *_, ranks in settings if ranks > 1}
+    waiting = {ranks: Ranks(ranks) for ranks in {setting[-1] for setting in settings} if ranks > 1}
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
             cells = []

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -91,11 +93,24 @@ def grade_ends(model: Model, ends: Sequence[ContactEnd]) -> Model:
     ends = [end for end in ends if end.located]
     for name in {name: None for end in ends for name in end.curves}:
         own = [end for end in ends if name in end.curves]
-        curves[name] = _divide_curve(model.curves[name], own, growth)
+        curves[name] = divide_curve(model.curves[name], own, growth)
     return replace(model, curves=curves)
 
 
-def _divide_curve(curve: Curve, ends: Sequence[ContactEnd], growth: float) -> Curve:
+class _Place(Protocol):
+    """See ContactEnd."""
+
+    @property
+    def place(self) -> complex: ...
+    @property
+    def shortest(self) -> float: ...
+    @property
+    def window(self) -> float: ...
+
+
+def divide_curve(curve: Curve, ends: Sequence[_Place], growth: float) -> Curve:
+    """The curve with elements halved until none is longer than `shortest` within the window of a place, and beyond
+    than `growth` times the distance more."""
     at = np.array([_find_arc_length(curve, end.place) for end in ends])[:, None]
     shortest = np.array([end.shortest for end in ends])[:, None]
     window = np.array([end.window for end in ends])[:, None]

@@ -14,6 +14,7 @@ from pbem.model.model import Region
 from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
 from pbem.model.slot import SlotSide
+from pbem.model.tangency import Tangency, find_tangencies, grade_tangencies
 from pbem.wording import list_names
 
 # Curves and corners that are named in one note.
@@ -33,7 +34,7 @@ class FittedCurves:
 
 def fit_curves(
     case: Case, curves: Mapping[str, Curve], regions: Sequence[Region], tips: Mapping[str, tuple[bool, bool]],
-    jointed: frozenset[str],
+    jointed: frozenset[str], contacts: Mapping[str, tuple[str, str]],
 ) -> FittedCurves:
     """Divide curves anew where their elements are too long for the faces around them.
 
@@ -50,8 +51,33 @@ def fit_curves(
     if sizes.excess is not None:
         return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
-    notes = [*_note_added(curves, sizes.curves), *_note_ties(ties), *_note_long(sizes.long)]
-    return FittedCurves(sizes.curves, ties, tuple(notes), ())
+    graded, near = _grade_contacts(case, sizes.curves, contacts)
+    notes = [*_note_added(curves, sizes.curves), *near, *_note_ties(ties), *_note_long(sizes.long)]
+    return FittedCurves(graded, ties, tuple(notes), ())
+
+
+def _grade_contacts(
+    case: Case, curves: Mapping[str, Curve], contacts: Mapping[str, tuple[str, str]]
+) -> tuple[Mapping[str, Curve], list[str]]:
+    """Shorter elements where the rounded faces of contacts are nearest, unless the grading of a curve is the user's."""
+    at: dict[str, list[Tangency]] = {}
+    for pair in contacts.values():
+        free = [each for each in pair if each not in case.tools]
+        tables = [case.curves[each] for each in free]
+        if all(each in curves for each in pair) and all(t.grading == "auto" and not t.expression for t in tables):
+            found = list(find_tangencies(*(curves[each] for each in pair)))
+            for each in free:
+                at.setdefault(each, []).extend(found)
+    graded = grade_tangencies(curves, at)
+    return graded, _note_near(curves, graded)
+
+
+def _note_near(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list[str]:
+    old, new = count_elements(before), count_elements(after)
+    named = [f"'{name}' {old[name]} to {new[name]}" for name in new if new[name] != old[name]]
+    if not named:
+        return []
+    return [f"Elements added where rounded faces in contact are nearest: {list_names(named, MOST_NAMED)}."]
 
 
 def _refuse(excess: Excess) -> Fault:

@@ -1,0 +1,100 @@
+"""Rounded bodies that touch over less than an element as the file asks for it: Hertz's line contact, for light loads.
+
+The largest pressure is p = sqrt(N E*/(pi R)), 1/E* the sum of (1 - nu^2)/E of both bodies (Johnson, Contact mechanics,
+1985, eq. 4.45): it follows from the force alone, however that comes about.
+"""
+
+import cmath
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.results.reader import Results
+
+TOP, LOW, DISC = 3.0, 1.0, 0.7
+NU = {"top": 0.3, "low": 0.2, "disc": 0.35}
+
+
+def _make(
+    approach: float, unit: float = 1.0, modulus: float = 1.0, turn: float = 0.0, shift: complex = 0j,
+    where: float = 0.0, elements: int = 16, scheme: str = "SST", friction: float = 0.4,
+) -> dict[str, Any]:
+    """A disc of radius 1 between two blocks of 4 x 2, of which the upper one comes down by an approach."""
+
+    def move(*points: complex) -> list[list[float]]:
+        moved = [shift + unit * cmath.exp(1j * turn) * z for z in points]
+        return [[z.real, z.imag] for z in moved]
+
+    def draw(*points: complex, of: int = 8) -> dict[str, Any]:
+        return {"points": move(*points), "elements": of}
+
+    degrees = math.degrees(turn)
+    center = where + 1j
+    down = -1j * cmath.exp(1j * turn) * approach * unit
+    return {
+        "materials": {name: {"young": modulus * young, "poisson": NU[name]}
+                      for name, young in (("top", TOP), ("low", LOW), ("disc", DISC))},
+        "curves": {
+            "base": draw(-2 - 2j, 2 - 2j), "right": draw(2 - 2j, 2 + 0j), "face": draw(2 + 0j, -2 + 0j),
+            "left": draw(-2 + 0j, -2 - 2j),
+            "under": {"center": move(center)[0], "radius": unit, "angles": [180 + degrees, 360 + degrees],
+                      "elements": elements},
+            "over": {"center": move(center)[0], "radius": unit, "angles": [degrees, 180 + degrees],
+                     "elements": elements},
+            "ceiling": draw(-2 + 2j, 2 + 2j), "right_top": draw(2 + 2j, 2 + 4j), "lid": draw(2 + 4j, -2 + 4j),
+            "left_top": draw(-2 + 4j, -2 + 2j),
+        },
+        "regions": {
+            "low": {"material": "low", "boundary": ["base", "right", "face", "left"]},
+            "disc": {"material": "disc", "boundary": ["under", "over"]},
+            "top": {"material": "top", "boundary": ["ceiling", "right_top", "lid", "left_top"]},
+        },
+        "contacts": {"below": {"between": ["under", "face"], "friction": friction},
+                     "above": {"between": ["over", "ceiling"], "friction": friction}},
+        "boundary": {"base": {"ux": 0.0, "uy": 0.0}, "lid": {"ux": down.real, "uy": down.imag}},
+        "analysis": {"steps": 1, "scheme": scheme},
+    }  # fmt: skip
+
+
+def _compare(results: Results, unit: float, modulus: float) -> tuple[float, list[float]]:
+    """The force a unit of length, and the largest pressures of both contacts by those that Hertz gives for it."""
+    force = abs(complex(*results.reactions["lid"][-1]))
+    ratios = []
+    for name, body, young in (("below", "low", LOW), ("above", "top", TOP)):
+        compliance = (1 - NU[body] ** 2) / young + (1 - NU["disc"] ** 2) / DISC
+        expected = math.sqrt(force * modulus / compliance / (math.pi * unit))
+        ratios.append(float(-results.contact[name].traction_n[-1].min()) / expected)
+    return force, ratios
+
+
+@pytest.mark.parametrize("scheme", ["SST", "DBEM", "HST", "THST"])
+@pytest.mark.parametrize("approach", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_a_disc_between_blocks(approach: float, scheme: str, tmp_path: Path) -> None:
+    results = pbem.run(_make(approach, scheme=scheme), output=tmp_path / "disc.h5")
+    force, ratios = _compare(results, 1.0, 1.0)
+    assert 0.04 * approach < force < 0.1 * approach
+    # Of a peak that is flat, in nodes at most a quarter of the half-width away from it.
+    assert np.allclose(ratios, 1.0, atol=0.05)
+
+
+@pytest.mark.parametrize(("unit", "modulus", "turn", "shift", "where", "elements"), [
+    (1e-3, 2e11, 0.4, 1 - 2j, 0.31, 12), (40.0, 3e3, -1.2, -900 + 300j, -0.77, 24), (1e4, 1e-2, 3.0, 0j, 0.05, 33),
+])  # fmt: skip
+@pytest.mark.parametrize("approach", [3e-5, 7e-4])
+def test_it_elsewhere(
+    approach: float, unit: float, modulus: float, turn: float, shift: complex, where: float, elements: int,
+    tmp_path: Path,
+) -> None:
+    case = _make(approach, unit, modulus, turn, shift, where, elements)
+    _, ratios = _compare(pbem.run(case, output=tmp_path / "disc.h5"), unit, modulus)
+    assert np.allclose(ratios, 1.0, atol=0.05)
+
+
+def test_an_untouched_disc_is_not_pressed(tmp_path: Path) -> None:
+    """The lid goes up: nothing presses, and that is told."""
+    results = pbem.run(_make(-1e-4), output=tmp_path / "disc.h5")
+    assert abs(complex(*results.reactions["lid"][-1])) < 1e-12

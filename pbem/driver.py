@@ -198,7 +198,7 @@ def _refine_and_solve(
             watch.note(planned.note)
         if planned is None or planned.model is model:
             return
-        model, graded, kept = planned.model, graded + 1, None
+        model, graded, kept, watch.most = planned.model, graded + 1, None, planned.most
 
 
 def _solve(

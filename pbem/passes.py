@@ -28,6 +28,9 @@ MOST_ITERATIONS = 400
 MOST_GRADED = 3
 MOST_GROWN = 4
 STILL_COARSE = 0.05
+# A pass that was not asked for is given up at a step that is to be halved after so many times the iterations of the
+# former one, and so many more.
+PATIENCE, FIRST_PATIENCE = 2, 40
 # So many places are named.
 MOST_NAMED = 3
 
@@ -43,10 +46,14 @@ class Target:
 
 @dataclass(frozen=True)
 class Finer:
-    """A model with shorter elements where contacts did not settle, or end, and a sentence that says so."""
+    """A model with shorter elements where contacts did not settle, or end, and a sentence that says so.
+
+    most: iterations after which the run on it is given up where it comes to halve a step; None for any number.
+    """
 
     model: Model
     note: str
+    most: int | None = None
 
 
 def plan_finer(
@@ -112,7 +119,8 @@ def plan_graded(
         f"{where}, where the pressure falls like a root. Elements are graded towards these ends, "
         f"{after} in place of {before}, and the run starts again from rest.{left}"
     )
-    return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note)
+    most = FIRST_PATIENCE + PATIENCE * iterations if model.analysis.grade_contact_ends == "auto" else None
+    return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note, most)
 
 
 def _name_ends(model: Model, ends: Sequence[ContactEnd]) -> str:

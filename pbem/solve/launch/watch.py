@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from pbem.contact.custom import CustomLaw, find_fault
 from pbem.contact.laws import PairLaws
-from pbem.errors import LawError, StopError
+from pbem.errors import ConvergenceError, LawError, StopError
 from pbem.model.model import Model
 from pbem.parallel import StopSignals
 from pbem.solve.problem.step import Iteration, Reporter, Step
@@ -24,7 +24,8 @@ class Watch:
     """A reporter that hands all on to another (of the first rank), and then looks after signals and laws.
 
     Calls raise StopError or LawError, on all ranks alike. iterations: since the pass began, those of tries that failed
-    as well.
+    as well. most: a pass that comes to halve a step after more of them ends with ConvergenceError ("iteration limit"),
+    as it is not worth more; None for as many as it takes.
     """
 
     def __init__(self, comm: MPI.Intracomm, listener: Reporter, signals: StopSignals) -> None:
@@ -33,6 +34,7 @@ class Watch:
         self._signals = signals
         self._laws: tuple[CustomLaw, ...] = ()
         self.iterations = 0
+        self.most: int | None = None
 
     def look_after(self, laws: PairLaws) -> None:
         """From now on, see whether these laws fail or answer differently on different ranks."""
@@ -77,8 +79,10 @@ class Watch:
         self._tell("accept", step)
 
     def reject(self, reason: str, detail: str) -> None:
-        """Check, and hand on."""
+        """Check, and hand on; or end the pass."""
         self.check()
+        if self.most is not None and self.iterations > self.most:
+            raise ConvergenceError("iteration limit", f"more than {self.most} iterations, and {reason}: {detail}")
         self._tell("reject", reason, detail)
 
     def _tell(self, method: str, *arguments: object) -> None:

@@ -30,9 +30,13 @@ def find_case(name: str) -> Path:
 
 
 def locate(source: str | os.PathLike[str]) -> Path:
-    """The path of a file, or of a case of the program where there is no file but one of that name among them."""
+    """The path of a file, or of a case of the program where there is no file but one of that name among them.
+
+    What is written as a path, or with a suffix, means a file: mistyped it must not become another problem.
+    """
     path = Path(source)
-    return path if os.path.isfile(path) else find_bundled(str(source)) or path
+    named = isinstance(source, str) and not source.endswith(".toml") and not os.path.isfile(path)
+    return (find_bundled(source) if named else None) or path  # type: ignore[arg-type]
 
 
 def find_bundled(name: str) -> Path | None:

@@ -193,7 +193,7 @@ def _refine_and_solve(
         if decision.marked is not None:
             model = refine_marked(model, decision)
             continue
-        planned = plan_graded(model, decision.ends, graded, 2 * mesh.nodes, watch.iterations)
+        planned = plan_graded(model, decision.ends, graded, 2 * mesh.nodes, watch.iterations, bool(kept))
         if planned:
             watch.note(planned.note)
         if planned is None or planned.model is model:

@@ -9,7 +9,7 @@ from pathlib import Path
 from pbem.errors import ConvergenceError, PbemError
 from pbem.geometry.junction import format_point
 from pbem.mesh.generate import generate_mesh
-from pbem.model.end_grading import MOST_UNKNOWNS, ContactEnd, grade_ends, is_too_large
+from pbem.model.end_grading import MOST_UNKNOWNS, ContactEnd, grade_ends
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions, bisect_elements, count_elements, impose_fractions, mark_near
 from pbem.results.accuracy import Pass
@@ -82,28 +82,32 @@ def plan_finer(
 
 
 def plan_graded(
-    model: Model, ends: Sequence[ContactEnd], graded: int, unknowns: int = 0, iterations: int = 0
+    model: Model, ends: Sequence[ContactEnd], graded: int, unknowns: int = 0, iterations: int = 0, shared: bool = False
 ) -> Finer | None:
     """The model with elements graded towards the ends of contact, or as it is with the reason in the note; None if
-    there is nothing to be graded. graded: how often that was done; unknowns, iterations: of this pass."""
+    there is nothing to be graded. graded: how often that was done; unknowns, iterations: of this pass; shared: other
+    runs have the same mesh, which is left as it is unless grading is asked for."""
     ends = [end for end in ends if end.fall > STILL_COARSE or not graded]
-    if not ends:
+    auto = model.analysis.grade_contact_ends == "auto"
+    if not ends or (auto and shared):
         return None
     where = _name_ends(model, ends)
-    long = model.analysis.grade_contact_ends == "auto" and iterations > MOST_ITERATIONS
-    if long or is_too_large(model, unknowns):
-        what = f"{iterations} iterations" if long else f"{unknowns} unknowns"
-        return Finer(model, f"{where}, within elements that are long for the fall of the pressure there; they are not "
-                            f"graded, as the run took {what}: analysis.grade_contact_ends = true does.")  # fmt: skip
-    if graded >= MOST_GRADED:
+    finer = grade_ends(model, ends)
+    before, after = _count_all(model), _count_all(finer)
+    # What is not asked for must not cost more than a user would wait for.
+    large = auto and unknowns * after > MOST_UNKNOWNS * before
+    long = auto and iterations > MOST_ITERATIONS
+    if graded >= MOST_GRADED or (graded and (large or long)):
         fall = f"{max(end.fall for end in ends):.0%} of the largest pressure"
         return Finer(model, f"{where}, within elements over which the pressure still falls by {fall}: they were graded "
-                            f"{count(MOST_GRADED, 'time')}.")  # fmt: skip
+                            f"{count(graded, 'time')}.")  # fmt: skip
+    if large or long:
+        what = f"took {iterations} iterations" if long else f"would have {unknowns * after // before} unknowns"
+        return Finer(model, f"{where}, within elements that are long for the fall of the pressure there; they are not "
+                            f"graded, as the run {what}: analysis.grade_contact_ends = true does.")  # fmt: skip
     lost = [end for end in ends if not end.located]
     left = f" {_name_ends(model, lost)}: where in the elements there is not known, they are left as they are."
     left = left if lost else ""
-    finer = grade_ends(model, ends)
-    before, after = _count_all(model), _count_all(finer)
     if after == before:
         return Finer(model, left.strip()) if lost else None
     where = _name_ends(model, [end for end in ends if end.located])

@@ -17,7 +17,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.complementarity import Response, Subset, find_compliance, pose, solve_in_modes
-from pbem.contact.laws import ModeState, PairState, plastic_slip
+from pbem.contact.laws import OPEN, ModeState, PairState, plastic_slip
 from pbem.contact.modes import Proposal, measure_law_error
 from pbem.contact.running import NEAR, Rest
 from pbem.contact.subset import settle_subset
@@ -29,6 +29,8 @@ SCHEDULES = ((0.1, 0.1, 12), (1.0, 0.4, 30))
 SOFTEST = 1e-4
 # A motion goes on steadily if it grows as 1 / k but for this part, so many times in turn.
 STEADY, IN_TURN = 0.05, 2
+# What open faces come nearer by, of the largest motion, that is none.
+APPROACH = 1e-6
 # Problems of contact at most, of so many pairs, as in pbem.contact.running; of more pairs fewer. Friction that changes
 # with slip is taken at the slips of the problem before, in one instant so often at most.
 MOST_SOLVED, OF_PAIRS, MOST_TAKEN = 1000, 100, 100
@@ -77,7 +79,7 @@ def come_to_rest(
             moved, same = present.values[:, 2:] - jumps, now.fingerprint() == modes.fingerprint()
             off = np.abs(moved - motion / part).max(initial=0.0)
             # What holds the bodies resists only once it has been strained.
-            goes_on = same and not held and off <= STEADY * np.abs(moved).max(initial=0.0)
+            goes_on = same and not held and off <= STEADY * np.abs(moved).max(initial=0.0) and not _closes(now, moved)
             steady = steady + 1 if goes_on else 0
             if steady == IN_TURN:
                 break
@@ -86,6 +88,11 @@ def come_to_rest(
             return Damped(None, None, instants)
         runs = modes
     return Damped(None, runs, instants)
+
+
+def _closes(modes: ModeState, moved: Real) -> bool:
+    """Whether a motion g_n, g_s (s, 2) brings open faces nearer to each other: if it goes on, they stop it."""
+    return bool((moved[modes.mode == OPEN, 0] < -APPROACH * np.abs(moved).max(initial=0.0)).any())
 
 
 def _is_sound(subset: Subset, damped: Response) -> bool:

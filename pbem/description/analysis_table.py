@@ -34,5 +34,5 @@ class AnalysisTable(Table):
         description="where contact of rounded faces ends within an element that is too long for the fall of the "
         "pressure there, shorten the elements of both curves towards that end and solve again from rest; contacts one "
         'of whose curves has a `grading` other than `"auto"` are left as they are; `"auto"`: not beside `accuracy`, '
-        "nor in large models; see `pbem help accuracy`",
+        "nor in large models and sweeps; see `pbem help accuracy`",
     )

@@ -23,7 +23,6 @@ from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.end_grading import may_be_graded
 from pbem.model.model import Model, Operator
 from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
@@ -317,12 +316,13 @@ def compute_case(
     try:
         with clock.piece("reading"):
             model = do_on_first(comm, PbemError, lambda: _make_model(setting, values))
-        whole = setting.keep is not None or model.analysis.accuracy is not None
-        with clock.piece("reading"):
-            mesh = None if whole else _mesh(setting, model)
-        if mesh is None or may_be_graded(model, 2 * mesh.nodes):
+        # Ends of contact are graded where that is asked for: cases share operators, and a mesh, but for that.
+        asked = model.analysis.accuracy is not None or model.analysis.grade_contact_ends is True
+        if setting.keep is not None or asked:
             _run_with_file(setting, values, outcome, kept)
         else:
+            with clock.piece("reading"):
+                mesh = _mesh(setting, model)
             _solve(model, mesh, setting, outcome, columns, kept, signals, place)
     except CaseError as error:
         status, reason = "refused", "; ".join(str(fault) for fault in error.faults)

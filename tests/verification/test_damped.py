@@ -9,11 +9,14 @@ import pytest
 
 from pbem.case.build import parse_model
 from pbem.contact.damped import Damped
-from pbem.contact.laws import SLIP, STICK, commit, plastic_slip, start_memory
+from pbem.contact.laws import SLIP, STICK, Memory, commit, plastic_slip, start_memory
+from pbem.contact.loads import Load
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
 from pbem.solve.nonlinear.damped import can_be_damped, describe_run, find_damped
 from pbem.solve.nonlinear.newton import Solution, solve_step
+from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.system.assembly import assemble_problem
 from scripts.torture.kinds import KINDS
 from scripts.torture.runs import run_sample
@@ -21,19 +24,24 @@ from tests.verification.test_limit_load import write_pushed_block
 from tests.verification.test_settling import Listener
 
 
+def begin(text: str) -> tuple[Problem, TangentOperator, Memory, Load]:
+    """A case whose first stage is solved, and the load of its second one."""
+    model = parse_model(text)[1]
+    problem = assemble_problem(model, generate_mesh(model), world)
+    tangent, memory = problem.make_tangent(), start_memory(problem.laws)
+    pressed, pushed = problem.evaluate_load(0, 1.0), problem.evaluate_load(1, 1.0)
+    done = solve_step(problem, tangent, memory, pressed, Listener())
+    return problem, tangent, commit(problem.laws, done.memory, done.modes, done.pairs, pressed.pressure), pushed
+
+
 def push(shear: float, law: dict[str, float], unit: float = 1.0, shift: float = 0.0,
          own: bool = False) -> tuple[Damped, Solution | None, str]:
     """Where the block rests that was pressed and is pushed; with its solution (own), and what moves on."""
-    model = parse_model(write_pushed_block(shear, law, unit, shift))[1]
-    problem, listener = assemble_problem(model, generate_mesh(model), world), Listener()
-    tangent, memory = problem.make_tangent(), start_memory(problem.laws)
-    pressed, pushed = problem.evaluate_load(0, 1.0), problem.evaluate_load(1, 1.0)
-    done = solve_step(problem, tangent, memory, pressed, listener)
-    memory = commit(problem.laws, done.memory, done.modes, done.pairs, pressed.pressure)
+    problem, tangent, memory, pushed = begin(write_pushed_block(shear, law, unit, shift))
     assert can_be_damped(problem, tangent)
     found = find_damped(problem, tangent, memory, pushed)
     assert found is not None
-    solution = solve_step(problem, tangent, memory, pushed, listener) if own else None
+    solution = solve_step(problem, tangent, memory, pushed, Listener()) if own else None
     if solution and found.rest:
         np.testing.assert_allclose(found.rest.slip, plastic_slip(problem.laws, solution.pairs), atol=1e-8 * unit)
     return found, solution, describe_run(problem, memory, pushed, found.runs).detail if found.runs else ""
@@ -71,6 +79,51 @@ def test_a_block_moves_on_beyond_the_largest_push(
     if "friction_dynamic" not in law:
         below, _, _ = push(0.97 * largest, law, unit)
         assert below.rest is not None
+
+
+WALL = """
+stages = [
+    {{ name = "press", steps = 1, boundary = {{ top = {{ tx = 0.0, ty = -1.0 }} }} }},
+    {{ name = "push", steps = 1, boundary = {{ top = {{ tx = 0.4, ty = -1.0 }} }} }},
+]
+[materials]
+m = {{ young = {young}, poisson = 0.3 }}
+[curves]
+joint = {{ points = [[0, 0], [2, 0]], elements = 8 }}
+right = {{ points = [[2, 0], [2, 1]], elements = 4 }}
+top = {{ points = [[2, 1], [0, 1]], elements = 6 }}
+left = {{ points = [[0, 1], [0, 0]], elements = 4 }}
+seat = {{ points = [[-1, -1], [5, -1]], elements = 8 }}
+b1 = {{ points = [[-1, 0], [-1, -1]], elements = 3 }}
+b2 = {{ points = [[5, -1], [5, 0]], elements = 3 }}
+s0 = {{ points = [[0, 0], [-1, 0]], elements = 3 }}
+s1 = {{ points = [[5, 0], [2, 0]], elements = 6 }}
+w0 = {{ points = [[{near}, 0.1], [{near}, 0.9]], elements = 4 }}
+w1 = {{ points = [[{near}, 0.9], [{far}, 0.9], [{far}, 0.1], [{near}, 0.1]], elements = 8 }}
+[regions]
+upper = {{ material = "m", boundary = ["joint", "right", "top", "left"] }}
+base = {{ material = "m", boundary = ["seat", "b2", "s1", "joint", "s0", "b1"] }}
+wall = {{ material = "m", boundary = ["w1", "w0"] }}
+[boundary]
+seat = {{ ux = 0.0, uy = 0.0 }}
+w1 = {{ ux = 0.0, uy = 0.0 }}
+top = {{ tx = 0.0, ty = -1.0 }}
+[interfaces]
+joint = {{ law = "coulomb", friction = 0.2 }}
+[contacts]
+stop = {{ between = ["right", "w0"] }}
+"""
+
+
+@pytest.mark.parametrize(("young", "gap"), [(1e4, 0.1), (1e5, 0.1), (2e6, 0.01), (2e6, 1e-3), (2e7, 0.3)])
+def test_a_block_slides_as_far_as_a_wall(young: float, gap: float) -> None:
+    """However far that is beside its strains: it comes to rest there."""
+    problem, tangent, memory, load = begin(WALL.format(young=young, near=2 + gap, far=3 + gap))
+    found = find_damped(problem, tangent, memory, load)
+    assert found is not None and found.runs is None
+    assert found.rest is not None
+    # The block loses contact with its joint nowhere, and all of it slides to the wall.
+    assert np.abs(found.rest.slip).max() == pytest.approx(gap, rel=0.1 + 10 / (young * gap))
 
 
 @pytest.mark.parametrize("seed", [91448, 93152, 81044, 70100])

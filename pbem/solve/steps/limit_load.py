@@ -67,7 +67,10 @@ class Held:
 def find_held(
     problem: Problem, memory: Memory, former: Former | None, stage: int, reached: float, target: float
 ) -> Held | None:
-    """With the normal tractions that were reached, which go on as from the step before it; None if not known."""
+    """With the normal tractions that were reached, which go on as from the step before it; None if not known, and where
+    faces part as they slip, which presses them together."""
+    if any(group.law.dilates for group in problem.laws.strengths):
+        return None
     loads = [problem.evaluate_load(stage, factor).pressure for factor in (reached, target)]
     if any(load.any() for load in loads) or any(
         group.law.find_strongest(group.parameters) is None for group in problem.laws.strengths

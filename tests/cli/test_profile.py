@@ -137,7 +137,10 @@ def test_a_wrong_case_has_no_profile(folder: Path) -> None:
 
 
 def test_a_run_that_does_not_converge_has_one(folder: Path) -> None:
-    (folder / "blocks.toml").write_text(BLOCKS + "[solver]\nnewton_max_iterations = 1\nmin_step = 0.5\n")
+    # A push of its pressure, of which friction bears a fifth.
+    pushed = BLOCKS.replace("ux = 0.0\nuy = -0.01", "tx = 0.0\nty = -1.0").replace("ux = 0.02\nuy = -0.01", "tx = 1.0")
+    assert "tx = 1.0" in pushed and "ty = -1.0" in pushed
+    (folder / "blocks.toml").write_text(pushed)
     assert main(["run", "blocks.toml", "--quiet", "--profile", "profile.json"]) == 3
     assert json.loads((folder / "profile.json").read_text())["pieces"]["steps"] > 0
 

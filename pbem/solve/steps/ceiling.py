@@ -10,6 +10,8 @@ from pbem.errors import ConvergenceError
 
 # A limit load is told where no more than this part of it is missing.
 NEAR = 0.02
+# Where bodies slide is known from the pressures, so that few steps come as near to it as this.
+NEAR_SLIDING = 0.004
 # Of what forces in the contacts could still balance, a step takes this part.
 SAFE = 0.97
 
@@ -48,7 +50,7 @@ class Ceiling:
 
     def is_sliding(self, reached: float, target: float, least: float) -> bool:
         """Whether hardly anything is left between what was reached and what makes bodies slide."""
-        return self.slides <= target and self.slides - reached < max(least, NEAR * self.slides)
+        return self.slides <= target and self.slides - reached < max(least, NEAR_SLIDING * self.slides)
 
     def is_reached(self, reached: float, target: float, least: float) -> bool:
         """Whether hardly anything is left between what was reached and what cannot be.
@@ -57,7 +59,8 @@ class Ceiling:
         loads: its own reason is told in the end, whatever the steps.
         """
         lowest = min(self.balanced, self.free)
-        return lowest <= target and lowest - reached < max(least, NEAR * lowest)
+        near = NEAR_SLIDING if self.slides < np.inf else NEAR
+        return lowest <= target and lowest - reached < max(least, near * lowest)
 
     def lower(self, target: float, balanced: float, error: ConvergenceError) -> Ceiling:
         """With a try that failed; balanced: up to the target, which it is if all of it may be in balance."""

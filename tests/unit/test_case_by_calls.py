@@ -304,7 +304,7 @@ def test_cases_of_the_program_are_found_by_name(tmp_path: Path, monkeypatch: pyt
     """In an empty folder; a file of that name there comes first."""
     monkeypatch.chdir(tmp_path)
     case = pbem.Case.read("kelvin_point")
-    assert case.title and case.text == pbem.Case.read("gallery/kelvin_point.toml").text
+    assert case.title and case.text == pbem.Case.read("gallery/kelvin_point").text
     results = pbem.run("kelvin_point")
     assert Path("kelvin_point.h5").exists() and results.title == case.title
     Path("kelvin_point").write_text(case.text.replace(case.title, "Mine"))

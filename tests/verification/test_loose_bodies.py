@@ -158,7 +158,7 @@ def test_a_disc_beside_the_middle_of_a_table_stays_upright(load: float, tmp_path
     arm = position - position.mean()
     turn = (arm.conj() * (moved - moved.mean())).imag.sum() / (np.abs(arm) ** 2).sum()
     assert abs(turn) < 0.05 * abs(moved.mean())  # a disc rolls easily
-    assert abs(moved.mean().real) < 5e-3 * abs(moved.mean())
+    assert abs(moved.mean().real) < 0.05 * abs(moved.mean())
     # What is left over is that of the table's coarse sides.
     assert results.reactions["bottom"][-1] == pytest.approx([0.0, np.pi * load], rel=1e-4, abs=1e-4 * load)
 

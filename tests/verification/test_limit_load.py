@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+import pbem
 from pbem.case.build import parse_model
 from pbem.contact.laws import start_memory
 from pbem.errors import ConvergenceError
@@ -21,6 +24,7 @@ from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
 from pbem.solve.system.assembly import assemble_problem
 from scripts.torture.kinds import draw_sample
 from tests.verification.proofs.proof import write_case
+from tests.verification.rigid_sample import UNMOVED, compare_pressures, find_persson_force, write_pin
 from tests.verification.test_settling import BLOCKS, Listener, run
 
 
@@ -317,3 +321,17 @@ def test_a_ring_slips_on_its_shaft_at_the_torque_of_friction(
     found = [float(each) for each in re.findall(r"(?:fraction|loads at|: at) ([0-9.]+)", str(caught.value))]
     assert found[1] == pytest.approx(limit, rel=2e-3) and 0.97 * found[1] <= found[0] < limit
     assert listener.tried <= steps + 7 and len(listener.rejected) <= 2
+
+
+def test_a_pin_in_a_very_wide_plate_is_no_limit_load(tmp_path: Path) -> None:
+    """Elements are 1e-8 of the model: entries so small were taken for none by what solves (57), so that no force was
+    left to balance the loads."""
+    clearance, half = 3.1e-4, math.radians(61.9)
+    force = find_persson_force(half, clearance)
+    case = tmp_path / "wide.toml"
+    case.write_text(write_pin(
+        clearance, force, 122.5, 64, UNMOVED, scheme="THST", hub=0.002, edge=3000.0, grade_contact_ends=False))
+    results = pbem.run(case, tmp_path / "wide.h5")
+    assert results.status == "finished"
+    # Of elements that are not graded towards the ends of contact.
+    assert np.abs(compare_pressures(results, force, half, 122.5, UNMOVED)).max() < 4e-2

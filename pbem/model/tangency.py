@@ -37,8 +37,8 @@ MOST_SAMPLES = 4000
 
 @dataclass(frozen=True)
 class Tangency:
-    """Where two rounded faces are nearest: place (complex) on the first curve; shortest: length of elements there, and
-    within `window` of it, as bodies that move until they touch may do so beside it."""
+    """Where two rounded faces are nearest: place (complex) on one of the curves; shortest: length of elements there,
+    and within `window` of it, as bodies that move until they touch may do so beside it."""
 
     place: complex
     shortest: float
@@ -46,7 +46,11 @@ class Tangency:
 
 
 def find_tangencies(first: Curve, second: Curve) -> Iterator[Tangency]:
-    """Of the two curves of a contact; faces that are flush, that meet with a corner or that are far apart have none."""
+    """Of the two curves of a contact; faces that are flush, that meet with a corner or that are far apart have none.
+
+    They are looked for along the curve with the shorter elements, whichever comes first.
+    """
+    first, second = sorted((first, second), key=_measure_elements)
     passed: list[complex] = []
     for leg in first.legs:
         half = 0.5 * leg.length / leg.elements
@@ -66,6 +70,11 @@ def grade_tangencies(curves: Mapping[str, Curve], found: Mapping[str, list[Tange
     """The curves with elements near their tangencies halved until they are short enough."""
     return {name: divide_curve(curve, found[name], GROWTH) if found.get(name) else curve
             for name, curve in curves.items()}
+
+
+def _measure_elements(curve: Curve) -> float:
+    """Their mean length."""
+    return curve.length / sum(leg.elements for leg in curve.legs)
 
 
 def _measure(leg: Leg, second: Curve, fractions: Real) -> Real:

@@ -36,7 +36,8 @@ def test_a_disc_on_a_straight_face_has_one(shift: complex, unit: float, turn: fl
         return shift + unit * cmath.exp(1j * turn) * z
 
     disc, face = _round(move(0.313 + 1j * (1 + gap)), unit), _draw([move(-2 + 0j), move(3 + 0j)])
-    for first, second, place in ((disc, face, 0.313 + 1j * gap), (face, disc, 0.313 + 0j)):
+    place = 0.313 + 1j * gap  # on the disc, whose elements are shorter
+    for first, second in ((disc, face), (face, disc)):
         (found,) = _find(first, second)
         # Rounding of the coordinates is seen in the distances, least distances are flat.
         allowed = 1e-5 * unit + 1e-7 * abs(shift)
@@ -45,6 +46,15 @@ def test_a_disc_on_a_straight_face_has_one(shift: complex, unit: float, turn: fl
         # Curvature by what faces part over half an element.
         assert found.shortest == pytest.approx(expected, rel=0.1)
         assert found.window == pytest.approx(gap * unit, abs=1e-9 * abs(shift) + 1e-12 * unit)
+
+
+@pytest.mark.parametrize("elements", [1, 2, 3])
+def test_a_long_element_hides_none(elements: int) -> None:
+    disc, face = _round(0.2 + 1j, 1.0), _draw([-9 + 0j, 7 + 0j], elements)
+    for pair in ((disc, face), (face, disc)):
+        (found,) = _find(*pair)
+        assert abs(found.place - 0.2) < 1e-5
+        assert found.shortest == pytest.approx(math.sqrt(2 * SEEN), rel=0.1)
 
 
 def test_two_rounded_faces_have_it_between_their_centres() -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Integer
 from pbem.case.build import Source, find_file, make_checked_model
 from pbem.case.changed import Label, label_key
 from pbem.clock import clock
@@ -26,7 +26,6 @@ from pbem.parallel import (
     check_communicator,
     do_on_first,
     lacks_memory,
-    world,
 )
 from pbem.passes import Target, blame_pass, blame_tries, plan_finer, plan_graded, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide, refine_marked
@@ -38,10 +37,7 @@ from pbem.results.overrides import choose_overrides
 from pbem.results.passes import KeptPass, PassOutput, open_beside, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.tip_notes import compare_release
-from pbem.results.tips import TipRules
 from pbem.results.writer import ResultWriter
-from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
-from pbem.solve.estimate.second_solution import SecondSolution
 from pbem.solve.launch.account import describe_start
 from pbem.solve.launch.arguments import check_arguments
 from pbem.solve.launch.memory import check_memory
@@ -51,10 +47,12 @@ from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
 from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
-from pbem.solve.steps.march import free_at_last, march, note_place, resume_modes, start_from
+from pbem.solve.steps.former_pass import FormerPass
+from pbem.solve.steps.march import free_at_last, march, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
+from pbem.storing import make_estimator, store_steps
 
 
 def run(
@@ -161,6 +159,7 @@ def _refine_and_solve(
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
     # Passes for an accuracy count as graded ones, but never are both asked for.
     first, tries, begun, graded = model, 0, one.number, one.number - 1
+    former: FormerPass | None = None
     while True:
         with clock.piece("reading"):
             mesh = generate_mesh(model)
@@ -174,7 +173,7 @@ def _refine_and_solve(
             watch.note(note)
         now = replace(one, first_unknowns=one.first_unknowns or 2 * mesh.nodes)
         try:
-            decision = _solve(model, mesh, target, options, watch, signals, now, kept)
+            decision, former = _solve(model, mesh, target, options, watch, signals, now, kept, former)
         except ConvergenceError as error:
             if one.spare:
                 watch.note(f"The run on that mesh did not converge ({error.reason}): the results are those before.")
@@ -185,7 +184,7 @@ def _refine_and_solve(
             if finer is None:
                 raise blame_tries(error, tries, 2 * mesh.nodes) from error
             watch.note(finer.note)
-            model, target, tries = finer.model, Target(target.path, False, True), tries + 1
+            model, target, tries, former = finer.model, Target(target.path, False, True), tries + 1, None
             continue
         # The next pass takes the place of this one in the file.
         target = Target(target.path, False, True)
@@ -203,9 +202,9 @@ def _refine_and_solve(
 
 def _solve(
     model: Model, mesh: Mesh, target: Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
-    one: Pass, kept: KeptProblems | None,
-) -> Decision:
-    """March through the load history; the first rank writes. Returns what follows."""
+    one: Pass, kept: KeptProblems | None, former: FormerPass | None,
+) -> tuple[Decision, FormerPass]:
+    """March through the load history; the first rank writes. Returns what follows, and the modes of this pass."""
     with clock.piece("evaluation"):
         interior = InteriorField(model, mesh, watch.comm) if model.interior_points else None
     region = None if interior is None else interior.location.region
@@ -217,7 +216,7 @@ def _solve(
             lambda: _open(model, mesh, target, options, region, one, watch.comm.size), share=False,
         ) or PassOutput()
     try:  # from here on whatever happens has to leave a closed file
-        decision = _fill(output.writer, model, mesh, interior, watch, signals, one, kept)
+        found = _fill(output.writer, model, mesh, interior, watch, signals, one, kept, former)
     except BaseException as error:
         told = error if one.number == 1 or one.spare or target.resume else blame_pass(error, one, 2 * mesh.nodes)
         if output.writer:
@@ -229,7 +228,7 @@ def _solve(
         if output.former:
             output.former.drop()
         watch.comm.Barrier()
-    return decision
+    return found
 
 
 def _open(
@@ -249,9 +248,9 @@ def _open(
 
 def _fill(
     writer: ResultWriter | None, model: Model, mesh: Mesh, interior: InteriorField | None, watch: Watch,
-    signals: StopSignals, one: Pass, kept: KeptProblems | None,
-) -> Decision:
-    """Assemble, march, store the steps as they come, and judge their errors."""
+    signals: StopSignals, one: Pass, kept: KeptProblems | None, former: FormerPass | None,
+) -> tuple[Decision, FormerPass]:
+    """Assemble, march, store the steps as they come, and judge their errors. former: with whose modes to begin."""
     comm = watch.comm
     if model.analysis.accuracy is not None or one.number > 1:
         do_on_first(comm, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
@@ -273,9 +272,10 @@ def _fill(
         rules = writer.tip_rules if writer else None
         estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
     tangent = kept.take_tangent(problem) if kept else None
+    guess, passed = former.make_guess(problem) if former else None, FormerPass(mesh)
     try:
-        steps = clock.each("steps", march(problem, watch, start, tangent, unfinished=unfinished))
-        steps = steps if kept else free_at_last(problem, steps)
+        steps = clock.each("steps", march(problem, watch, start, tangent, guess, unfinished=unfinished))
+        steps = passed.listen(steps if kept else free_at_last(problem, steps))
         last = store_steps(steps, model.output_every, interior, writer, watch, estimator, comm) or last
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
@@ -283,7 +283,8 @@ def _fill(
     estimator.destroy()
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
-    return _conclude(writer, model, mesh, estimator, watch, one, last)
+    decision = _conclude(writer, model, mesh, estimator, watch, one, last)
+    return decision, replace(passed, ends=decision.ends)
 
 
 def _conclude(
@@ -332,69 +333,3 @@ def _end_pass(writer: ResultWriter, decision: Decision) -> None:
         writer.finish()
     else:
         writer.fail("accuracy", "a finer mesh was to follow", "stopped")
-
-
-def _append(writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | None, missing: str) -> tuple[str, ...]:
-    if writer is None:
-        return ()
-    notes = writer.append(step, rows)
-    if missing:
-        writer.note_missing(missing)
-    return notes
-
-
-def make_estimator(
-    model: Model, mesh: Mesh, start: Step | None = None, comm: Comm = world, kept: KeptProblems | None = None,
-    signals: StopSignals | None = None, rules: TipRules | None = None,
-) -> Estimator:
-    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together.
-
-    rules: of the run's tips, if they are known on this rank.
-    """
-    beside, second, missing = None, None, ""
-    try:
-        beside = put_beside(model, mesh)
-        if beside is not None:  # it has fewer nodes, perhaps fewer than there are ranks
-            check_shares(beside.model, beside.mesh, comm.size)
-        second = None if beside is None else SecondSolution(beside, comm, start, kept, signals)
-        missing = NOTHING_COARSER if beside is None else ""
-    except PbemError as error:
-        missing = f"the second solution cannot be computed ({error})"
-    return Estimator(model, mesh, beside, second, missing, comm.rank == 0, rules)
-
-
-def store_steps(
-    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
-    listener: Reporter | None = None,
-    estimator: Estimator | None = None,
-    comm: Comm = world,
-) -> Step | None:
-    """Write the steps as they come, those that are stored with the field at the interior points; returns the last."""
-    waiting: Step | None = None
-    last: Step | None = None
-    try:
-        for step in steps:
-            stored = interior is not None and step.is_due(every)
-            waiting, last = None if stored else step, step
-            if interior is not None and stored:
-                with clock.piece("evaluation"):
-                    step = replace(step, interior=interior.evaluate(step))
-            with clock.piece("estimate"), note_place(step.stage, step.factor, resume_modes(step.contact)):
-                rows = None if estimator is None else estimator.estimate(step)
-            # An error of the first rank is every rank's.
-            missing = "" if estimator is None else estimator.missing
-            with clock.piece("writing"):
-                notes = do_on_first(
-                    comm, PbemError,
-                    lambda due=step, rows=rows, missing=missing: _append(writer, due, rows, missing),  # type: ignore[misc]
-                )
-            for note in notes:
-                (listener or SilentReporter()).note(note)
-    except ConvergenceError:
-        # All ranks are here together: the last step reached is stored as well.
-        if interior is not None and waiting is not None:
-            field = interior.evaluate(waiting)
-            if writer:
-                writer.complete(field)
-        raise
-    return last

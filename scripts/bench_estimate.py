@@ -34,7 +34,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from pbem.case.build import parse_model
 from pbem.contact.laws import collect_laws
-from pbem.driver import make_estimator
 from pbem.errors import ConvergenceError
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.shape import WIDEST_ARC
@@ -45,6 +44,7 @@ from pbem.model.refinement import bisect_elements, count_elements
 from pbem.results.accuracy import Pass, decide, refine_marked
 from pbem.results.estimates import Comparison, Relative
 from pbem.solve.estimate.coarser_mesh import relate_meshes
+from pbem.storing import make_estimator
 from scripts.refined_models import list_models
 from tests.verification.proofs import PROOFS, Proof, proof
 from tests.verification.proofs.proof import Solved

@@ -31,6 +31,7 @@ class ContactEnd:
     shortest: length of the elements there that follow the root well enough; window: how far the place may be off.
     fall: what the pressure falls by over the element there now, by the largest of the contact. located: false where
     the openings do not tell the place: it lies in one of the two elements that meet at `place`, which are left alone.
+    inward: unit direction from there into the contact; reach: length of the longer one of these elements.
     """
 
     contact: str
@@ -40,6 +41,8 @@ class ContactEnd:
     window: float
     fall: float = 1.0
     located: bool = True
+    inward: complex = 0j
+    reach: float = 0.0
 
 
 def list_gradable(model: Model) -> dict[str, tuple[str, ...]]:

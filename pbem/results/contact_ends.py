@@ -124,7 +124,9 @@ class _Pressed:
         inside, along = (last, 1 + at / last.length) if at <= 0 else (free, at / free.length)
         of = mesh.geometry.select(np.array([inside.element]))
         place = complex(of.place_fractions(np.array([[along if forward else 1 - along]]))[0, 0])
-        return ContactEnd(name, place, curves, shortest, window, over / self._largest)
+        leaving, arriving = of.directions()
+        return ContactEnd(name, place, curves, shortest, window, over / self._largest,
+                          inward=complex(-arriving[0] if forward else leaving[0]), reach=max(last.length, free.length))
 
     def _is_rounded(self, side: _Side) -> bool:
         """Whether the faces part as they are rounded: what straight ones do as they bend needs no more than it has."""

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 import pbem
 from pbem import driver
 from pbem.cli import main
-from pbem.driver import make_estimator
 from pbem.errors import CaseError, ConvergenceError, StopError, StorageError
 from pbem.model.model import Model
 from pbem.results import accuracy as limits
@@ -22,6 +21,7 @@ from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
 from pbem.solve.estimate import second_solution
 from pbem.solve.problem.step import Step
+from pbem.storing import make_estimator
 from tests.cli.cli_sample import BLOCKS
 from tests.verification.proofs import PROOFS, proof
 from tests.verification.proofs.proof import Solved

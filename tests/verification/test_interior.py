@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 import pbem.bem.interior
 from pbem.bem.hoop import evaluate_hoop_stress
 from pbem.bem.location import NEAR_END, locate_points
-from pbem.driver import store_steps
 from pbem.errors import ConvergenceError
 from pbem.exact import PlaneField, griffith_field, kirsch_field, polynomial_field, uniform_field
 from pbem.geometry.curve import Curve
@@ -33,6 +32,7 @@ from pbem.solve.problem.step import ContactState, InteriorValues, SilentReporter
 from pbem.solve.steps.march import march
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
+from pbem.storing import store_steps
 from tests.parallel.launch import launch_snippet
 from tests.verification.planes import ROCK, make_circle, make_plane, make_straight, solve
 from tests.verification.proofs.proof import solve_case

@@ -45,7 +45,7 @@ def test_a_pin_settles_in_one_step_as_in_several(
     """Without friction the path does not matter."""
     force = find_persson_force(math.radians(half_width), clearance)
     texts = (
-        write_pin(clearance, force, degrees, 48, place, steps=steps, grade_contact_ends=False) for steps in (1, 4)
+        write_pin(clearance, force, degrees, 48, place, steps=steps) for steps in (1, 4)
     )
     one, several = (run(text, tmp_path / f"{k}.toml") for k, text in enumerate(texts))
     assert int(one.steps.iterations.max()) <= 12

@@ -1,0 +1,89 @@
+"""The steps of a run as they come: stored, with their errors as a second solution tells them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from pbem.arrays import Real
+from pbem.clock import clock
+from pbem.errors import ConvergenceError, PbemError
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.parallel import Comm, StopSignals, do_on_first, world
+from pbem.results.estimator import Estimator
+from pbem.results.tips import TipRules
+from pbem.results.writer import ResultWriter
+from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
+from pbem.solve.estimate.second_solution import SecondSolution
+from pbem.solve.launch.start import check_shares
+from pbem.solve.problem.step import Reporter, SilentReporter, Step
+from pbem.solve.steps.march import note_place, resume_modes
+from pbem.solve.system.interior import InteriorField
+from pbem.solve.system.kept import KeptProblems
+
+
+def make_estimator(
+    model: Model, mesh: Mesh, start: Step | None = None, comm: Comm = world, kept: KeptProblems | None = None,
+    signals: StopSignals | None = None, rules: TipRules | None = None,
+) -> Estimator:
+    """What estimates the errors of a run by a second solution, from rest or after a step; by all ranks together.
+
+    rules: of the run's tips, if they are known on this rank.
+    """
+    beside, second, missing = None, None, ""
+    try:
+        beside = put_beside(model, mesh)
+        if beside is not None:  # it has fewer nodes, perhaps fewer than there are ranks
+            check_shares(beside.model, beside.mesh, comm.size)
+        second = None if beside is None else SecondSolution(beside, comm, start, kept, signals)
+        missing = NOTHING_COARSER if beside is None else ""
+    except PbemError as error:
+        missing = f"the second solution cannot be computed ({error})"
+    return Estimator(model, mesh, beside, second, missing, comm.rank == 0, rules)
+
+
+def store_steps(
+    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None,
+    listener: Reporter | None = None,
+    estimator: Estimator | None = None,
+    comm: Comm = world,
+) -> Step | None:
+    """Write the steps as they come, those that are stored with the field at the interior points; returns the last."""
+    waiting: Step | None = None
+    last: Step | None = None
+    try:
+        for step in steps:
+            stored = interior is not None and step.is_due(every)
+            waiting, last = None if stored else step, step
+            if interior is not None and stored:
+                with clock.piece("evaluation"):
+                    step = replace(step, interior=interior.evaluate(step))
+            with clock.piece("estimate"), note_place(step.stage, step.factor, resume_modes(step.contact)):
+                rows = None if estimator is None else estimator.estimate(step)
+            # An error of the first rank is every rank's.
+            missing = "" if estimator is None else estimator.missing
+            with clock.piece("writing"):
+                notes = do_on_first(
+                    comm, PbemError,
+                    lambda due=step, rows=rows, missing=missing: _append(writer, due, rows, missing),  # type: ignore[misc]
+                )
+            for note in notes:
+                (listener or SilentReporter()).note(note)
+    except ConvergenceError:
+        # All ranks are here together: the last step reached is stored as well.
+        if interior is not None and waiting is not None:
+            field = interior.evaluate(waiting)
+            if writer:
+                writer.complete(field)
+        raise
+    return last
+
+
+def _append(writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | None, missing: str) -> tuple[str, ...]:
+    if writer is None:
+        return ()
+    notes = writer.append(step, rows)
+    if missing:
+        writer.note_missing(missing)
+    return notes

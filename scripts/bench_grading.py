@@ -76,14 +76,20 @@ def make_rollers(count: int, approach: float, friction: float, scheme: str, step
     boundary: dict[str, Any] = {}
     wide = 1.5 * count
 
-    def lay_block(name: str, low: float, high: float) -> None:
+    def lay_block(name: str, low: float, high: float, facing: str) -> None:
+        """A plate of which each roller has a piece."""
         corners = [complex(-wide, low), complex(wide, low), complex(wide, high), complex(-wide, high)]
+        sides = []
         for k, side in enumerate("brtl"):
-            curves[name + side] = lay(corners[k], corners[(k + 1) % 4], 6 * count if side in "bt" else 6)
-        regions[name] = {"material": "m", "boundary": [name + side for side in "brtl"]}
+            ends, pieces = (corners[k], corners[(k + 1) % 4]), count if side == facing else 1
+            for piece in range(pieces):
+                first, last = (ends[0] + (ends[1] - ends[0]) * (piece + j) / pieces for j in (0, 1))
+                curves[f"{name}{side}{piece}"] = lay(first, last, 6 if side == facing else 6 * count)
+                sides.append(f"{name}{side}{piece}")
+        regions[name] = {"material": "m", "boundary": sides}
 
-    lay_block("low", -2.0, 0.0)
-    lay_block("top", 2.0, 4.0)
+    lay_block("low", -2.0, 0.0, "t")
+    lay_block("top", 2.0, 4.0, "b")
     for k in range(count):
         center = [3.0 * k - 1.5 * (count - 1), 1.0]
         for part, angles in (("under", [180, 360]), ("over", [0, 180])):
@@ -91,9 +97,9 @@ def make_rollers(count: int, approach: float, friction: float, scheme: str, step
         curves[f"hub{k}"] = {"center": center, "radius": 0.2, "elements": 8}
         regions[f"roller{k}"] = {"material": "m", "boundary": [f"under{k}", f"over{k}", f"hub{k}"]}
         boundary[f"hub{k}"] = {"rigid": {"ux": 0.0, "fy": 0.0, "rotation": 0.0}}
-        contacts[f"below{k}"] = {"between": [f"under{k}", "lowt"], "friction": friction}
-        contacts[f"above{k}"] = {"between": [f"over{k}", "topb"], "friction": friction}
-    boundary |= {"lowb": {"ux": 0.0, "uy": 0.0}, "topt": {"ux": 0.0, "uy": -approach}}
+        contacts[f"below{k}"] = {"between": [f"under{k}", f"lowt{count - 1 - k}"], "friction": friction}
+        contacts[f"above{k}"] = {"between": [f"over{k}", f"topb{k}"], "friction": friction}
+    boundary |= {"lowb0": {"ux": 0.0, "uy": 0.0}, "topt0": {"ux": 0.0, "uy": -approach}}
     return {"materials": {"m": {"young": 1000.0, "poisson": 0.3}}, "curves": curves, "regions": regions,
             "contacts": contacts, "boundary": boundary, "analysis": {"steps": steps, "scheme": scheme}}
 
@@ -107,14 +113,17 @@ def make_punch(radius: float, force: float, friction: float, scheme: str, steps:
         "r": lay(half + radius * 1j, half + high * 1j, 4), "t": lay(half + high * 1j, -half + high * 1j, 6),
         "l": lay(-half + high * 1j, -half + radius * 1j, 4),
         "left": {"center": [-half + radius, radius], "radius": radius, "angles": [180, 270], "elements": 8},
-        "seat": lay(3, -3, 36), "bl": lay(-3, -3 - 4j, 6), "b": lay(-3 - 4j, 3 - 4j, 6), "br": lay(3 - 4j, 3, 6),
+        "seat_right": lay(3, half - radius, 12), "seat_face": lay(half - radius, radius - half, 12),
+        "seat_left": lay(radius - half, -3, 12), "bl": lay(-3, -3 - 4j, 6),
+        "b": lay(-3 - 4j, 3 - 4j, 6), "br": lay(3 - 4j, 3, 6),
     }  # fmt: skip
     boundary = {"b": {"ux": 0.0, "uy": 0.0}, "t": {"rigid": {"fx": 0.5 * friction * force, "fy": -force,
                                                              "rotation": 0.0}}}  # fmt: skip
-    contacts = {name: {"between": [name, "seat"], "friction": friction} for name in ("face", "right", "left")}
+    contacts = {name: {"between": [name, f"seat_{name}"], "friction": friction} for name in ("face", "right", "left")}
     return {"materials": {"m": {"young": 1000.0, "poisson": 0.3}}, "curves": curves,
             "regions": {"punch": {"material": "m", "boundary": ["face", "right", "r", "t", "l", "left"]},
-                        "block": {"material": "m", "boundary": ["seat", "bl", "b", "br"]}},
+                        "block": {"material": "m",
+                                  "boundary": ["seat_right", "seat_face", "seat_left", "bl", "b", "br"]}},
             "contacts": contacts, "boundary": boundary, "analysis": {"steps": steps, "scheme": scheme}}  # fmt: skip
 
 

@@ -14,8 +14,8 @@ from pathlib import Path
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "bundled", "case", "importing", "solve",
     "results", "progress", "passes", "storing", "driver", "sweeps", "terminal", "make_command", "import_command",
-    "check_command", "run_command", "sweep_command", "export_command", "info_command", "plot_command", "pages", "cli", "__main__",
-    "__init__",
+    "check_command", "run_command", "sweep_command", "export_command", "info_command", "plot_command", "pages", "cli",
+    "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock",

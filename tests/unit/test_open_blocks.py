@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, ModeState, PairState
 from pbem.contact.modes import linearise
-from pbem.solve.nonlinear.open_blocks import FALL, PART, OpenBlocks
+from pbem.solve.nonlinear.open_blocks import FALL, FLOATING, PART, OpenBlocks
 from pbem.solve.nonlinear.smooth_search import SmoothSearch
 from pbem.solve.problem.step import Step
 from tests.unit.test_laws import make_laws, remember
@@ -23,12 +23,17 @@ __all__ = ["many_groups"]
 COUNT, SCALE = 12, 7.0
 
 
-def make_blocks(own_stiffness: float = 3.0) -> tuple[Any, OpenBlocks, ModeState, PairState]:
-    """Laws, of which all but the first pair are smoothed; modes of which every other pair is open; a state."""
-    laws = make_laws(COUNT, np.full(COUNT, 0.6), own_stiffness=np.full(COUNT, own_stiffness))
+WEIGHT = np.linspace(0.1, 1.0, COUNT)
+
+
+def make_blocks() -> tuple[Any, OpenBlocks, ModeState, PairState]:
+    """Laws of pairs on two curves, of which all but the first pair are smoothed, stiffer where pairs are shorter; modes
+    of which every other pair is open; a state."""
+    laws = make_laws(COUNT, np.full(COUNT, 0.6), own_stiffness=3.0 / WEIGHT)
     modes = ModeState(np.where(np.arange(COUNT) % 2, SLIP, OPEN).astype(np.int8), np.ones(COUNT))
     state = PairState(*np.random.default_rng(4).normal(size=(4, COUNT)))
-    problem: Any = SimpleNamespace(laws=laws)
+    pairs = SimpleNamespace(interface=np.arange(COUNT) // (COUNT // 2), weight=WEIGHT)
+    problem: Any = SimpleNamespace(laws=laws, mesh=SimpleNamespace(pairs=pairs), traction_scale=SCALE)
     return laws, OpenBlocks(problem, np.arange(COUNT) > 0), modes, state
 
 
@@ -39,34 +44,74 @@ def test_open_pairs_bear_what_their_jumps_change() -> None:
     assert blocks.stiffen(law, modes) is law
     unknowns = np.random.default_rng(5).normal(size=(COUNT, 2))
     usual = law.evaluate(unknowns)
-    assert blocks.take_off(modes, usual) == (usual, 0.0)
+    left, borne = blocks.take_off(modes, usual)
+    assert left is usual and not borne.any()
     blocks.begin(state)
     found = blocks.stiffen(law, modes).evaluate(unknowns)
     held = (modes.mode == OPEN) & (np.arange(COUNT) > 0)
-    stiffness = np.where(held, PART * 3.0, 0.0)
+    # All pairs of a curve alike: 3 by the mean of their lengths.
+    mean = np.repeat(WEIGHT.reshape(2, -1).mean(axis=1), COUNT // 2)
+    stiffness = np.where(held, PART * 3.0 / mean, 0.0)
     np.testing.assert_allclose(found.p_n - usual.p_n, stiffness * (usual.g_n - state.g_n), rtol=1e-6, atol=1e-15)
     np.testing.assert_allclose(found.p_s - usual.p_s, stiffness * (usual.g_s - state.g_s), rtol=1e-6, atol=1e-15)
-    left, off = blocks.take_off(modes, found)
+    left, borne = blocks.take_off(modes, found)
     np.testing.assert_allclose(left.p_n, usual.p_n, rtol=0, atol=1e-14)
     np.testing.assert_allclose(left.p_s, usual.p_s, rtol=0, atol=1e-14)
-    largest = max(np.abs(usual.p_n).max(), np.abs(usual.p_s).max())
-    most = max(np.abs(found.p_n - usual.p_n).max(), np.abs(found.p_s - usual.p_s).max())
-    np.testing.assert_allclose(off, most / largest, rtol=1e-6)
+    by = np.maximum(np.abs(found.p_n - usual.p_n), np.abs(found.p_s - usual.p_s))
+    np.testing.assert_allclose(borne, by, rtol=1e-6, atol=1e-15)
 
 
-def test_the_stiffness_falls_once_no_mode_changes() -> None:
+def test_the_stiffness_falls_once_no_mode_changes_but_around_blocks_that_float() -> None:
     _, blocks, modes, state = make_blocks()
-    blocks.move_on(state, True)
-    assert blocks.state is None
+    floats = np.arange(COUNT) >= 8
+    blocks.move_on(state, floats)
+    assert blocks.state is None and not blocks.stiffen_again()
     blocks.begin(state)
-    blocks.move_on(state, False)
-    assert blocks.part == PART
     moved = PairState(state.p_n, state.p_s, state.g_n + 1.0, state.g_s)
+    held = (modes.mode == OPEN) & (np.arange(COUNT) > 0)
     before = blocks.take_off(modes, moved)[1]
-    blocks.move_on(state, True)
-    np.testing.assert_allclose(blocks.take_off(modes, moved)[1], FALL * before, rtol=1e-4)
-    blocks.move_on(moved, True)
-    assert blocks.take_off(modes, moved)[1] == 0.0
+    np.testing.assert_array_equal(before > 0, held)
+
+    def check(part: float) -> None:
+        borne = blocks.take_off(modes, moved)[1]
+        np.testing.assert_allclose(borne, np.where(floats, 1.0, part) * before, rtol=1e-12)
+
+    blocks.move_on(state, None)
+    np.testing.assert_array_equal(blocks.take_off(modes, moved)[1], before)
+    blocks.move_on(state, floats)
+    check(FALL)
+    blocks.move_on(state, floats)
+    check(FALL**2)
+    # A system that could not be solved: what was before comes back, and is the least.
+    assert blocks.stiffen_again()
+    check(FALL)
+    blocks.move_on(state, floats)
+    check(FALL)
+    assert blocks.stiffen_again() and not blocks.stiffen_again()
+    check(1.0)
+    blocks.begin(state)
+    blocks.move_on(moved, None)
+    assert not blocks.take_off(modes, moved)[1].any()
+
+
+@pytest.mark.parametrize(("drive", "block", "counts"), [
+    (0.5, True, False), (2.0, True, True), (0.5, False, True)])
+def test_what_is_left_over_on_blocks_that_float_does_not_count(drive: float, block: bool, counts: bool) -> None:
+    _, blocks, modes, state = make_blocks()
+    problem: Any = blocks._problem
+    own, other = np.arange(4, COUNT), np.arange(4)
+    problem.parts = SimpleNamespace(block=np.array([False, block]))
+    problem.find_cut_motions = lambda modes: (SimpleNamespace(moving=(1,)),)
+    problem.cut = SimpleNamespace(find_around=lambda body: (own, None))
+    usual = np.average(np.maximum(np.hypot(state.p_n, state.p_s), SCALE * np.hypot(state.g_n, state.g_s)),
+                       weights=WEIGHT)
+    size = max(np.abs(state.p_n).max(), np.abs(state.p_s).max())
+    borne = np.zeros(COUNT)
+    borne[own], borne[other] = drive * FLOATING * usual, 1e-7 * size
+    rest, floats = blocks.measure_rest(modes, state, borne)
+    np.testing.assert_allclose(rest, borne[own[0]] / size if counts else 1e-7, rtol=1e-12)
+    np.testing.assert_array_equal(floats, (np.arange(COUNT) >= 4) & (not counts))
+    assert blocks.measure_rest(modes, state, np.zeros(COUNT))[0] == 0.0
 
 
 def write_blocks(load: str) -> str:

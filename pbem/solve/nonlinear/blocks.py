@@ -33,10 +33,8 @@ def place_block(problem: Problem, body: int, modes: ModeState, opening: Real, be
 
 def open_floating(problem: Problem, modes: ModeState, state: PairState, pressure: Real) -> ModeState:
     """The modes, with the pairs open around blocks that carry next to nothing and fit where nothing touches."""
-    pairs = problem.mesh.pairs
+    pairs, usual = problem.mesh.pairs, measure_usual(problem, state)
     carried = np.maximum(np.abs(state.p_n + pressure), np.abs(state.p_s))
-    jumps = problem.traction_scale * np.hypot(state.g_n, state.g_s)
-    usual = float(pairs.weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(pairs.weight.sum())
     mode = modes.mode.copy()
     for body in np.flatnonzero(problem.parts.block):
         own, normal = problem.cut.find_around(int(body))
@@ -47,3 +45,9 @@ def open_floating(problem: Problem, modes: ModeState, state: PairState, pressure
         if measure_space(pairs.position[own], normal, state.g_n[own]).is_wide:
             mode[own[loose]] = OPEN
     return ModeState(mode, modes.sign)
+
+
+def measure_usual(problem: Problem, state: PairState) -> float:
+    """The mean traction of all pairs, or of what jumps as theirs make over the length of the model (stress)."""
+    weight, jumps = problem.mesh.pairs.weight, problem.traction_scale * np.hypot(state.g_n, state.g_s)
+    return float(weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(weight.sum())

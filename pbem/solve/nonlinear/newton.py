@@ -205,6 +205,8 @@ def _run_search(
                 if loosely and not outcome.settled:
                     forcing.tighten()
         except ConvergenceError as error:
+            if blocks.stiffen_again():
+                continue
             forcing.used |= part > 0 and error.reason == "linear solver"  # in full it may be solved
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
             raise
@@ -241,7 +243,7 @@ def _run_search(
             raise ConvergenceError(refused.reason, refused.detail + moves)
         frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
         search.note(proposal, outcome.law_error)
-        blocks.move_on(pairs, outcome.settled)
+        blocks.move_on(pairs, outcome.floats)
         running.note(search, proposal, outcome.law_error)
         if search.taken >= most or (hurried and search.is_stuck()) or search.collapses():
             raise _end(hold, "iteration limit", proposal, search)

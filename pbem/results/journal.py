@@ -42,6 +42,8 @@ from pbem.results.tail import (
 
 # Pages that are kept beyond a file, if nothing else is, for the reason that its run ended.
 ROOM = 16
+# A file that nobody knows yet need not change at once: no more pages of it than this wait in memory.
+MOST_WAITING = 4096
 
 
 def lock(disk: int, wait: bool = False) -> bool:
@@ -116,12 +118,15 @@ class JournaledFile:
     """A file, perhaps still empty, for h5py to go on writing, as one process; it holds the lock until it is closed.
 
     dirty: whether there are writes that were not committed. checked: whether it had checksums, which are right.
+    waits: whether all writes wait in memory for `commit`; else they go to the disk now and then, in states that mean
+    nothing: of a file under a temporary name.
 
     Raises BlockingIOError if another process is writing it, DamageError if it is damaged, OSError if it cannot be read
     or written.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, waits: bool = True) -> None:
+        self.waits = waits
         self._disk = os.open(path, os.O_RDWR | os.O_CLOEXEC)
         try:
             if not lock(self._disk):
@@ -193,6 +198,11 @@ class JournaledFile:
             self._open_page(number)[offset : offset + len(part)] = part
             done, self._at = done + len(part), self._at + len(part)
         self._length = max(self._length, self._at)
+        if len(self._pages) > MOST_WAITING and not self.waits:
+            try:
+                self.commit()
+            except OSError:  # where there is no room all that follows waits, and the last commit says so
+                self.waits = True
         return len(view)
 
     def _open_page(self, number: int) -> bytearray:

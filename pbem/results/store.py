@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 
 from pbem.errors import ResultFileError
+from pbem.results.free_lists import empty_free_lists
 from pbem.results.journal import JournaledFile, lock
 from pbem.results.trial import try_reading
 
@@ -29,7 +30,7 @@ class Store:
         """
         self.path = path
         try:
-            self._journal = JournaledFile(path)
+            self._journal = JournaledFile(path, waits=fill is None)
         except BlockingIOError as error:
             raise ResultFileError(str(path), TAKEN) from error
         except OSError as error:
@@ -39,9 +40,11 @@ class Store:
                 with h5py.File(self._journal, "w", libver=VERSIONS) as file:
                     fill(file)
                 self._journal.commit()
+                self._journal.waits = True
             elif not self._journal.checked:
                 try_reading(path)
             self.file = self._open()
+            empty_free_lists()
         except BaseException:
             self._journal.close()
             raise
@@ -61,6 +64,7 @@ class Store:
         """Bring what was written to the disk. Raises OSError if there is no room; the file is then as before."""
         self.file.flush()
         self._journal.commit()
+        empty_free_lists()
 
     def roll_back(self) -> None:
         """Forget what was written since the last commit."""

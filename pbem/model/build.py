@@ -34,7 +34,7 @@ from pbem.model.kinks import split_at_kinks
 from pbem.model.law import check_along
 from pbem.model.load_notes import note_jumps, note_loads
 from pbem.model.loading import Loading, list_held, read_loading
-from pbem.model.loads_along import check_loads, list_given
+from pbem.model.loads_along import check_loads, list_filled, list_given
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.origin import move_to_own_origin
@@ -188,7 +188,7 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
         notes += describe_closing(curves, cracks, loops)
     if not faults:
         written = {name for name in curves if case.curves[name].expression}
-        seats = split_opposite_ends(curves, loops, roles.contacts, written)
+        seats = split_opposite_ends(curves, loops, roles.contacts, written, list_filled(case))
         curves, opposite = seats.curves, seats.opposite
         notes += seats.notes
     points = PointLoads({}, (), ())

@@ -1,32 +1,37 @@
-"""Kinks of tractions that vary along a curve, as at the level of water on a wall: elements end there.
+"""Kinks of what varies along a curve, as at the level of water on a wall, or where friction changes: elements end there.
 
 Within an element a traction is the polynomial through its values at the nodes, which has another resultant than one
-with a kink.
+with a kink; so have the tractions of springs, of a fluid between two faces, and of friction, which follow from theirs.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
 
 from pbem.arrays import Real
 from pbem.description.case import Case
+from pbem.description.varying import VaryingTable
+from pbem.errors import KeyPath
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.expression import evaluate_expression, list_switches
+from pbem.geometry.intersection import project
 from pbem.geometry.junction import split_leg
 from pbem.model.given import read_value
-from pbem.model.loads_along import list_given
 from pbem.model.touching import place_on_leg
 from pbem.model.varying import Varying
 
-TRACTIONS = ("tx", "ty", "tn", "ts", "pressure")
 # Kinks this part of an element from the end of a leg, or from each other, stay within it: they change the resultant by
 # its square at most.
 NEAREST = 0.05
 # Kinks on a leg at most, of its elements: values in a dense table are measured, and have kinks everywhere.
 MOST = 0.5
+# Numbers of elements are whole but for this.
+ROUNDING = 1e-6
 # Slopes of a table that differ by less than this part are one.
 STRAIGHT = 1e-9
 # Points of a leg between which an expression changes its branch once at most.
@@ -34,24 +39,56 @@ SAMPLES = 65
 
 
 def split_at_kinks(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
-    """The curves, those of bodies with an end of a leg at each kink of tractions by tables or expressions of the place
-    alone."""
+    """The curves, with an end of a leg at each kink of what varies on them by tables or expressions of the place alone:
+    conditions, springs, fluid pressure, strengths, gaps. Of a contact both curves have it."""
     kinks: dict[str, dict[int, list[float]]] = {}
-    for loc, name, given, _ in list_given(case):
-        if loc[-3] != "boundary" or loc[-1] not in TRACTIONS or name not in curves:
-            continue
+    for loc, name, given in _list_varying(case):
         value = read_value(loc, given, timed=True)[0]
-        if isinstance(value, Varying) and not value.timed:
+        if name in curves and isinstance(value, Varying) and not value.timed:
             for number, found in _find_on_curve(value, curves[name]):
                 kinks.setdefault(name, {}).setdefault(number, []).extend(found)
+    for contact in case.contacts.values():
+        first, second = contact.between
+        if first in kinks and second in curves:
+            for number, found in _find_opposite(curves[first], kinks[first], curves[second]):
+                kinks.setdefault(second, {}).setdefault(number, []).append(found)
     return {name: _split(curve, kinks[name]) if name in kinks else curve for name, curve in curves.items()}
+
+
+def _list_varying(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable]]:
+    """Place, curve (of a contact the first), and what varies along it."""
+    for key in ("boundary", "interfaces", "contacts"):
+        tables = [((key, name), table) for name, table in getattr(case, key).items()]
+        tables += [(("stages", number, key, name), table) for number, stage in enumerate(case.stages)
+                   for name, table in getattr(stage, key).items()]
+        for loc, table in tables:
+            name = str(loc[-1])
+            curve = case.contacts[name].between[0] if key == "contacts" and name in case.contacts else name
+            for place, each in ((loc, table), ((*loc, "spring"), getattr(table, "spring", None))):
+                for field in type(each).model_fields if each is not None else ():
+                    given = getattr(each, field)
+                    if isinstance(given, VaryingTable):
+                        yield (*place, field), curve, given
+
+
+def _find_opposite(first: Curve, kinks: Mapping[int, Sequence[float]], second: Curve) -> Iterator[tuple[int, float]]:
+    """Number and fraction of the leg of the second curve whose normal passes a kink on the first."""
+    for number, fractions in kinks.items():
+        for t in fractions:
+            point = complex(first.legs[number].point(np.array(t)))
+            nearest = min(range(len(second.legs)), key=lambda at: project(second.legs[at], point)[1])
+            yield nearest, project(second.legs[nearest], point)[0]
 
 
 def _split(curve: Curve, kinks: Mapping[int, Sequence[float]]) -> Curve:
     legs: list[Leg] = []
     for number, leg in enumerate(curve.legs):
         at = _part(kinks.get(number, ()), NEAREST / leg.elements)
-        legs += split_leg(leg, {complex(leg.point(np.array(t))): t for t in at})
+        if len(at) > MOST * leg.elements:
+            at = []
+        # No piece has longer elements than the leg: on arcs they must not turn by more, and what is symmetrical stays so.
+        legs += [replace(piece, elements=math.ceil(leg.elements * piece.length / leg.length - ROUNDING))
+                 for piece in split_leg(leg, {complex(leg.point(np.array(t))): t for t in at})]
     return Curve(curve.name, tuple(legs))
 
 

@@ -109,6 +109,12 @@ def list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]]
                 yield (*loc, key), curve, given, range(first, _find_next(case, (*loc, key), first))
 
 
+def list_filled(case: Case) -> set[str]:
+    """The contacts whose open faces a fluid presses on."""
+    tables = [case.contacts, *(stage.contacts for stage in case.stages)]
+    return {name for each in tables for name, table in each.items() if table.pressure}
+
+
 def _find_next(case: Case, loc: KeyPath, first: int) -> int:
     """The first stage in which another value takes its place; the number of stages if there is none."""
     kind, name, key = (str(part) for part in loc[-3:])

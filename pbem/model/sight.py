@@ -27,8 +27,10 @@ NARROW = 0.25
 OVERLAP = 1e-3
 # Normals of bodies that lie in each other meet the other face farther behind than these are deep, by this factor.
 REACH = 2.0
-# A leg is not split nearer to its ends than this part of its mean element, nor for faces farther away than that.
+# A leg is not split nearer to its ends than this part of its mean element.
 LEAST_PIECE = 0.25
+# Nor for faces farther away than this part of the shorter curve, between which there is no fluid.
+FAR = 0.25
 
 
 @dataclass(frozen=True)
@@ -118,24 +120,27 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
 
 
 def split_opposite_ends(
-    curves: Mapping[str, Curve], loops: Loops, contacts: Mapping[str, tuple[str, str]], kept: Set[str] = frozenset()
+    curves: Mapping[str, Curve], loops: Loops, contacts: Mapping[str, tuple[str, str]],
+    kept: Set[str] = frozenset(), filled: Set[str] = frozenset(),
 ) -> Seats:
     """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
 
     Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well, and
-    faces far away are not.
-    kept: curves that are not split. Ends near those of an element are left.
+    faces far away are not, except where a fluid fills what is between them.
+    kept: curves that are not split. filled: contacts with fluid. Ends near those of an element are left.
     """
     sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
     result, notes = dict(curves), []
     opposite: dict[str, dict[complex, tuple[str, complex]]] = {}
-    for pair in contacts.values():
+    for contact, pair in contacts.items():
         for name, other in (pair, pair[::-1]):
             if name in kept or name not in sides or other not in sides:
                 continue
+            shorter = min(curves[name].length, curves[other].length)
+            reach = np.inf if contact in filled else FAR * shorter
             cuts: dict[int, dict[float, complex]] = {}
             for end, normal in _outward_ends(curves[other], sides[other]):
-                found = _find_opposite(curves[name], sides[name].forward, end, normal, curves[other].length)
+                found = _find_opposite(curves[name], sides[name].forward, end, normal, (-OVERLAP * shorter, reach))
                 if found is not None:
                     cuts.setdefault(found[0], {})[found[1]] = end
             legs = []
@@ -161,18 +166,18 @@ def _outward_ends(curve: Curve, side: Side) -> list[tuple[complex, complex]]:
 
 
 def _find_opposite(
-    curve: Curve, forward: bool, end: complex, normal: complex, length: float
+    curve: Curve, forward: bool, end: complex, normal: complex, ahead: tuple[float, float]
 ) -> tuple[int, float] | None:
-    """Number of the leg and fraction of it whose normal meets an end of the other curve (of a length) face to face."""
+    """Number of the leg and fraction of it whose normal meets an end of another curve face to face, so far ahead."""
     number = min(range(len(curve.legs)), key=lambda at: project(curve.legs[at], end)[1])
     leg = curve.legs[number]
     t, distance = project(leg, end)
     foot = leg.point(np.array([t]))
     outward = complex(leg.normals(foot)[0]) * (1 if forward else -1)
-    shorter = min(length, curve.length)
-    ahead = ((end - complex(foot[0])) * outward.conjugate()).real
-    piece = LEAST_PIECE * leg.length / leg.elements
-    if min(t, 1 - t) * leg.length < piece or distance > piece or ahead < -OVERLAP * shorter:
+    apart = ((end - complex(foot[0])) * outward.conjugate()).real
+    if min(t, 1 - t) * leg.length < LEAST_PIECE * leg.length / leg.elements:
+        return None
+    if not ahead[0] <= apart <= ahead[1] or distance > ahead[1]:
         return None
     return None if (normal * outward.conjugate()).real > OPPOSITE else (number, t)
 

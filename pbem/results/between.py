@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -46,10 +46,9 @@ class BetweenNodes:
 
     def find_violations(self, step: Step) -> Violations:
         """Of a step of the run."""
-        contact, pressure = step.contact, evaluate_pressure(self._model, self._mesh, step.stage, step.factor)
+        contact, fluid = step.contact, evaluate_pressure(self._model, self._mesh, step.stage, step.factor)
         laws = self._laws
         checked, creeps = ~(laws.bonded | laws.parted | self._find_held(step.stage)), find_creeping(laws)
-        limit = np.where(contact.broken, 0.0, laws.tensile_strength)
         count = laws.count
         penetration, tension, cone = np.zeros(count), np.zeros(count), np.zeros(count)
         for plain, rooted in zip(self._plain, self._rooted, strict=True):
@@ -57,13 +56,34 @@ class BetweenNodes:
             p_n, p_s, path = (
                 self._read(each, plain) for each in (contact.traction_n, contact.traction_s, contact.slip_path)
             )
+            pressure, here = self._read_given(fluid, plain), self._read_laws(plain)
+            limit = np.where(contact.broken, 0.0, here.tensile_strength)
             penetration = np.maximum(penetration, find_closure(laws, p_n, pressure)[0] - opening)
             tension = np.maximum(tension, p_n + pressure - limit)
             admissible = np.minimum(p_n, limit - pressure)
             slide = Slide(np.zeros(count), {**contact.internal, SLIP_PATH.name: np.maximum(path, 0.0)})
-            bound = evaluate_strength(laws, admissible, slide, pressure).bound
+            bound = evaluate_strength(here, admissible, slide, pressure).bound
             cone = np.maximum(cone, np.where(creeps, 0.0, np.abs(p_s) - bound))
         return Violations(*(self._gather(np.where(checked, each, 0.0)) for each in (penetration, tension, cone)))
+
+    def _read_laws(self, weights: Real) -> PairLaws:
+        """The laws with the strengths that they have between the nodes, where these vary along an element."""
+        groups = []
+        for group in self._laws.strengths:
+            parameters = {}
+            for key, own in group.parameters.items():
+                whole = np.full(self._laws.count, np.nan)
+                whole[group.pairs] = own
+                read = self._read_given(whole, weights)[group.pairs]
+                parameters[key] = np.where(np.isfinite(read), np.maximum(read, np.minimum(own, 0.0)), own)
+            groups.append(replace(group, parameters=parameters))
+        limit = np.maximum(self._read_given(self._laws.tensile_strength, weights), 0.0)
+        return replace(self._laws, strengths=tuple(groups), tensile_strength=limit)
+
+    def _read_given(self, values: Real, weights: Real) -> Real:
+        """The same of values (m,) that are given; without rounding where an element has one value."""
+        same = (values[self._pair] == values[:, None]).all(axis=1)
+        return np.where(same, values, self._read(values, weights))
 
     def _find_held(self, stage: int) -> Bool:
         """The pairs (m,) that a stage has closed or opened, whatever their law."""

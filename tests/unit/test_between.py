@@ -53,3 +53,22 @@ def test_the_cone_is_that_of_friction() -> None:
     assert inside.cone[0] == pytest.approx(0.0, abs=1e-14)
     beyond = between.find_violations(make_step(traction_n=pressure, traction_s=2.0 + bulge))
     assert beyond.cone[0] == pytest.approx((b - a) ** 2 / 4, rel=1e-12)
+
+
+def test_what_varies_is_read_between_the_nodes() -> None:
+    """Open faces under a pressure that rises along them carry it between the nodes too; friction is that of the place,
+    so that tractions on the cone of a friction coefficient that rises are on it everywhere."""
+    assert "friction = 0.2" in BLOCKS
+    model = parse_model(BLOCKS.replace("friction = 0.2", 'friction = { expression = "0.2 + 0.3*x" }'))[1]
+    mesh = generate_mesh(model)
+    x = mesh.position[mesh.pairs.first].real
+    found = BetweenNodes(model, mesh).find_violations(
+        make_step(traction_n=np.full(mesh.pairs.count, -10.0), traction_s=2.0 + 3.0 * x))
+    assert found.cone[0] < 1e-12
+
+    text = BLOCKS.replace("friction = 0.2", 'friction = 0.2\npressure = { expression = "2*x" }')
+    model = parse_model(text)[1]
+    mesh = generate_mesh(model)
+    x = mesh.position[mesh.pairs.first].real
+    found = BetweenNodes(model, mesh).find_violations(make_step(traction_n=-2 * x))
+    assert found.tension[0] < 1e-12

@@ -200,6 +200,7 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
     counts = [len(pairs) for pairs in interfaces.values()]
     order = join_pairs(interfaces)
     together["interface"] = np.repeat(np.arange(len(counts)), counts).astype("i4")
+    together["node"] = mesh.pairs.slave[order].astype("i4")
     fixed = {
         "position": to_columns(mesh.pairs.position[order] + model.origin),
         "normal": to_columns(mesh.pairs.normal[order]), "arc_length": mesh.pairs.arc_length[order],

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pbem.arrays import Integer, Real
 from pbem.results.contents import Elements
 from pbem.results.opening import freeze, open_quietly
-from pbem.results.pair_weights import JUMPS, weigh_pairs
+from pbem.results.pair_weights import JUMPS, find_nodes, weigh_pairs
 from pbem.results.trace_names import is_piece, number_piece
 from pbem.wording import suggest
 
@@ -94,7 +94,17 @@ class Contact:
     def _weights(self) -> tuple[Real, Real]:
         with open_quietly(self.path) as file:
             nodes = file["nodes"]
-            return weigh_pairs(_read_elements(file), nodes["position"][...], int(nodes.attrs["order"]), self.position)
+            position = nodes["position"][...]
+            node = self._find_nodes(file, position)
+            return weigh_pairs(_read_elements(file), position, int(nodes.attrs["order"]), node)
+
+    def _find_nodes(self, file: h5py.File, position: Real) -> Integer:
+        """The nodes (m,) that the pairs belong to."""
+        together = file["all/contact"]
+        if "node" not in together:
+            return find_nodes(position, self.position)
+        own = together["interface"][...] == [str(name) for name in file["contact"].attrs["names"]].index(self.name)
+        return np.asarray(together["node"][...][own], dtype=np.int64)
 
     @property
     def internal(self) -> Mapping[str, Real]:
@@ -121,6 +131,9 @@ class JoinedContact(Contact):
         shared = [name for name in parts[0] if all(name in part for part in parts)]
         axis = {name: 0 if name in ("position", "normal", "arc_length") else 1 for name in shared}
         return {name: freeze(np.concatenate([part[name] for part in parts], axis=axis[name])) for name in shared}
+
+    def _find_nodes(self, file: h5py.File, position: Real) -> Integer:
+        return np.concatenate([piece._find_nodes(file, position) for piece in self.pieces])
 
     @cached_property
     def starts(self) -> list[float]:
@@ -205,6 +218,15 @@ class AllPairs:
     def arc_length(self) -> Real:
         """(m,)."""
         return self._load("arc_length")
+
+    @cached_property
+    def node(self) -> Integer:
+        """(m,): the node of each pair, of either of its sides, where its tractions are those of the contact."""
+        with open_quietly(self.path) as file:
+            together = file["all/contact"]
+            if "node" not in together:
+                return freeze(find_nodes(file["nodes/position"][...], self.position))
+            return freeze(together["node"][...].astype(np.int64))
 
     @cached_property
     def laws(self) -> tuple[str, ...]:

@@ -14,31 +14,35 @@ from pbem.results.contents import Elements
 JUMPS = ("opening", "slip")
 
 
-def weigh_pairs(elements: Elements, position: Real, order: int, pairs: Real) -> tuple[Real, Real]:
-    """Weights (m,) of tractions and of jumps at the pairs' places (m, 2): lengths.
+def weigh_pairs(elements: Elements, position: Real, order: int, node: Integer) -> tuple[Real, Real]:
+    """Weights (m,) of tractions and of jumps at the pairs with the given nodes (m,): lengths.
 
-    position (n, 2): of the nodes, element after element. A pair lies on a node of either of its sides. Beside the tip
-    of a crack jumps have the square-root shape.
+    position (n, 2): of all nodes, element after element. A pair has a node of either of its sides. Beside the tip of a
+    crack jumps have the square-root shape.
     """
-    if not len(pairs):
+    if not len(node):
         return np.zeros(0), np.zeros(0)
     plain, rooted = _weigh_nodes(elements, position, order)
-    node = find_nodes(position, pairs)
     return plain[node], rooted[node]
 
 
 def weigh_mesh_pairs(mesh: Mesh) -> tuple[Real, Real]:
-    """The same weights (m,) of all pairs of a mesh, in its order; second faces of cracks lie on the first ones."""
+    """The same weights (m,) of all pairs of a mesh, in its order."""
     vertices = np.stack([mesh.start, mesh.end], axis=1)
     elements = Elements(
         np.stack([vertices.real, vertices.imag], axis=-1), mesh.sweep, mesh.region, mesh.curve, mesh.crack,
         mesh.tip.astype(np.int64))
-    position, pairs = (np.column_stack([each.real, each.imag]) for each in (mesh.position, mesh.pairs.position))
-    return weigh_pairs(elements, position, mesh.order, pairs)
+    position = np.column_stack([mesh.position.real, mesh.position.imag])
+    return weigh_pairs(elements, position, mesh.order, mesh.pairs.slave)
 
 
 def find_nodes(position: Real, pairs: Real) -> Integer:
-    """The numbers (m,) of the nodes, of either side, that the pairs lie on; as for `weigh_pairs`."""
+    """The nodes (m,) nearest to the places of pairs (m, 2), for files that do not name the nodes.
+
+    It is not that of the pair where pairs are told on the other curve of a contact, across a gap.
+    """
+    if not len(pairs):
+        return np.zeros(0, dtype=np.int64)
     _, node = cKDTree(position).query(pairs)
     return np.asarray(node)
 

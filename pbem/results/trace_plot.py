@@ -21,7 +21,7 @@ from pbem.results.body_plot import write_names
 from pbem.results.label_room import part_labels
 from pbem.results.outline import trace_outlines
 from pbem.results.page import Page, add_legend_row, choose_box, describe_box, finish_plane, save, write_around
-from pbem.results.pair_weights import find_nodes, weigh_pairs
+from pbem.results.pair_weights import weigh_pairs
 from pbem.results.picture_limits import limit_field, print_number
 from pbem.results.plot_style import MODES, describe_step, label, scale_axis, style
 from pbem.results.reader import Results
@@ -230,8 +230,8 @@ def list_segments(results: Results) -> tuple[Real, Real]:
     In its element a piece goes from the middle to the pair before, or the vertex, to that to the pair after.
     """
     nodes, place = results.nodes, results.pairs.position
-    lengths, _ = weigh_pairs(results.elements, nodes.position, nodes.order, place)
-    element = find_nodes(nodes.position, place) // (nodes.order + 1)
+    lengths, _ = weigh_pairs(results.elements, nodes.position, nodes.order, results.pairs.node)
+    element = results.pairs.node // (nodes.order + 1)
     geometry = results.elements.geometry.select(element)
     middle = geometry.place(np.zeros((len(element), 1)))[:, 0]
     # Either of the faces may own the node that was found: an element is known by its middle.
@@ -250,7 +250,7 @@ def list_segments(results: Results) -> tuple[Real, Real]:
 def sum_orientations(results: Results, step: int) -> Orientations:
     """Lengths and integrals of |slip| of all pairs at a stored step, by their orientation."""
     normal, nodes = results.pairs.normal, results.nodes
-    lengths, rooted = weigh_pairs(results.elements, nodes.position, nodes.order, results.pairs.position)
+    lengths, rooted = weigh_pairs(results.elements, nodes.position, nodes.order, results.pairs.node)
     angle = np.degrees(np.arctan2(normal[:, 0], -normal[:, 1])) % 180.0
     # Directions that are 0 but for rounding are 0.
     number = np.floor((angle + 1e-9) / (180.0 / BINS)).astype(int) % BINS

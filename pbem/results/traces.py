@@ -39,7 +39,7 @@ def list_traces(results: Results, step: int = -1) -> list[TraceTotals]:
     if not pairs.names or not len(results.steps):
         return []
     nodes = results.nodes
-    plain, rooted = weigh_pairs(results.elements, nodes.position, nodes.order, pairs.position)
+    plain, rooted = weigh_pairs(results.elements, nodes.position, nodes.order, pairs.node)
     numbers: dict[str, int] = {}
     of = np.array([numbers.setdefault(name_trace(name), len(numbers)) for name in pairs.names])
     trace, count = of[pairs.interface], len(numbers)

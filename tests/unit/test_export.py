@@ -318,7 +318,8 @@ def test_integrals_along_curves(cracks: Results, blocks: Results) -> None:
         assert joint.integrate(quantity).dtype == float
     with pytest.raises(ValueError, match="did you mean 'slip'"):
         joint.integrate("slipp")
-    plain, rooted = weigh_pairs(cracks.elements, cracks.nodes.position, 2, cracks.contact["other"].position)
+    own = cracks.pairs.interface == cracks.pairs.names.index("other")
+    plain, rooted = weigh_pairs(cracks.elements, cracks.nodes.position, 2, cracks.pairs.node[own])
     assert plain.sum() == pytest.approx(math.hypot(2, 0.5), rel=1e-12)
     along = cracks.contact["other"].arc_length / plain.sum()
     # Half of an ellipse, in which slip is distributed.

@@ -1,4 +1,4 @@
-"""Kinks of what varies along a curve, as at the level of water on a wall, or where friction changes: elements end there.
+"""Kinks of what varies along a curve, as at the level of water on a wall or a jump of friction: elements end there.
 
 Within an element a traction is the polynomial through its values at the nodes, which has another resultant than one
 with a kink; so have the tractions of springs, of a fluid between two faces, and of friction, which follow from theirs.
@@ -86,7 +86,7 @@ def _split(curve: Curve, kinks: Mapping[int, Sequence[float]]) -> Curve:
         at = _part(kinks.get(number, ()), NEAREST / leg.elements)
         if len(at) > MOST * leg.elements:
             at = []
-        # No piece has longer elements than the leg: on arcs they must not turn by more, and what is symmetrical stays so.
+        # No piece has longer elements than the leg: on arcs they would turn by more, and what is symmetrical stays so.
         legs += [replace(piece, elements=math.ceil(leg.elements * piece.length / leg.length - ROUNDING))
                  for piece in split_leg(leg, {complex(leg.point(np.array(t))): t for t in at})]
     return Curve(curve.name, tuple(legs))

@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 
 from pbem.arrays import Real
 from pbem.description.case import Case
+from pbem.description.table import Table
 from pbem.description.varying import VaryingTable
 from pbem.errors import KeyPath
 from pbem.geometry.curve import Curve, Leg
@@ -50,15 +51,15 @@ def split_at_kinks(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
     for contact in case.contacts.values():
         first, second = contact.between
         if first in kinks and second in curves:
-            for number, found in _find_opposite(curves[first], kinks[first], curves[second]):
-                kinks.setdefault(second, {}).setdefault(number, []).append(found)
+            for number, opposite in _find_opposite(curves[first], kinks[first], curves[second]):
+                kinks.setdefault(second, {}).setdefault(number, []).append(opposite)
     return {name: _split(curve, kinks[name]) if name in kinks else curve for name, curve in curves.items()}
 
 
 def _list_varying(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable]]:
     """Place, curve (of a contact the first), and what varies along it."""
     for key in ("boundary", "interfaces", "contacts"):
-        tables = [((key, name), table) for name, table in getattr(case, key).items()]
+        tables: list[tuple[KeyPath, Table]] = [((key, name), table) for name, table in getattr(case, key).items()]
         tables += [(("stages", number, key, name), table) for number, stage in enumerate(case.stages)
                    for name, table in getattr(stage, key).items()]
         for loc, table in tables:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -111,7 +112,7 @@ def list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]]
 
 def list_filled(case: Case) -> set[str]:
     """The contacts whose open faces a fluid presses on."""
-    tables = [case.contacts, *(stage.contacts for stage in case.stages)]
+    tables: list[Mapping[str, Any]] = [case.contacts, *(stage.contacts for stage in case.stages)]
     return {name for each in tables for name, table in each.items() if table.pressure}
 
 

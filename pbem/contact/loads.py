@@ -12,6 +12,7 @@ from pbem.bem.particular_solution import ParticularSolution
 from pbem.bem.point_field import PointField
 from pbem.bem.rigid_region import list_region_nodes, load_rigid_rows
 from pbem.contact.rigid_nodes import RigidNodes, collect_rigid_nodes, evaluate_rigid, list_nodes_of
+from pbem.geometry.curve import find_middle_of_legs
 from pbem.geometry.loop import loop_legs
 from pbem.mesh.mesh import Mesh
 from pbem.model.in_situ import AT_REST, LinearStress
@@ -240,7 +241,8 @@ def balanced_solution(model: Model, region: Region, stage: int, factor: float) -
     carried = region.material.density * at_rest
     # The weight of an infinite region is carried by the stress far away.
     force = 0j if region.infinite else region.material.density * gravity - carried
-    center = _find_center(model, region) if force else 0
+    # It turns with the region, as curved elements take a uniform pressure, by which places differ, only nearly.
+    center = find_middle_of_legs(list(loop_legs(model.curves, region.loops))) if force else 0
     before = model.stages[stage - 1].swelling if stage > 0 else {}
     grown = before.get(region.name, NO_SWELLING).mix(model.stages[stage].swelling.get(region.name, NO_SWELLING), factor)
     return ParticularSolution(
@@ -265,13 +267,6 @@ def _find_points(model: Model, region: Region, stage: int, factor: float) -> tup
         x, y, moment = (float(value) for value in start + factor * (end - start))
         fields.append(PointField(load, complex(x, y), moment, model.logarithm_lengths[region.name]))
     return tuple(each for each in fields if not each.is_zero)
-
-
-def _find_center(model: Model, region: Region) -> complex:
-    """The middle of the points at which the legs of a finite region's boundary begin and end."""
-    points = [point for leg in loop_legs(model.curves, region.loops) for point in (leg.start, leg.end)]
-    x, y = [point.real for point in points], [point.imag for point in points]
-    return complex(0.5 * (min(x) + max(x)), 0.5 * (min(y) + max(y)))
 
 
 def far_solution(model: Model, region: Region, remote: Real) -> ParticularSolution:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -147,8 +147,12 @@ def turning_angle(incoming: complex, outgoing: complex) -> float:
 
 
 def find_middle(curves: Mapping[str, Curve]) -> complex:
-    """The mean place of all curves, by their lengths: it moves and turns with the model, whatever its mesh."""
-    legs = [leg for curve in curves.values() for leg in curve.legs]
+    """The mean place of all curves, as of their legs."""
+    return find_middle_of_legs([leg for curve in curves.values() for leg in curve.legs])
+
+
+def find_middle_of_legs(legs: Sequence[Leg]) -> complex:
+    """Their mean place, by their lengths: it moves and turns with the model, whatever its mesh."""
     first = legs[0].start
     lengths = [leg.length for leg in legs]
     return first + sum(length * (_find_centroid(leg) - first) for leg, length in zip(legs, lengths, strict=True)) / sum(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.arrays import Complex
 from pbem.case.build import parse_model
 from pbem.errors import CaseError, ConvergenceError
 from pbem.geometry.curve import Curve, Leg, find_middle
@@ -62,6 +63,47 @@ def test_supports_tools_joints_and_rigid_parts_elsewhere_are_the_same(name: str,
     (row,) = study(f"scripts/fuzz_seeds/{name}", [each for each in MOVES if each.name == move], tmp_path)
     assert row["worst"] <= 1e-9, row
     assert row["statuses"] == 0
+
+
+@pytest.mark.parametrize("degrees", [17.0, 71.0])
+def test_the_weight_of_a_curved_body_turns_with_it(degrees: float, solve: Solve) -> None:
+    """Curved elements take a uniform pressure nearly alone: where the weight's field has none must turn, too."""
+    def move(turned: float) -> tuple[str, complex]:
+        turn = cmath.exp(1j * math.radians(turned))
+        (a, b), (c, d) = ([r * cmath.exp(1j * math.radians(angle + turned)) for r in (1.0, 1.3)] for angle in (20, 165))
+        ends = {"foot": (a, b), "head": (c, d)}
+        curves = "".join(f"{name} = {{ points = [[{p.real}, {p.imag}], [{q.real}, {q.imag}]], elements = 4 }}\n"
+                         for name, (p, q) in ends.items())
+        arcs = "".join(f"{name} = {{ center = [0, 0], radius = {radius}, angles = [{20 + turned}, {165 + turned}], "
+                       "elements = 8 }\n" for name, radius in (("inner", 1.0), ("outer", 1.3)))
+        pull = turn * (0.3 - 1.0j)
+        return f"""
+[materials.stone]
+young = 1e4
+poisson = 0.2
+density = 1.0
+[curves]
+{curves}{arcs}
+[regions.rib]
+material = "stone"
+boundary = ["foot", "outer", "head", "inner"]
+[boundary]
+foot = {{ ux = 0.0, uy = 0.0 }}
+[gravity]
+gx = {pull.real}
+gy = {pull.imag}
+""", turn
+
+    places = 1.15 * np.exp(1j * np.radians([30.0, 75.0, 120.0, 160.0]))
+    (still, _), (turned, turn) = move(0.0), move(degrees)
+    here, there = (_evaluate(solve(text), at) for text, at in ((still, places), (turned, turn * places)))
+    np.testing.assert_allclose(there, turn * here, rtol=0, atol=1e-11 * np.abs(here).max())
+
+
+def _evaluate(results: Results, places: Complex) -> Complex:
+    """Displacement (q,), complex, in the last step."""
+    field = results.evaluate(np.stack([places.real, places.imag], -1)).displacement[-1]
+    return np.asarray(field[:, 0] + 1j * field[:, 1])
 
 
 def test_the_middle_of_curves_moves_and_turns_with_them() -> None:

@@ -122,7 +122,7 @@ def write_blocks(load: str) -> str:
         for k in range(3):
             beyond = 0.3 * (corners[k + 1] - corners[k])
             ends = [corners[k] - beyond, corners[k + 1] + beyond]
-            curves[f"{name}_{k}"] = [[round(z.real, 4), round(z.imag, 4)] for z in ends]
+            curves[f"{name}_{k}"] = [[round(float(z.real), 4), round(float(z.imag), 4)] for z in ends]
     head = write_network(1, 4).split("cracks = ")[0].replace("sxx = 0.1, syy = -1.0, sxy = 0.3", load)
     text = f"{head}cracks = {list(curves)}\n[curves]\n"
     text += "".join(f"{name} = {{ points = {ends}, elements = 8 }}\n" for name, ends in curves.items())

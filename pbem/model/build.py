@@ -247,9 +247,10 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
     )
     tools = make_tool_regions(case, curves, loading.rigid.bodies, topology.loops)
     jointed = frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    loads = tuple(topology.points.loads.values())
     fitted = recall.find(
-        "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts),
-        lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts),
+        "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts, loads),
+        lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts, loads),
     )
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from pbem.description.case import Case
@@ -11,6 +11,7 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
 from pbem.model.lengths import count_elements
 from pbem.model.model import Region
+from pbem.model.point_loads import PointLoad
 from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
 from pbem.model.slot import SlotSide
@@ -34,9 +35,9 @@ class FittedCurves:
 
 def fit_curves(
     case: Case, curves: Mapping[str, Curve], regions: Sequence[Region], tips: Mapping[str, tuple[bool, bool]],
-    jointed: frozenset[str], contacts: Mapping[str, tuple[str, str]],
+    jointed: frozenset[str], contacts: Mapping[str, tuple[str, str]], loads: Collection[PointLoad] = (),
 ) -> FittedCurves:
-    """Divide curves anew where their elements are too long for the faces around them.
+    """Divide curves anew where their elements are too long for the faces around them, or for loads inside.
 
     tips: per crack whether its ends are tips; jointed: curves with contact pairs.
     """
@@ -47,7 +48,9 @@ def fit_curves(
         + [SlotSide(crack, None) for crack in region.cracks]
         for region in regions
     ]
-    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order)
+    inside = [[load.place for load in loads if load.region == region.name and not load.on_boundary]
+              for region in regions]
+    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, inside)
     if sizes.excess is not None:
         return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)

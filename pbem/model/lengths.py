@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes, Meetings
@@ -20,6 +21,8 @@ REACH = (1.0, 1.0, 2.0, 2.0)
 # lies between by less than displacement equations do (mouth of a crack at 7 degrees to a surface: 1.2 % with the above
 # at order 2, 0.2 % with these; 1e-5 at order 3).
 BENDING = (0.5, 0.5, 1.0, 2.0)
+# The same from a force or a moment at a point inside a region, whose field the remainder has to cancel on the boundary.
+LOADED = 0.5
 # Growth of lengths per distance from a crack tip: neighbours of the tip's element are at most 1.5 times as long.
 SLOPE = 0.5
 # Least length of a tip's element on a leg that is graded towards the tip, as a part of the leg.
@@ -103,8 +106,9 @@ class LengthField:
 
     def __init__(
         self, surroundings: Surroundings, wedges: Wedges, tips: Mapping[str, tuple[bool, bool]], kept: frozenset[str],
-        order: int,
+        order: int, loads: Sequence[tuple[frozenset[str], Complex]] = (),
     ) -> None:
+        """loads: curves around a region, and the places of point loads inside of it."""
         legs = surroundings.legs
         self.surroundings, self.wedges, self.reach = surroundings, wedges, Reach(REACH[order], BENDING[order])
         self._least_reach = self.reach.bending if surroundings.is_mixed else self.reach.usual
@@ -127,6 +131,8 @@ class LengthField:
                 self._ends[number] = leg.divide(leg.elements, *self.refined[number])
         self._component = _connect(surroundings, tips)
         self._tips, self._at_tip = self._collect_tips(tips)
+        self._loads = [(np.array([name in around for name in surroundings.curve], dtype=bool) & ~self.kept,
+                        cKDTree(np.column_stack([at.real, at.imag]))) for around, at in loads]
 
     def list_elements(self) -> Cells:
         """The elements of all legs."""
@@ -155,7 +161,7 @@ class LengthField:
         distance, allowed = distances.nearest, self._allow(distances)
         thin = np.isfinite(distance)
         corner = np.zeros(len(t), dtype=bool)
-        allowed = np.where(self.kept[legs], np.inf, allowed)
+        allowed = np.minimum(np.where(self.kept[legs], np.inf, allowed), self._measure_from_loads(legs, points))
         for k, (r, touches) in enumerate(((t, cells.low == 0), (1 - t, cells.high == 1))):
             from_end, floor = r * self.length[legs], self._floor[legs, k]
             falling = np.full(len(t), np.inf)
@@ -166,7 +172,7 @@ class LengthField:
             corner |= touches & (floor > 0) & (length <= floor)
         allowed = np.where(corner, length, allowed)
         beside_tips = self._measure_from_tips(points, near.tips)
-        steepest = max(self.reach.usual, GROWTH, SLOPE)
+        steepest = max(self.reach.usual, GROWTH, SLOPE, LOADED)
         allowed = np.minimum(allowed, beside_tips)
         final = (length <= FINENESS * allowed) | (allowed - 0.5 * steepest * length >= cells.wanted) | corner
         return Measured(allowed, final, distance, distances.leg, near)
@@ -198,6 +204,15 @@ class LengthField:
         tips = Meetings(boxes, *boxes.find_meeting(wider))
         tips = tips.select(self._component[cells.leg[tips.other]] == self._tips.component[tips.box])
         return Near(self.surroundings.find_near(cells.leg, around), tips, np.arange(len(points)))
+
+    def _measure_from_loads(self, legs: Integer, points: Complex) -> Real:
+        """What point loads inside of the regions allow."""
+        allowed = np.full(len(points), np.inf)
+        for around, tree in self._loads:
+            own = np.flatnonzero(around[legs])
+            distance, _ = tree.query(np.column_stack([points[own].real, points[own].imag]))
+            allowed[own] = np.minimum(allowed[own], LOADED * distance)
+        return allowed
 
     def _measure_from_tips(self, points: Complex, near: Meetings) -> Real:
         """What the tips of the same set of connected cracks allow."""

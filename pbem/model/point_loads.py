@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -127,6 +127,7 @@ def place_point_loads(
     loads: dict[str, PointLoad] = {}
     notes: list[str] = []
     faults: list[Fault] = []
+    kept = {name for name, table in case.curves.items() if table.grading != "auto"}
     for name, table in case.point_loads.items():
         point, loc = complex(*table.at), ("point_loads", name)
         moments = any(tables[name].moment for tables in (case.point_loads, *(
@@ -140,7 +141,7 @@ def place_point_loads(
         else:
             found = _place_inside(loc, name, point, curves, loops)
             if isinstance(found, PointLoad):
-                wrong, note = _check_distance((*loc, "at"), name, point, curves)
+                wrong, note = _check_distance((*loc, "at"), name, point, curves, kept)
                 faults += wrong
                 notes += note
         if isinstance(found, Fault):
@@ -171,9 +172,12 @@ def _place_inside(
 
 
 def _check_distance(
-    loc: KeyPath, name: str, point: complex, curves: Mapping[str, Curve]
+    loc: KeyPath, name: str, point: complex, curves: Mapping[str, Curve], kept: Set[str]
 ) -> tuple[list[Fault], list[str]]:
-    """Loads inside that are too near to a curve, or so near that its elements should be shorter."""
+    """Loads inside that are too near to a curve, or so near that its elements should be shorter.
+
+    kept: curves whose grading is the user's; others get shorter elements later.
+    """
     near: list[tuple[float, str, float]] = []
     for curve in curves.values():
         for leg in curve.legs:
@@ -188,7 +192,9 @@ def _check_distance(
     if part < TOO_NEAR:
         return [Fault.at(loc, f"a point {where}", "a point on the curve, or further away from it, or shorter elements")
                 ], []
-    return [], [f"The point load '{name}' lies {where}: shorter ones there are more accurate."] if part < NEAR else []
+    if part >= NEAR or curve_name not in kept:
+        return [], []
+    return [], [f"The point load '{name}' lies {where}: shorter ones there are more accurate."]
 
 
 def _place_on_boundary(

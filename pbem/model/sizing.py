@@ -66,10 +66,11 @@ def fit_lengths(
     tips: Mapping[str, tuple[bool, bool]],
     kept: frozenset[str],
     order: int,
+    loads: Sequence[Sequence[complex]] = (),
 ) -> Sizes:
-    """Divide the legs anew whose elements are longer than other faces or a crack tip allow.
+    """Divide the legs anew whose elements are longer than other faces, a crack tip or a point load allow.
 
-    regions: curves of every region; tips: per crack whether its start and its end have tip elements;
+    regions: curves of every region; loads: the places of point loads inside each of them; tips: per crack whether its start and its end have tip elements;
     kept: curves whose grading is the user's, which follow the rule beside tips only; order: of the polynomials.
     """
     every = [leg for curve in curves.values() for leg in curve.legs]
@@ -79,7 +80,9 @@ def fit_lengths(
         frozenset(side.curve for sides in regions for side in sides if side.forward is None),
     )
     wedges = find_wedges(surroundings, kept)
-    field = LengthField(surroundings, wedges, tips, kept, order)
+    inside = [(frozenset(side.curve for side in sides), np.array(places, dtype=complex))
+              for sides, places in zip(regions, loads, strict=False) if len(places)]
+    field = LengthField(surroundings, wedges, tips, kept, order, inside)
     cells, allowed, excess = _divide(field)
     if excess is not None:
         return Sizes(curves, wedges, excess=excess)

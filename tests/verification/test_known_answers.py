@@ -51,3 +51,55 @@ def test_a_wedge_pressed_into_a_block(first: str, unit: float, tmp_path: Path) -
     x, pressure = np.abs(contact.position[:, 0]) / unit, -contact.traction_n[-1]
     inside = (x > 0.1) & (x < 0.9)
     np.testing.assert_allclose(pressure[inside], modulus * slope / math.pi * np.arccosh(1 / x[inside]), rtol=0.02)
+
+
+L_SHAPE = [0, 6, 6 + 1j, 2 + 1j, 2 + 5j, 5j]
+
+
+@pytest.mark.parametrize(("unit", "turn"), [(1.0, 1.0), (40.0, 0.6 + 0.8j)])
+def test_point_loads_beside_faces_are_reciprocal(unit: float, turn: complex, tmp_path: Path) -> None:
+    """Betti: what a force at A moves B by is what one at B moves A by, both at 0.2 and 0.3 from a face of elements of
+    0.5; a force at the first place in direction i, the motion of the second in direction j."""
+    corners = [unit * turn * z for z in L_SHAPE]
+    curves = {f"s{k}": {"points": [[z.real, z.imag] for z in (corners[k], corners[(k + 1) % 6])], "elements": 8}
+              for k in range(6)}
+    places = [[z.real, z.imag] for z in (unit * turn * (5.2 + 0.8j), unit * turn * (0.3 + 4.1j))]
+    moved = np.zeros((2, 2, 2))
+    for at in (0, 1):
+        for axis in (0, 1):
+            case = {
+                "materials": {"m": {"young": 10.0, "poisson": 0.3}},
+                "curves": curves,
+                "regions": {"b": {"material": "m", "boundary": list(curves)}},
+                "boundary": {"s0": {"ux": 0.0, "uy": 0.0}},
+                "point_loads": {"q": {"at": places[at], "fx": 1.0 - axis, "fy": float(axis)}},
+                "output": {"points": [places[1 - at]]},
+                "analysis": {"steps": 1},
+            }
+            results = pbem.run(case, tmp_path / f"plate{at}{axis}.h5")
+            moved[at, axis] = results.interior.displacement[-1][0]
+    np.testing.assert_allclose(moved[0], moved[1].T, atol=1.5e-3 * np.abs(moved).max())
+
+
+def test_a_cantilever_under_a_force_and_a_moment_inside(tmp_path: Path) -> None:
+    """Deflection by beam theory with shear; the moment acts in the middle of the height, half an element from both
+    faces."""
+    young, length, force, moment, x = 1e4, 20.0, 0.5, 3.0, 18.0
+    corners = [[0, 0], [length, 0], [length, 1], [0, 1]]
+    curves = {name: {"points": [corners[k], corners[(k + 1) % 4]], "elements": 4 if k % 2 else 20}
+              for k, name in enumerate(("below", "end", "above", "root"))}
+    case = {
+        "materials": {"m": {"young": young, "poisson": 0.0, "plane": "stress"}},
+        "curves": curves,
+        "regions": {"beam": {"material": "m", "boundary": list(curves)}},
+        "boundary": {"root": {"ux": 0.0, "uy": 0.0}},
+        "point_loads": {"tip": {"at": [length, 1.0], "fy": -force}, "inside": {"at": [10.0, 0.5], "moment": moment}},
+        "output": {"points": [[x, 0.5]]},
+        "analysis": {"steps": 1},
+    }
+    results = pbem.run(case, tmp_path / "beam.h5")
+    stiffness = young / 12
+    exact = -force * x**2 * (3 * length - x) / (6 * stiffness) - 1.2 * force * x / (young / 2)
+    exact += moment * 10 * (10 / 2 + x - 10) / stiffness
+    assert results.interior.displacement[-1][0][1] == pytest.approx(exact, rel=5e-3)
+    np.testing.assert_allclose(results.reactions["root"][-1], [0, force], atol=1e-3 * force)

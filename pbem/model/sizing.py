@@ -70,8 +70,9 @@ def fit_lengths(
 ) -> Sizes:
     """Divide the legs anew whose elements are longer than other faces, a crack tip or a point load allow.
 
-    regions: curves of every region; loads: the places of point loads inside each of them; tips: per crack whether its start and its end have tip elements;
-    kept: curves whose grading is the user's, which follow the rule beside tips only; order: of the polynomials.
+    regions: curves of every region; loads: the places of point loads inside each of them; tips: per crack whether its
+    start and its end have tip elements; kept: curves whose grading is the user's, which follow the rule beside tips
+    only; order: of the polynomials.
     """
     every = [leg for curve in curves.values() for leg in curve.legs]
     slots = find_slots(every, [name for name, curve in curves.items() for _ in curve.legs], regions)

@@ -4,9 +4,12 @@
 
 Each seed draws a model of one kind with gaps of 1e-6 to 1e-2 of its size, materials, friction, scheme and mesh, presses
 it until the gaps are closed and on, and prints what is left over on the worst body at the given mesh and at twice the
-elements, and how far the force is from that without gaps and pressed by as much less (stacks, grains and wedges). What
-is left over is a sum with signs, which can pass through zero between two meshes: where twice the elements leave more,
-four times as many have to leave less than a half of that.
+elements, and how far the force is from that without gaps and pressed by as much less (stacks, grains and wedges).
+Without its gaps a wedge touches two jaws that were moved towards it along the normals of their faces: normals and
+partners of faces are those of the bodies as given, whereas a wedge that slides home meets other points of the jaws, by
+1.4 times the gap, and its force differs by about 1.5 times the gap (`slid`, for comparison). What is left over is a
+sum with signs, which can pass through zero between two meshes: where twice the elements leave more, four times as many
+have to leave less than a half of that.
 """
 
 from __future__ import annotations
@@ -33,7 +36,8 @@ SCHEMES = ("SST", "DBEM", "HST", "THST")
 LEFT_OVER, OFF = 1e-3, 1e-2
 # What four times the elements may leave of what twice as many do, where these leave more than the given mesh.
 HALVED = 0.5
-COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "finest", "off", "error")
+HALF_ANGLE = math.radians(35)
+COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "finest", "off", "slid", "error")
 
 
 @dataclass(frozen=True)
@@ -83,13 +87,17 @@ class Text:
         self.lines += lines
 
 
-def write(sample: Sample, elements: int, operator: str, closed: bool) -> str:
-    """The case; closed: without gaps, and pressed by as much less."""
+def write(sample: Sample, elements: int, operator: str, closed: bool, slid: bool = False) -> str:
+    """The case; closed: without gaps, and pressed by as much less. slid: a wedge at its place between the jaws as
+    given, not the jaws at the faces of the wedge."""
     text = Text(sample)
     gap, contact = (0.0 if closed else sample.gap), f"friction = {sample.friction!r}"
-    {"stack": _write_stack, "grains": _write_grains, "wedge": _write_wedge, "pin": _write_pin}[sample.kind](
-        sample, text, gap, elements, contact
-    )
+    if sample.kind == "wedge":
+        _write_wedge(sample, text, gap, elements, contact, sample.gap if closed and not slid else 0.0)
+    else:
+        {"stack": _write_stack, "grains": _write_grains, "pin": _write_pin}[sample.kind](
+            sample, text, gap, elements, contact
+        )
     text.add(f'solver.operator = "{operator}"')
     return "\n".join(text.lines) + "\n"
 
@@ -139,28 +147,32 @@ def _write_grains(sample: Sample, text: Text, gap: float, elements: int, contact
              f"boundary.sback = {{ ux = 0.0, uy = {-(3 * gap + sample.approach)!r} }}")
 
 
-def _write_wedge(sample: Sample, text: Text, gap: float, elements: int, contact: str) -> None:
-    """A blunt wedge in a notch of the same angle, whose faces are a gap apart along their normals."""
-    half = math.radians(35)
-    lift = gap / math.sin(half)
+def _write_wedge(sample: Sample, text: Text, gap: float, elements: int, contact: str, moved: float) -> None:
+    """A blunt wedge between two jaws, whose faces are a gap apart along their normals; each jaw is held at its base.
+
+    moved: how far the jaws are moved towards the wedge along the normals of their faces.
+    """
+    lift = (gap + moved) / math.sin(HALF_ANGLE)
     top, foot = 1.0, 0.4
-    wide, narrow = top * math.tan(half), foot * math.tan(half)
-    notch = [complex(-narrow, foot), complex(-wide * 1.2, top * 1.2)]
-    text.add_body("p", [
-        complex(-2, -1), complex(2, -1), complex(2, 1.2), complex(wide * 1.2, 1.2), complex(narrow, foot),
-        complex(narrow, 0), complex(-narrow, 0), *notch, complex(-2, 1.2),
-    ], "a", 2 * elements)  # fmt: skip
-    # Its edges press between the ends of the notch's faces: where corners meet, pairs would pass each other.
+    wide, narrow = top * math.tan(HALF_ANGLE), foot * math.tan(HALF_ANGLE)
+    towards = -moved * complex(math.cos(HALF_ANGLE), -math.sin(HALF_ANGLE))
+    right = [z + towards for z in (complex(narrow, -1), complex(2, -1), complex(2, 1.2), complex(1.2 * wide, 1.2),
+                                   complex(narrow, foot))]
+    text.add_body("p", right, "a", 2 * elements)
+    text.add_body("o", [-z.conjugate() for z in reversed(right)], "a", 2 * elements)
+    # Its edges press between the ends of the jaws' faces: where corners meet, pairs would pass each other.
     low = foot + 0.15
-    edge = low * math.tan(half)
+    edge = low * math.tan(HALF_ANGLE)
     text.add_body("q", [
         complex(-edge, low + lift), complex(edge, low + lift),
         complex(wide, top + lift), complex(-wide, top + lift),
     ], "b", elements)  # fmt: skip
+    pressed = sample.approach + gap / math.sin(HALF_ANGLE)
     text.add('contacts.k = { between = ["q1", "p3"], ' + contact + " }",
-             'contacts.l = { between = ["q3", "p7"], ' + contact + " }",
+             'contacts.l = { between = ["q3", "o0"], ' + contact + " }",
              "boundary.p0 = { ux = 0.0, uy = 0.0 }",
-             f"boundary.q2 = {{ ux = 0.0, uy = {-(lift + sample.approach)!r} }}")
+             "boundary.o3 = { ux = 0.0, uy = 0.0 }",
+             f"boundary.q2 = {{ ux = 0.0, uy = {-pressed!r} }}")
 
 
 def _write_pin(sample: Sample, text: Text, gap: float, elements: int, contact: str) -> None:
@@ -199,9 +211,9 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
         row: dict[str, Any] = {"seed": seed, "kind": sample.kind, "scheme": sample.scheme, "operator": operator,
                                "gap": sample.gap, "friction": sample.friction}
         try:
-            def run(elements: int, closed: bool, operator: str = operator) -> tuple[float, float]:
+            def run(elements: int, closed: bool, operator: str = operator, slid: bool = False) -> tuple[float, float]:
                 case = folder / "case.toml"
-                case.write_text(write(sample, elements, operator, closed), encoding="utf-8")
+                case.write_text(write(sample, elements, operator, closed, slid), encoding="utf-8")
                 return measure(pbem.run(case, folder / "case.h5", force=True))
 
             row["left"], force = run(sample.elements, False)
@@ -211,6 +223,9 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
             if sample.kind != "pin":
                 expected = run(sample.elements, True)[1]
                 row["off"] = abs(force - expected) / expected
+            if sample.kind == "wedge":
+                expected = run(sample.elements, True, slid=True)[1]
+                row["slid"] = abs(force - expected) / expected
         except StopError:
             raise
         except PbemError as error:
@@ -235,6 +250,8 @@ def describe(row: dict[str, Any]) -> str:
     """A line for a run."""
     drawn = "{seed:3d} {kind:7s} {scheme:5s} {operator:13s} gap {gap:.1e} friction {friction:.1f}: ".format(**row)
     found = row.get("error") or "left over {left:.1e}, finer {finer:.1e}, force off {off:.1e}".format(**row)
+    if "slid" in row:
+        found += ", slid {slid:.1e}".format(**row)
     if row.get("finest", math.nan) > 0:
         found += ", finest {finest:.1e}".format(**row)
     return drawn + found + ("  WRONG" if is_wrong(row) else "")

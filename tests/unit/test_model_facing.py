@@ -101,6 +101,31 @@ def test_a_ray_meets_the_first_leg(radius: float | None) -> None:
     np.testing.assert_allclose(seen.product[0], 1.0 if radius is None else math.sqrt(0.75), rtol=1e-12)
 
 
+@pytest.mark.parametrize("elements", [6, 96, 800])
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_faces_are_divided_opposite_ends_on_meshes_of_any_fineness(size: float, elements: int) -> None:
+    """Across a gap of a hundredth of the face, which is half and four times an element of the finer meshes; not across
+    a third of the face."""
+    for gap, divided in ((0.01, 2), (0.3, 0)):
+        corners = {"top": (2, 1, 0, 1), "left": (0, 1, 0, 0), "bottom": (0, 0, 2, 0), "right": (2, 0, 2, 1),
+                   "foot": (0.5, 1 + gap, 1.5, 1 + gap), "around": (1.5, 1 + gap, 1.5, 2), "roof": (1.5, 2, 0.5, 2),
+                   "back": (0.5, 2, 0.5, 1 + gap)}  # fmt: skip
+        lines = [f"{name} = {{ points = [[{size * a!r}, {size * b!r}], [{size * c!r}, {size * d!r}]], "
+                 f"elements = {elements if name == 'top' else 6} }}" for name, (a, b, c, d) in corners.items()]
+        text = MATERIAL + "[curves]\n" + "\n".join(lines) + """
+[regions]
+lower = { material = "soft", boundary = ["top", "left", "bottom", "right"] }
+upper = { material = "soft", boundary = ["foot", "around", "roof", "back"] }
+[boundary]
+bottom = { ux = 0.0, uy = 0.0 }
+roof = { ux = 0.0, uy = 0.0 }
+[contacts]
+seat = { between = ["foot", "top"], friction = 0.3 }
+"""
+        notes = [note for note in build(text).notes if "opposite an end of 'foot'" in note]
+        assert len(notes) == divided and all("'top' is split at" in note for note in notes)
+
+
 @pytest.mark.parametrize("place", SCALES)
 def test_a_small_gap_is_a_gap(place: Place) -> None:
     """1e-8 of the faces' length is left open, and the pairs know it; faces that touch hold each other."""

@@ -144,6 +144,25 @@ def test_loose_bodies_with_gaps_carry_what_they_do_without(seed: int, tmp_path: 
     assert row["off"] < 1e-2
 
 
+# The largest gaps that a wedge of THST was drawn with.
+WEDGE = replace(study_stacks.draw(2750), elements=8)
+
+
+def press_wedge(sample: study_stacks.Sample, closed: bool, slid: bool, solve: Solve) -> float:
+    return study_stacks.measure(solve(study_stacks.write(sample, sample.elements, "dense", closed, slid)))[1]
+
+
+def test_a_wedge_carries_what_it_does_between_jaws_that_touch_it(solve: Solve) -> None:
+    """Faces keep their normals and partners across a gap, so that this is exact whatever the gap."""
+    ways = [(False, False), (True, False), (True, True)]
+    gap, touching, slid = (press_wedge(WEDGE, *way, solve) for way in ways)
+    assert gap == pytest.approx(touching, rel=1e-9)
+    # Where the wedge slides home in between, it meets other points of the jaws, by 1.4 times the gap.
+    smaller = replace(WEDGE, gap=0.1 * WEDGE.gap)
+    less = press_wedge(smaller, False, False, solve) / press_wedge(smaller, True, True, solve) - 1
+    assert less == pytest.approx(0.1 * (gap / slid - 1), rel=0.05) and less < -1e-3
+
+
 # Infinite planes
 
 PLANE = """

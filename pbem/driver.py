@@ -34,8 +34,9 @@ from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
 from pbem.results.overrides import choose_overrides
-from pbem.results.passes import KeptPass, PassOutput, open_beside, read_refinement
+from pbem.results.passes import KeptPass, PassOutput, expect_no_pass, open_beside, read_refinement
 from pbem.results.reader import Results, open_results
+from pbem.results.resume import is_finished
 from pbem.results.tip_notes import compare_release
 from pbem.results.writer import ResultWriter
 from pbem.solve.launch.account import describe_start
@@ -46,7 +47,7 @@ from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
-from pbem.solve.problem.step import Reporter, SilentReporter, Step, Unfinished
+from pbem.solve.problem.step import Reporter, SilentReporter, Step
 from pbem.solve.steps.former_pass import FormerPass
 from pbem.solve.steps.march import free_at_last, march, start_from
 from pbem.solve.system.assembly import assemble_problem
@@ -105,8 +106,8 @@ def run(
             signals.at_once = comm.size == 1
             target = Path(output) if output is not None else Path("case.h5" if path is None else path.stem + ".h5")
             with clock.piece("reading"):
-                model = do_on_first(comm, PbemError, lambda: _make_model(
-                    case, name, operator, choose_overrides(target, set) if resume else set, label))
+                model = do_on_first(comm, PbemError, lambda: impose_operator(make_checked_model(
+                    case, choose_overrides(target, set) if resume else set, label), name, operator))
                 inputs = [*([path] if path else []), *map(Path, model.law_texts)]
                 do_on_first(comm, PbemError, lambda: check_output_path(
                     target, resume=resume, force=force, source=model.source, overrides=model.overrides, inputs=inputs))
@@ -125,12 +126,6 @@ def run(
         if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
             raise KeyboardInterrupt from error
         raise
-
-
-def _make_model(
-    case: Source, name: str, operator: Operator | None, changes: Mapping[str, Any] | None, label: Label
-) -> Model:
-    return impose_operator(make_checked_model(case, changes, label), name, operator)
 
 
 def impose_operator(model: Model, name: str, operator: Operator | None) -> Model:
@@ -196,6 +191,8 @@ def _refine_and_solve(
         if planned:
             watch.note(planned.note)
         if planned is None or planned.model is model:
+            if decision.ends:
+                do_on_first(watch.comm, PbemError, lambda path=target.path: expect_no_pass(path))
             return
         model, graded, kept, watch.most = planned.model, graded + 1, None, planned.most
 
@@ -208,6 +205,9 @@ def _solve(
     with clock.piece("evaluation"):
         interior = InteriorField(model, mesh, watch.comm) if model.interior_points else None
     region = None if interior is None else interior.location.region
+    if target.resume and do_on_first(watch.comm, PbemError, lambda: is_finished(target.path, model, mesh)):
+        watch.note(f"{target.path} is finished: nothing is left to be computed, and it stays as it is.")
+        return Decision(), FormerPass(mesh)
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
     with clock.piece("writing"):
@@ -254,8 +254,8 @@ def _fill(
     comm = watch.comm
     if model.analysis.accuracy is not None or one.number > 1:
         do_on_first(comm, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
-    last: Step | None = broadcast(comm, writer.last_step if writer else None)
-    unfinished: Unfinished | None = broadcast(comm, writer.unfinished if writer else None)
+    last, unfinished, before = broadcast(
+        comm, (writer.last_step, writer.unfinished, writer.former) if writer else (None, None, None))
     signals.at_once = comm.size == 1
     with clock.piece("assembly"):
         problem = kept.assemble(model, mesh) if kept else assemble_problem(model, mesh, comm)
@@ -267,7 +267,7 @@ def _fill(
     if interior is not None:
         with clock.piece("evaluation"):
             interior.prepare(problem.system)
-    start = None if last is None else start_from(problem, last.number, last.stage, last.factor, last.contact)
+    start = None if last is None else start_from(problem, last, before)
     with clock.piece("estimate"):
         rules = writer.tip_rules if writer else None
         estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
@@ -330,6 +330,6 @@ def _check(writer: ResultWriter | None) -> ResultWriter:
 def _end_pass(writer: ResultWriter, decision: Decision) -> None:
     """What is not accurate yet is not finished."""
     if decision.marked is None:
-        writer.finish()
+        writer.finish(may_follow=bool(decision.ends))
     else:
         writer.fail("accuracy", "a finer mesh was to follow", "stopped")

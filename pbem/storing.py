@@ -18,7 +18,7 @@ from pbem.solve.estimate.coarser_mesh import NOTHING_COARSER, put_beside
 from pbem.solve.estimate.second_solution import SecondSolution
 from pbem.solve.launch.start import check_shares
 from pbem.solve.problem.step import Reporter, SilentReporter, Step
-from pbem.solve.steps.march import note_place, resume_modes
+from pbem.solve.steps.march import note_place
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
 
@@ -59,7 +59,7 @@ def store_steps(
             if interior is not None and stored:
                 with clock.piece("evaluation"):
                     step = replace(step, interior=interior.evaluate(step))
-            with clock.piece("estimate"), note_place(step.stage, step.factor, resume_modes(step.contact)):
+            with clock.piece("estimate"), note_place(step):
                 rows = None if estimator is None else estimator.estimate(step)
             # An error of the first rank is every rank's.
             missing = "" if estimator is None else estimator.missing

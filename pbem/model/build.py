@@ -29,7 +29,7 @@ from pbem.model.cutting import Cut, cut_cracks
 from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.in_situ import AT_REST, LinearStress
-from pbem.model.interior import list_interior_points
+from pbem.model.interior import check_interior_points, list_interior_points
 from pbem.model.kinks import split_at_kinks
 from pbem.model.law import check_along
 from pbem.model.load_notes import note_jumps, note_loads
@@ -135,7 +135,7 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     model, faults = _compose(case, roles, loading, topology, recall)
     model = replace(model, interior_points=interior)
     turning = recall.find("turning", (case.curves, model.curves), lambda: check_turning(case, model.curves))
-    faults += [*turning, *check_facing(model)]
+    faults += [*turning, *check_facing(model), *check_interior_points(case, model)]
     varying = [
         fault for name, interface in model.interfaces.items()
         for fault in check_along(("interfaces", name), interface.law, model.curves[name])

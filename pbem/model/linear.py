@@ -14,10 +14,14 @@ EXACT = 1e-9
 
 
 def fit_linear(text: str, corners: Complex) -> tuple[float, float, float]:
-    """Value at the first corner, and slopes, of a linear expression. Raises ExpressionError for any other."""
+    """Value at the first corner, and slopes, of a linear expression. Raises ExpressionError for any other,
+    and where it has no finite value."""
     across, up = corners[1] - corners[0], corners[2] - corners[0]
     points = corners[0] + np.array([0, 1, 0, 1, 0.37, 0.81]) * across + np.array([0, 0, 1, 1, 0.64, 0.23]) * up
     values = evaluate_expression(text, x=points.real, y=points.imag)
+    wrong = values[~np.isfinite(values)]
+    if len(wrong):
+        raise ExpressionError(f'"{text}", which is {wrong[0]:g} somewhere', "an expression with finite values")
     start, by_x, by_y = values[0], (values[1] - values[0]) / across.real, (values[2] - values[0]) / up.imag
     away = points - corners[0]
     linear = start + by_x * away.real + by_y * away.imag

@@ -132,7 +132,7 @@ def place_point_loads(
         point, loc = complex(*table.at), ("point_loads", name)
         moments = any(tables[name].moment for tables in (case.point_loads, *(
             {name: stage.point_loads[name]} for stage in case.stages if name in stage.point_loads)))
-        found: PointLoad | Fault
+        found: PointLoad | Fault | None
         if point in places:
             found = _place_on_boundary(loc, name, places[point], roles, curves, loops, held)
             if isinstance(found, PointLoad) and moments:
@@ -146,7 +146,7 @@ def place_point_loads(
                 notes += note
         if isinstance(found, Fault):
             faults.append(found)
-        else:
+        elif found is not None:
             loads[name] = found
     faults += _check_apart(case, loads)
     return PointLoads(loads, tuple(notes), tuple(faults))
@@ -200,7 +200,8 @@ def _check_distance(
 def _place_on_boundary(
     loc: KeyPath, name: str, place: complex, roles: Roles, curves: Mapping[str, Curve], loops: Loops,
     held: Mapping[str, tuple[str, ...]],
-) -> PointLoad | Fault:
+) -> PointLoad | Fault | None:
+    """None where the boundary of the region is at fault, which is told elsewhere."""
     at = format_point(place)
     touching = [each.name for each in curves.values() for leg in each.legs if place in (leg.start, leg.end)]
     own = list(dict.fromkeys(touching))
@@ -213,6 +214,8 @@ def _place_on_boundary(
             return Fault.at((*loc, "at"), f"{at}, on '{one}', where {list_names(held[one])} is prescribed",
                             "a point at which no displacement is prescribed: it would carry the load at once")
     region = roles.outer[own[0]]
+    if region not in loops:
+        return None
     legs = loop_legs(curves, loops[region])
     arriving = [leg for leg in legs if leg.end == place]
     leaving = [leg for leg in legs if leg.start == place]

@@ -38,6 +38,8 @@ STEP_DATASETS = {"stage": "i4", "factor": "f8", "iterations": "i4", "residual": 
 SHOWN = {"mode": "i1", "opening": "f8", "slip": "f8", "traction_n": "f8", "traction_s": "f8"}
 TIP_DATASETS = ("KI", "KII", "J", "T")
 ENERGIES = ("external", "elastic", "dissipated", "released", "removed")
+# Set in the file of a finished pass after which another one may come.
+MAY_FOLLOW = "pass_may_follow"
 CHUNK_BYTES = 32768
 
 
@@ -72,7 +74,7 @@ def write_attributes(
     }
     for name, value in attributes.items():
         file.attrs[name] = value
-    for name in ("failure", "failure_reason"):
+    for name in ("failure", "failure_reason", MAY_FOLLOW):
         if name in file.attrs:
             del file.attrs[name]
 

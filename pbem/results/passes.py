@@ -13,7 +13,7 @@ from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.accuracy import Pass
 from pbem.results.journal import lock
-from pbem.results.layout import read_fractions
+from pbem.results.layout import MAY_FOLLOW, read_fractions
 from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
 from pbem.results.trial import check_contents
@@ -74,6 +74,21 @@ def keep_pass(target: Path) -> KeptPass:
         raise ResultFileError(str(target), f"cannot be kept beside a finer pass ({error.strerror or error})") from error
 
 
+def expect_no_pass(path: Path) -> None:
+    """Say in the file of a finished pass that no other one follows. Raises ResultFileError."""
+    with refuse_damage(path):
+        storage = Store(path)
+    try:
+        storage.file.attrs.pop(MAY_FOLLOW, None)
+        storage.close()
+    except OSError as error:
+        storage.drop()
+        raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
+    except BaseException:
+        storage.drop()
+        raise
+
+
 class KeptPass:
     """The file of the last pass under a second name, until the next pass is finished; for one rank only.
 
@@ -103,6 +118,8 @@ class KeptPass:
             storage = Store(self._path)
         try:
             storage.file.attrs.update(reasons)
+            if not reasons:  # it is the last one
+                storage.file.attrs.pop(MAY_FOLLOW, None)
             storage.close()
         except BaseException:
             storage.drop()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -14,8 +15,10 @@ from pbem.model.model import Model
 from pbem.results.absent import fill
 from pbem.results.configuration import find_change
 from pbem.results.energy import Energy
+from pbem.results.former import read_ahead
 from pbem.results.layout import (
     ENERGIES,
+    MAY_FOLLOW,
     SHOWN,
     TIP_DATASETS,
     count_steps,
@@ -26,6 +29,7 @@ from pbem.results.layout import (
     list_pair_datasets,
     to_columns,
 )
+from pbem.results.opening import open_quietly
 from pbem.solve.problem.step import ContactState, Step
 
 # Places that differ by less than this part of the model's size and of its distance from the origin are one.
@@ -61,6 +65,16 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
                                     "run without resuming")
 
 
+def is_finished(path: Path, model: Model, mesh: Mesh) -> bool:
+    """Whether a file holds all steps of this case. Raises ResultFileError if it holds another one."""
+    with open_quietly(path) as file:
+        if file.attrs.get("status") != "finished" or file.attrs.get(MAY_FOLLOW):
+            return False
+        check_same_case(str(path), file, model, mesh)
+        k, steps = count_steps(file), file["steps"]
+        return k > 0 and (int(steps["stage"][k - 1]), float(steps["factor"][k - 1])) == (len(model.stages) - 1, 1.0)
+
+
 def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:
     """The last step that was stored completely, without its iterations; None if there is none."""
     steps = file["steps"]
@@ -78,6 +92,7 @@ def read_last_step(file: h5py.File, model: Model, mesh: Mesh) -> Step | None:
         number=int(steps["number"][k - 1]), stage=int(steps["stage"][k - 1]), factor=float(steps["factor"][k - 1]),
         iterations=(), residual=float(steps["residual"][k - 1]), **fields,
         contact=ContactState(**{name: contact.pop(name) for name in SHOWN}, internal=contact),
+        ahead=read_ahead(file, int(steps["number"][k - 1])),
     ))
 
 

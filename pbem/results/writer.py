@@ -23,9 +23,11 @@ from pbem.results.absent import Absence
 from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance
+from pbem.results.former import read_former, write_former
 from pbem.results.layout import (
     ENERGIES,
     ITERATION,
+    MAY_FOLLOW,
     SHOWN,
     STEP_DATASETS,
     append_row,
@@ -48,7 +50,7 @@ from pbem.results.store import Store, create_store, remove_stale_parts
 from pbem.results.tips import collect_tip_rules
 from pbem.results.unfinished import drop_unfinished, read_unfinished, write_unfinished
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
-from pbem.solve.problem.step import InteriorValues, Iteration, Step, Unfinished
+from pbem.solve.problem.step import Former, InteriorValues, Iteration, Step, Unfinished
 
 # What ends a run though nothing is wrong with it.
 STOPPED = (MemoryError, StorageError, BrokenPipeError)
@@ -70,7 +72,8 @@ class ResultWriter:
     if the model has such points.
 
     last_step: the last stored step of a resumed file (its `iterations` are empty), None of a new one. unfinished: the
-    step after it in which the run was stopped, or None. tip_rules: how the values at the tips follow from a step.
+    step after it in which the run was stopped, or None. former: the step before it, if it was of the same stage.
+    tip_rules: how the values at the tips follow from a step.
     """
 
     def __init__(
@@ -125,6 +128,7 @@ class ResultWriter:
             writer._start(target, storage, model, mesh, last_step, reached)
             with refuse_damage(target):
                 writer.unfinished = read_unfinished(file, writer._pairs)
+                writer.former = read_former(file, writer._pairs)
             storage.commit()
         except OSError as error:
             storage.drop()
@@ -141,6 +145,9 @@ class ResultWriter:
         self._model, self._mesh = model, mesh
         self.last_step = last_step
         self.unfinished: Unfinished | None = None
+        self.former: Former | None = None
+        self._before: Step | None = None
+        self._latest = last_step
         self._storage = storage
         self._every = max(1, model.output_every)
         faces = self._all_faces = list_faces(mesh)
@@ -172,6 +179,7 @@ class ResultWriter:
         steps before.
         """
         drop_unfinished(self._file)
+        self._before, self._latest = self._latest, step
         rows = [_iteration_row(step.number, iteration) for iteration in step.iterations]
         table = self._file["convergence"]
         # Files of earlier versions that are resumed have fewer columns.
@@ -207,6 +215,7 @@ class ResultWriter:
     def _store(self, step: Step) -> None:
         self._pending = None
         file = self._file
+        write_former(file, self._before, step, self._pairs)
         hoop_stress, reactions = self._evaluate_hoop_stress(step), self._sum_reactions(step.traction)
         tips = self.tip_rules.evaluate_all(step) if self.tip_rules.cracks else {}
         gone = self._absence.list_faces(step.stage)
@@ -293,8 +302,13 @@ class ResultWriter:
         count = len(self._model.conditions)
         return np.bincount(of, force.real, count) + 1j * np.bincount(of, force.imag, count)
 
-    def finish(self) -> None:
-        """Set the status to "finished" and close the file. Raises StorageError if the disk has no room."""
+    def finish(self, may_follow: bool = False) -> None:
+        """Set the status to "finished" and close the file. Raises StorageError if the disk has no room.
+
+        may_follow: another pass may take its place, with elements that are graded towards ends of contact.
+        """
+        if may_follow and self._storage.is_open:
+            self._file.attrs[MAY_FOLLOW] = True
         self._close("finished")
 
     def fail(self, reason: str, detail: str, status: str = "failed") -> None:

@@ -11,6 +11,7 @@ import pytest
 from pbem.case.build import parse_model
 from pbem.errors import CaseError
 from pbem.model.varying import Places, evaluate
+from tests.unit.case_sample import find_faults
 
 BLOCKS = """
 materials.m = { young = 1e3, poisson = 0.3, expansion = 1e-5 }
@@ -125,3 +126,18 @@ def test_a_flat_tool_that_is_pulled_off_is_refused(tool: str, text: str, stage: 
     # Bonds bear tension; and what is given moves.
     parse_model(case.replace('"head"] }', '"head"], law = "bonded" }') + text)
     parse_model(BLOCKS.replace("uy = -0.01", "uy = 0.01"))
+
+
+def test_a_force_at_the_boundary_of_a_region_at_fault() -> None:
+    """The fault of the region alone is told; the point, whose region has no boundary then, was a traceback."""
+    text = """
+materials.rock = { young = 1e3, poisson = 0.2 }
+curves.rim = { center = [0, 0], radius = 0.25, elements = 12 }
+curves.slit = { points = [[-0.15, -0.1], [-0.05, 0.1]], elements = 4 }
+regions.disc = { material = "rock", boundary = ["rim", "pin"], cracks = ["slit"] }
+interfaces.slit = { friction = 0.2 }
+point_loads.top = { at = [0.0, 0.25], fy = -0.1 }
+point_supports.left = { at = [-0.25, 0.0], ux = 0.0, uy = 0.0 }
+"""
+    faults = find_faults(text)
+    assert len(faults) == 1 and "'pin'" in str(faults[0])

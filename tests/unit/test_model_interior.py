@@ -62,3 +62,22 @@ def test_wrong_points_are_told(lines: str, place: str, text: str) -> None:
 
 def test_wrong_box_is_the_only_fault() -> None:
     assert "no width" not in find_only_fault(with_output("interior = { box = [1, 0, 1, 2], shape = [2, 2] }"))
+
+
+PLANE = """
+materials.rock = { young = 1e3, poisson = 0.2 }
+curves.ring = { center = [5e3, -2e3], radius = 0.5, elements = 8 }
+regions.plane = { material = "rock", boundary = ["ring"], infinite = true }
+remote = { syy = -1.0 }
+"""
+
+
+def test_points_of_a_plane_that_are_farther_away_than_numbers_reach() -> None:
+    """At 1e99 powers of the distance were no numbers, and stress was stored as NaN, as if outside of the body."""
+    faults = find_faults(PLANE + "output = { points = [[0, 1e99], [5e3, -1e3], [1e60, 0], [1e8, 2e8]] }")
+    assert [fault.split(":")[0].split(" ")[0] for fault in map(str, faults)] == ["output.points[1]", "output.points[3]"]
+    assert all("times the size of the model away" in str(fault) for fault in faults)
+    fault = find_only_fault(PLANE + "output = { interior = { box = [0, 0, 1, 1e40], shape = [2, 9] } }")
+    assert "output.interior.box" in fault
+    # Outside of bodies no field is evaluated.
+    assert len(build(with_output("points = [[0.25, 1e99]]")).interior_points) == 1

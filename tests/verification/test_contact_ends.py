@@ -155,6 +155,32 @@ def test_a_run_that_was_stopped_on_the_graded_mesh_goes_on_with_it(
                                atol=1e-9 * np.abs(whole).max())
 
 
+def test_a_finished_run_is_left_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where ends of contact were not graded, as an earlier version did not or the further pass was given up; but
+    not what was stopped between two passes."""
+    case, path = write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5"
+    planned = driver.plan_graded
+    with monkeypatch.context() as patch:
+        patch.setattr(driver, "plan_graded", lambda *_: None)
+        assert pbem.run(case, path).fractions is None
+    before = path.read_bytes()
+    assert pbem.run(case, path, resume=True).status == "finished"
+    assert path.read_bytes() == before
+
+    def stop(*given: Any) -> None:
+        planned(*given)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(driver, "plan_graded", stop)
+        with pytest.raises(KeyboardInterrupt):
+            pbem.run(case, path, force=True)
+    results = pbem.run(case, path, resume=True)
+    assert results.fractions is not None
+    again = path.read_bytes()
+    assert pbem.run(case, path, resume=True).status == "finished" and path.read_bytes() == again
+
+
 def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -172,6 +198,7 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     results = pbem.run(write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5")
     assert len(marches) == 2 and results.status == "finished"
     np.testing.assert_array_equal(np.asarray(results.contact["seat"].traction_n), plain)
+    assert pbem.run(tmp_path / "pin.toml", tmp_path / "pin.h5", resume=True).status == "finished" and len(marches) == 2
     assert not list(tmp_path.glob("pin.h5?*"))
 
 

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ import pytest
 import pbem
 from pbem.case.build import parse_model
 from pbem.contact.laws import start_memory
-from pbem.errors import ConvergenceError
+from pbem.errors import ConvergenceError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import world
+from pbem.results.reader import Results
 from pbem.solve.nonlinear.unsettled import Unsettled
+from pbem.solve.problem.step import SilentReporter, Step
 from pbem.solve.steps import march, softly
 from pbem.solve.steps.ends import find_reason
 from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction
@@ -321,6 +324,46 @@ def test_a_ring_slips_on_its_shaft_at_the_torque_of_friction(
     found = [float(each) for each in re.findall(r"(?:fraction|loads at|: at) ([0-9.]+)", str(caught.value))]
     assert found[1] == pytest.approx(limit, rel=2e-3) and 0.97 * found[1] <= found[0] < limit
     assert listener.tried <= steps + 7 and len(listener.rejected) <= 2
+
+
+class Stopping(SilentReporter):
+    """Stops the run as it accepts the step of this number."""
+
+    def __init__(self, number: int) -> None:
+        self.number, self.seen = number, 0
+
+    def accept(self, step: Step) -> None:
+        self.seen += 1
+        if self.seen == self.number:
+            raise StopError("SIGTERM", "stopped")
+
+
+def end_at_limit(case: Path, **options: Any) -> tuple[str, Results]:
+    with pytest.raises(ConvergenceError, match="limit load") as caught:
+        pbem.run(case, case.with_suffix(".h5"), **options)
+    return str(caught.value), pbem.open_results(case.with_suffix(".h5"))
+
+
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize("turned", [(1.25, 1.0, 1.0, 4, {"friction": 0.15}), (3.0, 1e-3, 1e6, 1, {"friction": 0.4})])
+def test_a_run_to_its_limit_load_that_was_stopped_ends_as_one_left_alone(
+    turned: tuple[float, float, float, int, dict[str, float]], every: int, tmp_path: Path
+) -> None:
+    """What was known of loads beyond, and how the pressures grow, is known after it was stopped or killed."""
+    case = tmp_path / "ring.toml"
+    case.write_text(f"output = {{ every = {every} }}\n" + write_press_fit(*turned)[0])
+    told, whole = end_at_limit(case)
+    last, factor, kept = int(whole.steps.number[-1]), whole.steps.factor[-1], case.with_suffix(".h5").read_bytes()
+    for number in (last - 1, last):
+        with pytest.raises(StopError):
+            pbem.run(case, case.with_suffix(".h5"), force=True, reporter=Stopping(number))
+        again, results = end_at_limit(case, resume=True)
+        assert again == told
+        assert (results.steps.number[-1], results.steps.factor[-1]) == (last, pytest.approx(factor, rel=1e-12))
+    # As after a kill: the steps alone.
+    case.with_suffix(".h5").write_bytes(kept)
+    again, results = end_at_limit(case, resume=True)
+    assert again == told and len(results.steps) == len(whole.steps)
 
 
 def test_a_pin_in_a_very_wide_plate_is_no_limit_load(tmp_path: Path) -> None:

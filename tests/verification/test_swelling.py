@@ -151,6 +151,8 @@ FAULTS = {
     "without expansion": ({"temperature": {"core": 1.0}}, "does not expand"),
     "not linear": ({"temperature": {"core": {"expression": "x*y"}}}, "not linear"),
     "misfit not linear": ({"eigenstrain": {"core": {"exy": {"expression": "x**2"}}}}, "core.exy: .* not linear"),
+    "misfit not finite": ({"eigenstrain": {"core": {"exx": {"expression": "1e400*x"}}}}, "core.exx: .* finite values"),
+    "misfit without value": ({"eigenstrain": {"core": {"eyy": {"expression": "log(-x*x)"}}}}, "core.eyy: .* nan "),
     "misfit as a table": ({"eigenstrain": {"core": {"exx": {"table": [[0, 1], [1, 2]]}}}}, "core.exx"),
     "of a stage": ({"stages": [{"eigenstrain": {"circle": {"exx": 1.0}}}]}, "stages"),
 }

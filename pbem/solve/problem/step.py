@@ -107,6 +107,14 @@ class Balance:
 
 
 @dataclass(frozen=True)
+class Former:
+    """The step before the last one, in the same stage: its fraction, and the normal tractions of the pairs (m,)."""
+
+    fraction: float
+    normal_traction: Real
+
+
+@dataclass(frozen=True)
 class Linearity:
     """How large strains, rotations (radians) and slips are, of r regions and i interfaces.
 
@@ -135,7 +143,8 @@ class Step:
     displacement, traction: (f,) complex at the nodes of `list_faces(mesh)`.
     duration: of the step, 0 where there is no time.
     interior: at the interior points, once evaluated. balance, linearity: None where they are not told.
-    support_reactions: force (2,) of every point support. last_of_stage: True at factor 1.
+    support_reactions: force (2,) of every point support. last_of_stage: True at factor 1. ahead: what is known of the
+    fractions of the stage beyond, as plain data (see pbem.solve.steps.attempt.describe_ceiling).
     """
 
     number: int
@@ -151,6 +160,7 @@ class Step:
     linearity: Linearity | None = None
     duration: float = 0.0
     support_reactions: Mapping[str, Real] = field(default_factory=dict)
+    ahead: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def last_of_stage(self) -> bool:

@@ -56,10 +56,23 @@ class Attempt:
             yield
         except StopError as stop:
             known = stop.unfinished or Unfinished(stage, 0.0, before.mode, before.sign)
-            ceiling = {**vars(self.ceiling), "error": self.ceiling.error and describe_error(self.ceiling.error)}
             stop.unfinished = replace(known, stage=stage, factor=self.target).within(
-                reached=reached, tries=self.tries, ceiling=ceiling, solver=solver)
+                reached=reached, tries=self.tries, ceiling=describe_ceiling(self.ceiling), solver=solver)
             raise
+
+
+def describe_ceiling(ceiling: Ceiling) -> Plain:
+    """As plain data; nothing if nothing is known."""
+    if ceiling == Ceiling():
+        return {}
+    return {**vars(ceiling), "error": ceiling.error and describe_error(ceiling.error)}
+
+
+def recall_ceiling(told: Plain | None) -> Ceiling:
+    """See `describe_ceiling`."""
+    if not told:
+        return Ceiling()
+    return Ceiling(**{**told, "error": told["error"] and recall_error(told["error"])})
 
 
 def take_up(
@@ -74,9 +87,7 @@ def take_up(
     search, target = unfinished.search, unfinished.factor
     # It was stopped after the search, with an earlier version, or with another operator.
     if search.get("solver") != solver:
-        return Attempt(Ceiling(), 0, target, ModeState(unfinished.mode, unfinished.sign))
+        return Attempt(recall_ceiling(search.get("ceiling")), 0, target, ModeState(unfinished.mode, unfinished.sign))
     if abs(search["reached"] - reached) > SAME:
         return None
-    ceiling = dict(search["ceiling"])
-    ceiling["error"] = ceiling["error"] and recall_error(ceiling["error"])
-    return Attempt(Ceiling(**ceiling), search["tries"], target, None, search["inner"])
+    return Attempt(recall_ceiling(search["ceiling"]), search["tries"], target, None, search["inner"])

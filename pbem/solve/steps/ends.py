@@ -11,8 +11,9 @@ from pbem.contact.separating import find_bonded
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.given import is_driven
 from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import Former
 from pbem.solve.steps.ceiling import Ceiling
-from pbem.solve.steps.limit_load import Former, can_balance, find_balanced_fraction, find_held, find_sliding_fraction
+from pbem.solve.steps.limit_load import can_balance, find_balanced_fraction, find_held, find_sliding_fraction
 
 # Reasons for which a step without equilibrium can fail.
 UNSETTLED = ("iteration limit", "mode cycle", "singular tangent", "no admissible modes")

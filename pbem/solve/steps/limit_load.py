@@ -17,6 +17,7 @@ from pbem.contact.laws import Memory, PairLaws, tensile_limit
 from pbem.contact.loads import Load
 from pbem.solve.problem.given import BALANCED, collect_given, find_push
 from pbem.solve.problem.problem import Problem
+from pbem.solve.problem.step import Former
 
 # A share that is less than the whole by no more than this is the whole.
 ROUNDING = 1e-6
@@ -45,14 +46,6 @@ def can_balance(problem: Problem, memory: Memory, stage: int, fraction: float) -
     """Whether some tractions balance the loads at a fraction of a stage; None if unknown, as above."""
     solved = _solve(problem, memory, stage, fraction, fraction)
     return None if solved is None or not solved.certain else solved.share is not None
-
-
-@dataclass(frozen=True)
-class Former:
-    """The step before the last one, in the same stage: its fraction, and the normal tractions of the pairs (m,)."""
-
-    fraction: float
-    normal_traction: Real
 
 
 @dataclass(frozen=True)

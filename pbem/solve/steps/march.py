@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
 import numpy as np
@@ -17,9 +17,9 @@ from pbem.solve.nonlinear.checkpoint import describe_error, from_plain, recall_e
 from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.problem.arranged import Arranged, begin_stage, describe_rest
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.step import ContactState, Step, Supervisor, Unfinished
+from pbem.solve.problem.step import ContactState, Former, Step, Supervisor, Unfinished
 from pbem.solve.problem.tangent import TangentOperator
-from pbem.solve.steps.attempt import Attempt, take_up
+from pbem.solve.steps.attempt import Attempt, describe_ceiling, recall_ceiling, take_up
 from pbem.solve.steps.ceiling import SAFE, Ceiling
 from pbem.solve.steps.ends import (
     UNSETTLED,
@@ -32,7 +32,6 @@ from pbem.solve.steps.ends import (
     find_sliding,
     refuse_load,
 )
-from pbem.solve.steps.limit_load import Former
 from pbem.solve.steps.proportional import is_proportional, is_proportional_at_last
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.steps.softly import solve_softly
@@ -51,6 +50,8 @@ Guess = Callable[[int, float, Memory, Real], ModeState | None]
 @dataclass(frozen=True)
 class Start:
     """Where a march begins: after a number of steps, at a fraction of a stage, with the memory and state of the pairs.
+
+    former: the step before the last one, if it was of the same stage; ceiling: what is known of fractions beyond.
     """
 
     number: int
@@ -58,6 +59,8 @@ class Start:
     factor: float
     memory: Memory
     contact: ContactState
+    former: Former | None = None
+    ceiling: Ceiling = field(default_factory=Ceiling)
 
 
 @dataclass(frozen=True)
@@ -78,12 +81,13 @@ def resume_modes(contact: ContactState) -> ModeState:
     return ModeState(contact.mode, np.where(contact.traction_s < 0, -1.0, 1.0))
 
 
-def start_from(problem: Problem, number: int, stage: int, factor: float, contact: ContactState) -> Start:
-    """The state of a stored step."""
+def start_from(problem: Problem, last: Step, former: Former | None) -> Start:
+    """The state of a stored step; former: see Start."""
+    contact = last.contact
     modes = resume_modes(contact)
     elastic = problem.laws.compliance_s * contact.traction_s
     memory = Memory(modes, contact.slip - elastic, contact.internal, contact.traction_n, contact.opening)
-    return Start(number, stage, factor, memory, contact)
+    return Start(last.number, last.stage, last.factor, memory, contact, former, recall_ceiling(last.ahead))
 
 
 def march(
@@ -112,7 +116,7 @@ def march(
                 memory = begin_stage(whole, stage, memory, contact)
             if reached < 1.0:
                 problem, tangent = arranged.enter(stage, reached, contact)
-            ceiling, former = Ceiling(), None
+            ceiling, former = (begin.ceiling, begin.former) if stage == begin.stage else (Ceiling(), None)
             while reached < 1.0:
                 planned = next(k / steps for k in range(1, steps + 1) if k / steps > reached * (1 + 1e-12))
                 attempt = take_up(unfinished, stage, reached, planned, type(tangent).__name__) or Attempt(ceiling)
@@ -125,11 +129,12 @@ def march(
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
                 number += 1
                 step = describe_step(problem, solution, memory, number, stage, reached, recover)
+                step = replace(step, ahead=describe_ceiling(ceiling))
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)
                 depth = note_passing(problem, step, depth, reporter)
                 contact = step.contact
-                with note_place(stage, reached, solution.modes):
+                with note_place(step, solution.modes):
                     reporter.accept(step)
                 if reached >= 1.0 and stage == len(whole.model.stages) - 1:
                     arranged.leave()
@@ -256,12 +261,13 @@ def _solve_usually(
 
 
 @contextmanager
-def note_place(stage: int, factor: float, modes: ModeState) -> Iterator[None]:
+def note_place(step: Step, modes: ModeState | None = None) -> Iterator[None]:
     """Where the run is stopped within, say in which step, and with which modes of the pairs it can go on."""
     try:
         yield
     except StopError as stop:
-        stop.unfinished = Unfinished(stage, factor, modes.mode, modes.sign)
+        modes = modes or resume_modes(step.contact)
+        stop.unfinished = Unfinished(step.stage, step.factor, modes.mode, modes.sign, {"ceiling": step.ahead})
         raise
 
 

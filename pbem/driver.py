@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -192,7 +193,7 @@ def _refine_and_solve(
             watch.note(planned.note)
         if planned is None or planned.model is model:
             if decision.ends:
-                do_on_first(watch.comm, PbemError, lambda path=target.path: expect_no_pass(path))
+                do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path))
             return
         model, graded, kept, watch.most = planned.model, graded + 1, None, planned.most
 

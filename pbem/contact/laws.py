@@ -29,6 +29,7 @@ from pbem.contact.strength import choose_strength
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
 from pbem.model.varying import Places, Value, Varying
+from pbem.uniform import fold_uniform, repeat_value
 
 Modes = NDArray[np.int8]
 
@@ -76,7 +77,7 @@ class PairLaws:
     def __post_init__(self) -> None:
         for name in ("rest", "stiffening"):
             if not len(getattr(self, name)):
-                object.__setattr__(self, name, np.zeros(len(self.gap)))
+                object.__setattr__(self, name, repeat_value(0.0, len(self.gap)))
 
     @property
     def count(self) -> int:
@@ -175,13 +176,13 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
     places = Places(pairs.position + model.origin, pairs.arc_length)
 
     def spread(values: list) -> np.ndarray:
-        return np.array(values)[pairs.interface] if values else np.zeros(0)
+        return fold_uniform(np.array(values)[pairs.interface]) if values else np.zeros(0)
 
     return PairLaws(
         strengths=_group_strengths(laws, pairs.interface, model.law_texts, places),
-        tensile_strength=spread_values([law.tensile_strength for law in laws], pairs.interface, places),
-        gap=pairs.distance + spread_values([0.0 if law.kind == "bonded" else law.gap for law in laws],
-                                           pairs.interface, places),
+        tensile_strength=fold_uniform(spread_values([law.tensile_strength for law in laws], pairs.interface, places)),
+        gap=fold_uniform(pairs.distance + spread_values(
+            [0.0 if law.kind == "bonded" else law.gap for law in laws], pairs.interface, places)),
         bonded=spread([law.kind == "bonded" for law in laws]).astype(bool),
         parted=spread([law.kind == "open" for law in laws]).astype(bool),
         brittle=spread([law.cohesion_lost for law in laws]).astype(bool),
@@ -240,6 +241,8 @@ def _group_strengths(
                                 places.take(pairs))
             for name in names
         }
+        if function not in functions.values():  # a law of the user's may write to what it is given
+            values = {name: fold_uniform(each) for name, each in values.items()}
         groups.append(StrengthGroup(function, pairs, values))
     return tuple(groups)
 

@@ -20,6 +20,10 @@ from pbem.model.model import Model, Region, Stage
 from pbem.model.swelling import NO_SWELLING
 from pbem.model.varying import Moment, Places, Value, Varying, blend
 from pbem.model.walls import Wall
+from pbem.uniform import fold_uniform, repeat_value
+
+# Nodes at which fields are evaluated at a time.
+SAMPLED = 4096
 
 
 @dataclass(frozen=True)
@@ -125,15 +129,16 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     points = [each for region, particular in zip(model.regions, particulars, strict=True) if region.infinite
               for each in particular.points]
     far = _sample(mesh, [far_solution(model, region, remote) for region in model.regions])
-    particular = balanced[0] + far[0]
+    particular = balanced[0] + far[0] if any(balanced.strides) else far[0]
     rigid = evaluate_rigid(model, stage, factor)
+    if any(body.tool for body in model.rigid.values()):
+        far = far.copy()
     for number, given in enumerate(rigid):
         _load_tool(model, mesh, number, given, far[0])
-    known = np.where(mesh.node_crack, [[0.0], [1.0]], 1.0) * balanced
     return Load(
         values=values,
-        pressure=evaluate_pressure(model, mesh, stage, factor),
-        known=np.stack([known.real, known.imag], axis=2).ravel(),
+        pressure=fold_uniform(evaluate_pressure(model, mesh, stage, factor)),
+        known=_spread_known(mesh, balanced),
         far=far,
         particular=particular,
         of_points=_sample(mesh, [each.of_points for each in particulars])[0],
@@ -184,6 +189,8 @@ def evaluate_pressure(model: Model, mesh: Mesh, stage: int, factor: float) -> Re
 
 def evaluate_walls(model: Model, mesh: Mesh, stage: int, factor: float) -> Real:
     """Tractions (m, 2) along n and s on the sides that are left of pairs whose other side is gone."""
+    if not model.stages[stage].walls:
+        return repeat_value(0.0, (mesh.pairs.count, 2))
     result = np.zeros((mesh.pairs.count, 2))
     before = model.stages[stage - 1].walls if stage > 0 else {}
     moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
@@ -217,13 +224,29 @@ def _blend_all(values: Sequence[tuple[Value, Value]], owner: Integer, places: Pl
     return result
 
 
+def _spread_known(mesh: Mesh, balanced: Complex) -> Real:
+    """Displacements and tractions (4 nodes,) of the balanced solutions; of cracks the tractions alone."""
+    if not any(balanced.strides):
+        return repeat_value(0.0, 4 * mesh.nodes)
+    known = np.empty((2, mesh.nodes, 2))
+    known[..., 0], known[..., 1] = balanced.real, balanced.imag
+    known[0, mesh.node_crack] = 0.0
+    return known.ravel()
+
+
 def _sample(mesh: Mesh, particulars: Sequence[ParticularSolution]) -> Complex:
-    """Displacement and traction (2, nodes) of the regions' particular solutions at all nodes."""
+    """Displacement and traction (2, nodes) of the regions' particular solutions at all nodes.
+
+    Some nodes at a time, as what they are computed by takes several times the room of the fields; see `repeat_value`
+    where there is none.
+    """
+    if all(particular.is_zero for particular in particulars):
+        return repeat_value(0.0, (2, mesh.nodes), complex)
     fields = np.zeros((2, mesh.nodes), dtype=complex)
     ends = np.searchsorted(mesh.node_region, np.arange(len(particulars) + 1))
     for region, particular in enumerate(particulars):
-        if not particular.is_zero:
-            own = slice(ends[region], ends[region + 1])
+        for begin in range(ends[region], ends[region + 1], SAMPLED) if not particular.is_zero else ():
+            own = slice(begin, min(begin + SAMPLED, ends[region + 1]))
             fields[0, own] = particular.displacement(mesh.position[own])
             fields[1, own] = particular.traction(mesh.position[own], mesh.normal[own])
     return fields

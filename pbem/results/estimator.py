@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -39,8 +40,7 @@ class Follower(Protocol):
 class Estimator:
     """Estimated errors of the steps of a run; made and asked by all ranks together.
 
-    missing: why there are no estimates, of some steps or all; empty if there are. comparison: of all steps so far, on
-    the first rank.
+    missing: why there are no estimates, of some steps or all; empty if there are.
     """
 
     def __init__(
@@ -51,11 +51,19 @@ class Estimator:
         this is the first rank, which alone compares. rules: of the run's tips, if they are known there."""
         self.missing = missing
         self._first = first
+        self._model, self._mesh, self._beside, self._rules = model, mesh, beside, rules
         self._names = list(sort_pairs(mesh))
         self._worst = {kind: (0.0, "", 0) for kind in VIOLATIONS}
-        self.comparison = Comparison(model, mesh, beside, rules=rules)
-        self._between = BetweenNodes(model, mesh)
         self._second = second
+
+    @cached_property
+    def comparison(self) -> Comparison:
+        """Of all steps so far; the first rank alone has it, from the first step on."""
+        return Comparison(self._model, self._mesh, self._beside, rules=self._rules)
+
+    @cached_property
+    def _between(self) -> BetweenNodes:
+        return BetweenNodes(self._model, self._mesh)
 
     def estimate(self, step: Step) -> Mapping[str, Real]:
         """The estimated errors of a step, on the first rank: see `pbem.results.estimates.to_rows`."""

@@ -1,0 +1,24 @@
+"""Arrays whose values are all alike, stored once: what is the same at all pairs or nodes is most of a simple model."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def repeat_value(value: Any, shape: int | tuple[int, ...], dtype: DTypeLike = float) -> NDArray[Any]:
+    """An array of one value, which takes no room and cannot be written to."""
+    return np.broadcast_to(np.asarray(value, dtype=dtype), shape)
+
+
+def fold_uniform(values: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The same values; where all are alike, to the bit, in an array that takes no room and cannot be written to."""
+    if values.size < 2:
+        return values
+    # By bits: numbers that are equal can differ in the sign of zero, and NaN is like nothing.
+    bits = np.ascontiguousarray(values).reshape(-1).view(np.uint8).reshape(values.size, -1)
+    return np.broadcast_to(values.reshape(-1)[0], values.shape) if (bits == bits[0]).all() else values

@@ -1,0 +1,82 @@
+"""Arrays whose values are all alike are stored once, and nothing else is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbem.contact.laws import collect_laws
+from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.mesh.generate import generate_mesh
+from pbem.uniform import fold_uniform, repeat_value
+from tests.unit.case_sample import build
+
+FIELD = """
+[materials.rock]
+young = 2.0e4
+poisson = 0.25
+[regions.rock]
+material = "rock"
+infinite = true
+[remote]
+syy = -1.0
+sxy = 0.2
+[[generate]]
+kind = "cracks"
+name = "crack"
+region = "rock"
+count = 12
+elements = 6
+half_length = 0.8
+distance = 0.1
+box = [0, 0, 12, 12]
+friction = 0.5
+[analysis]
+steps = 1
+"""
+
+
+@pytest.mark.parametrize("values", [
+    np.full(7, 0.1), np.zeros((3, 2)), np.full(5, np.nan), np.full(4, 1 - 2j), np.ones(6, dtype=bool), np.full(4, 7),
+    np.full((2, 3), 1.5).T,
+])  # fmt: skip
+def test_what_is_alike_takes_no_room(values: np.ndarray) -> None:
+    folded = fold_uniform(values)
+    assert not any(folded.strides)
+    assert folded.dtype == values.dtype
+    assert np.ascontiguousarray(folded).tobytes() == np.ascontiguousarray(values).tobytes()
+    with pytest.raises(ValueError, match="read-only"):
+        folded[...] = values
+
+
+@pytest.mark.parametrize("values", [
+    np.array([0.0, -0.0]), np.array([1.0, np.nan]), np.array([0.1, np.nextafter(0.1, 1)]), np.array([1j, 1]),
+    np.array([True, False]), np.array([3, 4]), np.zeros(0), np.array([5.0]),
+])  # fmt: skip
+def test_what_differs_in_a_bit_stays(values: np.ndarray) -> None:
+    assert fold_uniform(values) is values
+
+
+def test_repeated_values_are_those_of_full_arrays() -> None:
+    assert np.array_equal(repeat_value(2.5, (3, 2)), np.full((3, 2), 2.5))
+    assert repeat_value(0.0, 4, complex).dtype == complex
+    assert repeat_value(0.0, 0).shape == (0,)
+
+
+def measure(item: object) -> int:
+    """Bytes of the arrays of an object that take room."""
+    arrays = [each for each in vars(item).values() if isinstance(each, np.ndarray)]
+    return sum(each.nbytes for each in arrays if any(each.strides))
+
+
+def test_laws_and_loads_of_alike_cracks_take_little_room() -> None:
+    """Of pairs in one crack, those that depend on the place are left: stiffness, leader, and the field far away."""
+    model = build(FIELD)
+    mesh = generate_mesh(model)
+    laws = collect_laws(model, mesh)
+    assert measure(laws) <= 8 * 3 * laws.count
+    assert all(not any(each.strides) for group in laws.strengths for each in group.parameters.values())
+    load = evaluate_load(model, mesh, collect_outer_nodes(model, mesh), 0, 0.5)
+    # The field far away: displacement and traction; nothing else is there.
+    assert measure(load) <= 16 * 3 * mesh.nodes
+    assert not load.known.any()

@@ -175,18 +175,18 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
 
     places = Places(pairs.position + model.origin, pairs.arc_length)
 
-    def spread(values: list) -> np.ndarray:
-        return fold_uniform(np.array(values)[pairs.interface]) if values else np.zeros(0)
+    def spread(values: list, kind: type = float) -> np.ndarray:
+        return fold_uniform(np.array(values, dtype=kind)[pairs.interface])
 
     return PairLaws(
         strengths=_group_strengths(laws, pairs.interface, model.law_texts, places),
         tensile_strength=fold_uniform(spread_values([law.tensile_strength for law in laws], pairs.interface, places)),
         gap=fold_uniform(pairs.distance + spread_values(
             [0.0 if law.kind == "bonded" else law.gap for law in laws], pairs.interface, places)),
-        bonded=spread([law.kind == "bonded" for law in laws]).astype(bool),
-        parted=spread([law.kind == "open" for law in laws]).astype(bool),
-        brittle=spread([law.cohesion_lost for law in laws]).astype(bool),
-        fluid_inside=spread([law.pressurised == "all" for law in laws]).astype(bool),
+        bonded=spread([law.kind == "bonded" for law in laws], bool),
+        parted=spread([law.kind == "open" for law in laws], bool),
+        brittle=spread([law.cohesion_lost for law in laws], bool),
+        fluid_inside=spread([law.pressurised == "all" for law in laws], bool),
         compliance_n=spread([1 / law.normal_stiffness if law.normal_stiffness else 0.0 for law in laws]),
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
         stiffness=SOFTNESS * modulus / length,

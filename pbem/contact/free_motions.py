@@ -18,6 +18,8 @@ from pbem.model.rigid_body_modes import PairTie, RigidBodyMode, Tie, find_rigid_
 APART = 1e-6
 # A motion is one of those that are anchored if it differs by less than this part of itself.
 ANCHORED = 1e-6
+# Anchors that carry less than this part of what a motion does to them do not hold it.
+SEEN = 1e-6
 
 
 def find_ties(model: Model, mesh: Mesh, modes: ModeState) -> dict[str, Tie | PairTie]:
@@ -72,6 +74,11 @@ class FreeMotions:
     def text(self) -> str:
         """The free motions in words."""
         return "; ".join(motion.text for motion in self.motions)
+
+    def are_held_by(self, acting: Real) -> bool:
+        """Whether these combinations of anchors (a, k), which act in some other modes, hold all free motions."""
+        sizes = np.linalg.svd(acting.T @ self.acting, compute_uv=False)
+        return int((sizes > SEEN).sum()) == self.acting.shape[1]
 
 
 def find_free_motions(

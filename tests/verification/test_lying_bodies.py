@@ -169,3 +169,44 @@ def test_a_body_without_contacts_beside_one_that_slides_away(tmp_path: Path) -> 
     with pytest.raises(ConvergenceError) as caught:
         pbem.run(case, tmp_path / "slide.h5")
     assert caught.value.reason in ("limit load", "free motion") and "'b'" in caught.value.detail
+
+
+# The box is moved by more than there is room around the discs: at the places that they had they would be in its way.
+BOX = """
+title = "loose discs in a box that is moved"
+materials.m = {{ young = {young}, poisson = 0.4 }}
+materials.d = {{ young = {soft}, poisson = 0.1 }}
+curves.bottom = {{ points = [[{low}, {low}], [{high}, {low}]], elements = 8 }}
+curves.right = {{ points = [[{high}, {low}], [{high}, {high}]], elements = 8 }}
+curves.top = {{ points = [[{high}, {high}], [{low}, {high}]], elements = 8 }}
+curves.left = {{ points = [[{low}, {high}], [{low}, {low}]], elements = 8 }}
+curves.a = {{ center = [{a}, {b}], radius = {radius}, elements = 24 }}
+curves.b = {{ center = [{b}, {a}], radius = {radius}, elements = 16 }}
+regions.da = {{ material = "d", boundary = ["a"] }}
+regions.db = {{ material = "d", boundary = ["b"] }}
+regions.box = {{ material = "m", boundary = ["bottom", "right", "top", "left", "a", "b"] }}
+interfaces.a = {{ law = "coulomb", friction = {friction}, gap = {gap} }}
+interfaces.b = {{ law = "coulomb", friction = {friction}, gap = {gap} }}
+boundary.bottom = {{ un = 0.0, us = 0.0 }}
+boundary.top = {{ un = {un}, us = {us} }}
+analysis = {{ order = 2, steps = 1 }}
+"""
+
+
+@pytest.mark.parametrize(("pull", "shear", "friction"), [(8.0, 0.0, 0.3), (9.0, 1.0, 0.5), (10.0, -2.0, 0.3)])
+@pytest.mark.parametrize(("length", "young"), [(1.0, 1.0), (1e3, 2e5)], ids=["numbers", "mm"])
+def test_loose_discs_move_with_their_holes(
+    pull: float, shear: float, friction: float, length: float, young: float, tmp_path: Path
+) -> None:
+    """pull, shear: by which the top moves, relative to the gap around the discs."""
+    gap = 1e-4 * length
+    text = BOX.format(young=young, soft=0.3 * young, low=0.0, high=length, a=0.3 * length, b=0.7 * length,
+                      radius=0.06 * length, gap=gap, un=pull * gap, us=shear * gap, friction=friction)  # fmt: skip
+    (tmp_path / "box.toml").write_text(text)
+    listener = Listener()
+    results = pbem.run(tmp_path / "box.toml", tmp_path / "box.h5", reporter=listener)
+    for name in ("a", "b"):
+        assert np.abs(results.contact[name].traction_n[-1]).max() < 1e-6 * young * pull * gap / length
+        assert results.contact[name].opening[-1].min() > -1e-8 * gap
+    assert results.steps.iterations.max() <= 12
+    assert any(text.startswith("Nothing presses on") for text in listener.notes)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbem.arrays import Bool, Integer, Real
+from pbem.arrays import Integer, Real
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.cut_parts import CutMotion
 from pbem.contact.floating import measure_space
@@ -31,6 +31,7 @@ from pbem.solve.nonlinear.balance import measure_balance
 from pbem.solve.nonlinear.blocks import open_floating, place_block
 from pbem.solve.nonlinear.imbalance import DRIVEN
 from pbem.solve.nonlinear.resting import describe_lying, find_idle, find_pairs_around, let_lie, rest_bodies
+from pbem.solve.nonlinear.rolling import roll
 from pbem.solve.nonlinear.unsettled import Unsettled
 from pbem.solve.problem.problem import Problem
 
@@ -46,8 +47,8 @@ SLIGHT = 1e-2
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
 SHARES = (0.0, 0.3, 1.0)
-# Bodies that nothing drives are laid down so often in one step.
-MOST_LAID = 12
+# So often in one step contacts leave bodies to anchors, and bodies that nothing drives are laid down.
+MOST_LEFT, MOST_LAID = 2, 12
 
 
 class Hold:
@@ -68,11 +69,14 @@ class Hold:
         self.pairs: Integer = np.zeros(0, dtype=np.int64)
         self.count = 0
         self.driven = False
+        # The anchors that act in the present solution, and how often contacts left bodies to more of them.
+        self.acting: Real | None = None
+        self.left = 0
         self.repeated = 0
         # Whether pairs that were closed to hold a body opened again each time: then it rolls away from them.
         self.rolls = False
         # The sense of the friction of pairs that stuck last.
-        self.sense = np.zeros(problem.laws.count, dtype=np.int8)
+        self.sense = np.zeros(problem.laws.count, dtype=np.int64)
         # So often bodies were found free, and laid down where nothing drives them; their names.
         self.freed, self.laid, self.rested = 0, 0, set[str]()
         # Blocks that pairs were closed to hold; the last state of all pairs that was found; what floats in it.
@@ -87,7 +91,12 @@ class Hold:
         """The constraint map, with the anchors taken off whose motions the pairs hold; decided by the first rank."""
         if not self.problem.anchors:
             return constraints
-        released = broadcast(self.problem.comm, self._find_free_motions(modes).released)
+        support = self._find_free_motions(modes)
+        # Where a body has no place of its own anchors push it into the faces around it, which push it off again.
+        self.left += self.acting is not None and support.acting.shape[1] > self.acting.shape[1]
+        self.acting = support.acting
+        released, self.left = broadcast(self.problem.comm, (support.released, self.left))
+        self.driven |= self.left >= MOST_LEFT
         return replace(constraints, released=released)
 
     def is_driven(self, modes: ModeState, v: Real, load: Load) -> bool:
@@ -138,7 +147,8 @@ class Hold:
         left = None
         if before is not None:
             self._note_sense(before)
-            modes, left = self._roll(modes, before) if self.rolls else (modes, None)
+            if self.rolls:
+                modes, left = roll(mesh, laws, self.list_free(modes), self.sense, modes, before)
         # No more than hold it: a third pair beside the two on which a round body lies would pull at it.
         for least in range(2, CLOSED_AT_LEAST + 1):
             closed = close_nearest_pairs(mesh, laws, modes, opening, least, left)
@@ -170,21 +180,6 @@ class Hold:
         if self.state is not None:
             stuck = (before.mode == STICK) & (self.state.p_s != 0.0)
             self.sense[stuck] = np.sign(self.state.p_s[stuck])
-
-    def _roll(self, modes: ModeState, before: ModeState) -> tuple[ModeState, Bool]:
-        """The modes of bodies that roll, and the pairs (m,) away from which they do so, as one that sticks is left.
-
-        A body rolls about a pair that sticks: where one pair alone is left closed, it does. Pairs that are open have
-        the sense in which they were dragged when they stuck, as two that stick pull at each other.
-        """
-        pairs, count = self.problem.mesh.pairs, len(self.problem.mesh.interface_names)
-        closed, rolls = modes.mode != OPEN, find_contacts_of(self.problem.mesh, self.list_free(modes))
-        alone = closed & (np.bincount(pairs.interface[closed], minlength=count) == 1)[pairs.interface] & rolls
-        sticks = alone & resists_slip(self.problem.laws)
-        mode = np.where(sticks, STICK, modes.mode).astype(np.int8)
-        sign = np.where(~closed & rolls & (self.sense != 0), self.sense, modes.sign)
-        held = np.bincount(pairs.interface[sticks & (before.mode == STICK)], minlength=count) > 0
-        return ModeState(mode, sign), np.asarray((before.mode != OPEN) & ~closed & held[pairs.interface])
 
     def _stick_bodies(self, closed: ModeState, slip: Real, before: ModeState | None, modes: ModeState) -> ModeState:
         """The closed modes, with pairs sticking that hold the bodies; the same if nothing does."""
@@ -320,8 +315,13 @@ class Hold:
     def _stick_bonded(self, modes: ModeState) -> ModeState:
         return stick_bonded(self.problem.laws, self.memory, modes, self.settled)
 
-    def leaves_free(self, modes: ModeState) -> bool:
-        """Whether neither pairs nor anchors hold some body, or part of one, in given modes."""
+    def leaves_free(self, modes: ModeState, anchored: bool = False) -> bool:
+        """Whether neither pairs nor anchors hold some body, or part of one, in given modes.
+
+        anchored: by those anchors that act in the present solution: with other ones its responses are not theirs.
+        """
+        if anchored and self.acting is not None and not self._find_free_motions(modes).are_held_by(self.acting):
+            return True
         return bool(self.find_free(modes) or self._find_cut_motions(modes))
 
     def describe_free_motion(self, modes: ModeState) -> ConvergenceError | None:

@@ -345,9 +345,14 @@ def _pivot(
     def settle() -> Settled:
         if tangent.settling.nearby and len(group) > MOST_ASKED:
             return settle_parts(subset, response, search.proposal.modes, group, judge)
+        found = _settle(True)
+        # Modes that other anchors hold are still nearer, where there are none with those that act.
+        return found if found.modes is not None or not problem.anchors else _settle(False)
+
+    def _settle(anchored: bool) -> Settled:
         return settle_subset(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
-            lambda own: not hold.leaves_free(complete(own)),
+            lambda own: not hold.leaves_free(complete(own), anchored),
         )
 
     found: Settled = problem.decide(settle)

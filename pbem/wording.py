@@ -46,6 +46,11 @@ def count(number: float, noun: str) -> str:
     return f"{digits} {noun}{'s' * (number != 1)}"
 
 
+def write_percent(part: float) -> str:
+    """A part of a whole in percent with two digits, and never with an exponent below a million: 100, not 1e+02."""
+    return f"{float(f'{100 * part:.2g}'):g}"
+
+
 def list_names(names: Iterable[str], most: int = 20) -> str:
     """Names for a message, shortened."""
     listed = list(names)

@@ -30,11 +30,11 @@ from pbem.model.fitting import fit_curves
 from pbem.model.grading import check_turning, grade_curves
 from pbem.model.in_situ import AT_REST, LinearStress
 from pbem.model.interior import check_interior_points, list_interior_points
-from pbem.model.kinks import split_at_kinks
+from pbem.model.kinks import list_varying, split_at_kinks
 from pbem.model.law import check_along
 from pbem.model.load_notes import note_jumps, note_loads
 from pbem.model.loading import Loading, list_held, read_loading
-from pbem.model.loads_along import check_loads, list_filled, list_given
+from pbem.model.loads_along import check_loads, list_filled
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.origin import move_to_own_origin
@@ -124,8 +124,9 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     loading = read_loading(case, roles)
     overlaps = [(name, table.between, table.overlap) for name, table in case.contacts.items()]
     in_stages = [stage.point_loads for stage in case.stages]
-    kinked = [(loc, given) for loc, _, given, _ in list_given(case)]
-    pointed = (case.point_loads, in_stages, case.point_supports, list_held(loading.conditions), kinked)
+    kinked = [(loc, given) for loc, _, given in list_varying(case)]
+    pointed = (case.point_loads, in_stages, case.point_supports, list_held(loading.conditions), kinked,
+               list_filled(case))
     drawn = (*shown, cut.notes, cut.faults, case.curves, pointed, case.tools, overlaps)
     topology = recall.find("topology", drawn, lambda: _find_topology(cut, loading))
     interior, wrong = list_interior_points(case)

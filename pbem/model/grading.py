@@ -70,8 +70,18 @@ def grade_curves(
             replace(leg, refine_start=start, refine_end=end, singular_start=singular_start, singular_end=singular_end)
             for leg, (start, end), (singular_start, singular_end) in zip(curve.legs, wanted, singular, strict=True)
         ]
+        if grading == "auto":
+            legs = [_add_to_arc(leg) for leg in legs]
         result[name] = Curve(name, tuple(legs))
     return result, _describe(case, result)
+
+
+def _add_to_arc(leg: Leg) -> Leg:
+    """The leg with so many elements that none turns too far, as refined as it is: their number is a minimum."""
+    count = leg.elements
+    while leg.turn and _widest_turn(leg, count) > WIDEST_ARC * (1 + 1e-9):
+        count += 1
+    return replace(leg, elements=count) if count > leg.elements else leg
 
 
 def check_turning(case: Case, curves: Mapping[str, Curve]) -> list[Fault]:

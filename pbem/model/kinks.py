@@ -43,7 +43,7 @@ def split_at_kinks(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
     """The curves, with an end of a leg at each kink of what varies on them by tables or expressions of the place alone:
     conditions, springs, fluid pressure, strengths, gaps. Of a contact both curves have it."""
     kinks: dict[str, dict[int, list[float]]] = {}
-    for loc, name, given in _list_varying(case):
+    for loc, name, given in list_varying(case):
         value = read_value(loc, given, timed=True)[0]
         if name in curves and isinstance(value, Varying) and not value.timed:
             for number, found in _find_on_curve(value, curves[name]):
@@ -56,7 +56,7 @@ def split_at_kinks(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
     return {name: _split(curve, kinks[name]) if name in kinks else curve for name, curve in curves.items()}
 
 
-def _list_varying(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable]]:
+def list_varying(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable]]:
     """Place, curve (of a contact the first), and what varies along it."""
     for key in ("boundary", "interfaces", "contacts"):
         tables: list[tuple[KeyPath, Table]] = [((key, name), table) for name, table in getattr(case, key).items()]

@@ -29,8 +29,9 @@ OVERLAP = 1e-3
 REACH = 2.0
 # A leg is not split nearer to its ends than this part of its mean element.
 LEAST_PIECE = 0.25
-# Nor for faces farther away than this part of the shorter curve, between which there is no fluid.
-FAR = 0.25
+# Nor for faces farther away than this part of the shorter curve, between which there is no fluid. Those that are
+# farther away than this piece have to be opposite within 20 degrees: a disc on a block does not face its top's ends.
+FAR, OPPOSITE_FAR = 0.25, -0.94
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,8 @@ def _find_opposite(
         return None
     if not ahead[0] <= apart <= ahead[1] or distance > ahead[1]:
         return None
-    return None if (normal * outward.conjugate()).real > OPPOSITE else (number, t)
+    near = distance <= LEAST_PIECE * leg.length / leg.elements
+    return None if (normal * outward.conjugate()).real > (OPPOSITE if near else OPPOSITE_FAR) else (number, t)
 
 
 def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]]) -> list[Strip]:

@@ -21,6 +21,7 @@ from pbem.results.tip_notes import compare_release, explain_missing_factors
 from pbem.results.trace_names import name_trace
 from pbem.results.traces import list_traces
 from pbem.wording import count as _count
+from pbem.wording import write_percent
 
 MOST_TIPS = 10
 MOST_ERRORS = 10
@@ -192,7 +193,7 @@ def _describe_runaways(results: Results) -> list[str]:
     released = results.energy.released - before["released"]
     at_hand = np.abs(before["elastic"]) + np.abs(results.energy.external - before["external"])
     return [f"in step {results.steps.number[k]} faces moved unstably and released "
-            f"{100 * released[k] / at_hand[k]:.2g} % of the stored energy "
+            f"{write_percent(released[k] / at_hand[k])} % of the stored energy "
             f"({_number(released[k])})" for k in np.flatnonzero(released > 0)]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pbem.solve.problem.step import Step
+from pbem.wording import write_percent
 
 # Of the interfaces that took part, those that are named.
 MOST_NAMES = 4
@@ -26,5 +27,5 @@ def describe_runaway(step: Step, runaway: Runaway) -> str:
     names = ", ".join(f"'{name}'" for name in named) + (f" and {more} more" if more > 0 else "")
     return (
         f"Step {step.number} is not a path of equilibria: {names} moved unstably and released "
-        f"{100 * runaway.share:.2g} % of the stored energy ({runaway.released:.4g})."
+        f"{write_percent(runaway.share)} % of the stored energy ({runaway.released:.4g})."
     )

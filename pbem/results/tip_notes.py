@@ -8,7 +8,7 @@ import numpy as np
 
 from pbem.arrays import Integer
 from pbem.results.reader import Results
-from pbem.wording import list_names
+from pbem.wording import list_names, write_percent
 
 # K and J follow from different integrals of the same jumps. On meshes whose K is right to 3e-3 they agree within 1 %.
 AGREEMENT = 0.02
@@ -41,8 +41,8 @@ def compare_release(results: Results) -> list[str]:
     found.sort(reverse=True)
     names = list_names([name for _, name in found], MOST_NAMES)
     return [
-        f"J and (KI^2 + KII^2)/E' differ by up to {100 * found[0][0]:.2g} % at {names}: the elements there are too "
-        "long for the tractions on the crack, or those beside the tip too unequal."
+        f"J and (KI^2 + KII^2)/E' differ by up to {write_percent(found[0][0])} % at {names}: the elements there are "
+        "too long for the tractions on the crack, or those beside the tip too unequal."
     ]
 
 

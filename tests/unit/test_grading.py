@@ -223,3 +223,18 @@ def test_first_element_of_a_refined_leg() -> None:
     text = change(SQUARE, ("[[0, 0], [2, 0]], elements = 8", '[[0, 0], [2, 0]], elements = 4, grading = "start"'))
     ends = build(text).curves["bottom"].legs[0].element_ends()
     assert ends == pytest.approx([2 * (k / 4) ** 3 for k in range(5)])
+
+
+@pytest.mark.parametrize("count", [2, 3, 10])
+def test_an_arc_that_the_program_grades_gets_as_many_elements_as_it_takes(count: int) -> None:
+    """Half a circle with corners at both ends: graded, 10 elements would turn by 49 degrees in the middle."""
+    text = f"""
+materials.m = {{ young = 1.0, poisson = 0.3 }}
+curves.bow = {{ center = [0, 0], radius = 1, angles = [0, 180], elements = {max(count, 4)} }}
+curves.chord = {{ points = [[-1, 0], [1, 0]], elements = {count} }}
+regions.half = {{ material = "m", boundary = ["bow", "chord"] }}
+boundary.chord = {{ ux = 0.0, uy = 0.0 }}
+"""
+    leg = build(text).curves["bow"].legs[0]
+    assert np.diff(leg.element_fractions()).max() * 180 <= 45 + 1e-6
+    assert leg.refine_start and leg.refine_end

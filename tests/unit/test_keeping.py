@@ -140,3 +140,20 @@ def test_quantities_that_need_no_faces_are_those_of_whole_steps() -> None:
         np.testing.assert_allclose(short[name], whole[name], rtol=0, atol=1e-9 * size, err_msg=name)
     alone = pbem.sweep(CRACK, {key: each[-1:] for key, each in several.items()}, ["tips.one.T"], set=changes)
     np.testing.assert_allclose(whole["tips.one.T"][-1], alone["tips.one.T"][0], rtol=1e-8)
+
+
+def test_what_varies_along_curves_is_found_anew_where_it_changes_elsewhere() -> None:
+    """Elements end at kinks of friction and springs, and opposite the ends of faces with fluid between: a sweep over
+    these finds other meshes."""
+    recall = Recall()
+    case = {
+        "materials": {"m": {"young": 1.0, "poisson": 0.3}},
+        "curves": {"ring": {"center": [0, 0], "radius": 1, "elements": 16}},
+        "regions": {"plane": {"material": "m", "infinite": True, "boundary": ["ring"]},
+                    "core": {"material": "m", "boundary": ["ring"]}},
+        "remote": {"syy": -1.0},
+    }
+    for place in (2.0, 3.0):
+        law = {"law": "coulomb", "friction": {"table": [[0, 0.2], [place, 0.2], [6, 0.4]]}}
+        legs = make_checked_model({**case, "interfaces": {"ring": law}}, recall=recall).curves["ring"].legs
+        assert np.abs(np.angle([leg.end for leg in legs]) - place).min() < 1e-9

@@ -103,3 +103,30 @@ def test_a_cantilever_under_a_force_and_a_moment_inside(tmp_path: Path) -> None:
     exact += moment * 10 * (10 / 2 + x - 10) / stiffness
     assert results.interior.displacement[-1][0][1] == pytest.approx(exact, rel=5e-3)
     np.testing.assert_allclose(results.reactions["root"][-1], [0, force], atol=1e-3 * force)
+
+
+def make_split_beam(crack: float, height: float, order: int) -> Tables:
+    """A beam of length 20 and twice the height, clamped at one end and split along its middle from the other, whose
+    halves unit forces pull apart."""
+    points = {"below": [[0, -height], [20, -height]], "root": [[20, -height], [20, height]],
+              "above": [[20, height], [0, height]], "upper": [[0, height], [0, 0]], "lower": [[0, 0], [0, -height]]}
+    counts = {"below": 16, "above": 16, "root": 6, "upper": 4, "lower": 4}
+    curves = {name: {"points": line, "elements": counts[name]} for name, line in points.items()}
+    return {
+        "materials": {"m": {"young": 1e4, "poisson": 0.3}},
+        "curves": curves | {"split": {"points": [[0, 0], [crack, 0]], "elements": 12}},
+        "regions": {"beam": {"material": "m", "boundary": list(curves), "cracks": ["split"]}},
+        "interfaces": {"split": {"law": "open"}},
+        "boundary": {"root": {"ux": 0.0, "uy": 0.0}, "upper": {"rigid": {"fy": 1.0}}, "lower": {"rigid": {"fy": -1.0}}},
+        "analysis": {"steps": 1, "order": order},
+    }
+
+
+@pytest.mark.parametrize(("height", "order"), [(1.0, 2), (0.7, 2), (1.0, 3)])
+def test_the_energy_release_of_a_split_beam(height: float, order: int, tmp_path: Path) -> None:
+    """J = K^2/E' = 12 (1 - nu^2) P^2 (a + 0.673 h)^2/(E h^3) (Kanninen 1973), within 1 %."""
+    results = pbem.run(make_split_beam(8.0, height, order), tmp_path / "beam.h5")
+    tip = results.tips["split"]
+    exact = 12 * 0.91 / 1e4 * (8 + 0.673 * height) ** 2 / height**3
+    assert tip.J[-1][1] == pytest.approx(exact, rel=1e-2)
+    assert tip.KI[-1][1] ** 2 * 0.91 / 1e4 == pytest.approx(tip.J[-1][1], rel=8e-3)

@@ -8,6 +8,7 @@ from pbem.contact.cut_parts import name_part
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Balance
+from pbem.wording import write_percent
 
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
 # anchors hold it, and that make a result wrong, where they are more than WEIGHTY of those on the most loaded region.
@@ -43,7 +44,7 @@ def describe_imbalance(problem: Problem, balance: Balance) -> str | None:
         on = "the whole model"
     left = (
         f"the forces on {on} do not balance: ({x:.3g}, {y:.3g}) and a moment of {moment:.3g} are left, "
-        f"{100 * amount:.2g} % of their sum without signs"
+        f"{write_percent(amount)} % of their sum without signs"
     )
     if at < 0 and float(balance.carried[worst]) > WEIGHTY:
         left += ", which only the condition on its mean motion carries"
@@ -68,7 +69,7 @@ def _refuse_net_force(problem: Problem, balance: Balance) -> None:
             raise ConvergenceError(
                 "net force",
                 f"prescribed displacements or springs act on the infinite region '{region.name}' with a net force of "
-                f"({x:.6g}, {y:.6g}), {100 * amount:.2g} % of the sum of all forces there without signs; the "
+                f"({x:.6g}, {y:.6g}), {write_percent(amount)} % of the sum of all forces there without signs; the "
                 "displacement of a net force grows with the logarithm of the distance, so that these conditions "
                 "determine neither it nor their reactions; prescribe displacements whose forces balance, or "
                 "tractions that do, or a stiff inclusion in place of a hole held at rest, or take a finite region",

@@ -31,7 +31,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.contact.laws import PairLaws
-from pbem.mesh.mesh import Mesh
+from pbem.mesh.mesh import Faces, Mesh
 from pbem.model.model import Model
 from pbem.results.dissipation import PairWork, measure_work
 from pbem.results.runaway import Runaway
@@ -71,10 +71,13 @@ class EnergyBalance:
     laws: those of the pairs, evaluated once more here.
     """
 
-    def __init__(self, model: Model, mesh: Mesh, last: Step | None = None, reached: Energy | None = None) -> None:
-        """Begins at rest, or after the step `last` with the energies that were reached by then."""
+    def __init__(
+        self, model: Model, mesh: Mesh, last: Step | None = None, reached: Energy | None = None,
+        faces: Faces | None = None,
+    ) -> None:
+        """Begins at rest, or after the step `last` with the energies that were reached by then; faces: of the mesh."""
         self._model, self._mesh = model, mesh
-        self._stored = StoredEnergy(model, mesh)
+        self._stored = StoredEnergy(model, mesh, faces)
         self._reached = reached or Energy(0.0, 0.0, 0.0)
         self.runaway: Runaway | None = None
         self._last = last

@@ -15,15 +15,18 @@ from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.arrangement import Arrangement, find_arrangement
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load, evaluate_walls
-from pbem.mesh.mesh import Mesh, list_faces
+from pbem.mesh.mesh import Faces, Mesh, list_faces
 from pbem.model.model import Model
 from pbem.results.dissipation import PairRecord, measure_stored, record_pairs, record_pairs_at_rest
 from pbem.results.face_weights import weigh_faces
 from pbem.results.point_work import evaluate_unit_motions, measure_point_forces, measure_point_motions
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 from pbem.solve.problem.step import Step
+from pbem.uniform import repeat_value
 
 UNIT_STRESSES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+# Faces whose work is summed up at a time.
+SUMMED = 4096
 
 
 # Per region, the balanced particular solution and the one far away.
@@ -34,20 +37,29 @@ _Fields = tuple[Complex, Complex, Real]
 
 @dataclass(frozen=True)
 class _Reference:
-    """Fields of unit forces or unit stresses in one region: its faces (k,), their traction and displacement (c, k),
-    and the integral (c,) of the displacement over a finite region. at_points (c, l): what they move the model's point
-    loads by, 3 numbers each; 0 for those of other regions."""
+    """Fields (c,) of unit forces or unit stresses in one region about a center: its faces (k,) among all (f,), and the
+    integral (c,) of the displacement over a finite region. at_points (c, l): what they move the model's point loads by,
+    3 numbers each; 0 for those of other regions."""
 
     faces: Integer
-    traction: Complex
-    displacement: Complex
+    all_faces: Faces
+    fields: tuple[ParticularSolution, ...]
+    center: complex
     integral: Complex
     at_points: Real
 
     def conjugate(self, weight: Real, traction: Complex, displacement: Complex, point_forces: Real) -> Real:
-        """Betti's sum (c,) for the field with tractions and displacements on all faces (f,); point_forces (l,)."""
-        w, t, u = weight[self.faces], traction[self.faces], displacement[self.faces]
-        on_faces = (w * (t * np.conj(self.displacement) - np.conj(self.traction) * u)).real.sum(axis=1)
+        """Betti's sum (c,) for the field with tractions and displacements on all faces (f,); point_forces (l,).
+
+        The unit fields are evaluated anew, some faces at a time: stored they would be most of what the writer holds.
+        """
+        on_faces = np.zeros(len(self.fields))
+        for begin in range(0, len(self.faces), SUMMED):
+            at = self.faces[begin:begin + SUMMED]
+            z, n = self.all_faces.position[at] - self.center, self.all_faces.normal[at]
+            w, t, u = weight[at], traction[at], displacement[at]
+            for k, field in enumerate(self.fields):
+                on_faces[k] += (w * (t * np.conj(field.displacement(z)) - np.conj(field.traction(z, n)) * u)).real.sum()
         return np.asarray(on_faces + self.at_points @ point_forces)
 
 
@@ -84,14 +96,14 @@ class StoredEnergy:
     weight (f,): of the faces that are there, 0 of others.
     """
 
-    def __init__(self, model: Model, mesh: Mesh) -> None:
-        """Begins with all that the model has; `arrange` goes to a stage."""
+    def __init__(self, model: Model, mesh: Mesh, faces: Faces | None = None) -> None:
+        """Begins with all that the model has; `arrange` goes to a stage. faces: of the mesh, where they are known."""
         self._model, self._mesh = model, mesh
         self.laws = collect_laws(model, mesh)
         self.outer = collect_outer_nodes(model, mesh)
         self._all_weight = self.weight = weigh_faces(mesh)
         self.there: Arrangement | None = None
-        self._faces = list_faces(mesh)
+        self._faces = faces or list_faces(mesh)
         self._by_region = np.argsort(self._faces.region, kind="stable")
         self._bounds = np.searchsorted(self._faces.region[self._by_region], np.arange(len(model.regions) + 1))
         self._forces = [
@@ -133,7 +145,7 @@ class StoredEnergy:
             self.weight = np.where(self.there.regions[self._faces.region], 0.0, self._all_weight)
 
     def describe_rest(self) -> EnergyState:
-        nothing = np.zeros(len(self.weight), dtype=complex)
+        nothing = repeat_value(0.0, len(self.weight), complex)
         pairs = record_pairs_at_rest(self.laws, self._mesh, self._in_situ[: self._mesh.nodes])
         return self._compose(self._in_situ, nothing, 0, 0.0, pairs)
 
@@ -210,21 +222,21 @@ class StoredEnergy:
 
     def _sample_in_situ(self) -> Complex:
         """Traction of the in-situ stress on all faces (f,)."""
-        traction = np.zeros(len(self.weight), dtype=complex)
+        traction = repeat_value(0.0, len(self.weight), complex)
         for number, (balanced, _) in enumerate(evaluate_particular_solutions(self._model, 0, 0.0)):
             at_rest = ParticularSolution(balanced.material, initial=balanced.initial)
             if at_rest.is_zero:
                 continue
-            own = self._find_faces(number)
+            own, traction = self._find_faces(number), np.require(traction, requirements="W")
             traction[own] = at_rest.traction(self._faces.position[own], self._faces.normal[own])
         return traction
 
     def _sample_swelling(self, particulars: Sequence[ParticularSolution]) -> Complex:
         """Displacement of the strain without stress on all faces (f,)."""
-        moved = np.zeros(len(self.weight), dtype=complex)
+        moved = repeat_value(0.0, len(self.weight), complex)
         for number, balanced in enumerate(particulars):
             if not balanced.swelling.is_zero:
-                own = self._find_faces(number)
+                own, moved = self._find_faces(number), np.require(moved, requirements="W")
                 moved[own] = balanced.swelling.displacement(self._faces.position[own])
         return moved
 
@@ -243,9 +255,7 @@ class StoredEnergy:
         # The displacements of unit forces are multiples of z^2, whose integral is half that of n z^2 conj(z).
         second_moment = 0.5 * (self.weight[faces] * n * z**2 * np.conj(z)).sum()
         return _Reference(
-            faces,
-            np.array([field.traction(z, n) for field in fields]),
-            np.array([field.displacement(z) for field in fields]),
+            faces, self._faces, tuple(fields), center,
             np.array([complex(field.displacement(np.array([1 + 0j]))[0]) * second_moment for field in fields]),
             motions,
         )

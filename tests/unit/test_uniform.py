@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import gc
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import list_faces
+from pbem.results.energy import EnergyBalance
 from pbem.uniform import fold_uniform, repeat_value
 from tests.unit.case_sample import build
 
@@ -80,3 +85,20 @@ def test_laws_and_loads_of_alike_cracks_take_little_room() -> None:
     # The field far away: displacement and traction; nothing else is there.
     assert measure(load) <= 16 * 3 * mesh.nodes
     assert not load.known.any()
+
+
+def test_the_energy_balance_stores_no_fields_of_its_own() -> None:
+    """Neither the unit fields, which take 96 bytes for each of three stresses on a face, nor what is zero."""
+    model = build(FIELD.replace("count = 12", "count = 150").replace("12, 12", "50, 50"))
+    mesh = generate_mesh(model)
+    faces = list_faces(mesh)
+    EnergyBalance(model, mesh, faces=faces)  # what the model and the mesh keep by themselves is there
+    gc.collect()
+    tracemalloc.start()
+    balance = EnergyBalance(model, mesh, faces=faces)
+    now, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    count = len(faces.weight)
+    assert now < 120 * count
+    assert most < 300 * count
+    assert balance.laws.count == mesh.pairs.count

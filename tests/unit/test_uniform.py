@@ -100,5 +100,5 @@ def test_the_energy_balance_stores_no_fields_of_its_own() -> None:
     tracemalloc.stop()
     count = len(faces.weight)
     assert now < 120 * count
-    assert most < 300 * count
+    assert most < 400 * count
     assert balance.laws.count == mesh.pairs.count

@@ -27,7 +27,7 @@ MOST_ITERATIONS = 400
 # not where it was looked for, or not known well enough for shorter elements.
 MOST_GRADED = 3
 MOST_GROWN = 4
-STILL_COARSE = 0.05
+STILL_COARSE = 0.08
 # A pass that was not asked for is given up at a step that is to be halved after so many times the iterations of the
 # former one, and so many more.
 PATIENCE, FIRST_PATIENCE = 2, 40

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
+from pbem.arrays import Real
 from pbem.geometry.curve import Curve
 from pbem.model.model import Contact, Model
 
@@ -15,7 +18,10 @@ from pbem.model.model import Contact, Model
 # followed by three nodes to 3e-3 of its value. Two nodes follow it less well, and traction equations on both faces want
 # neighbours of more equal lengths: with 3 the pressures of pins were off by up to 3e-2 there, with 1 by 8e-3.
 GROWTH = 3.0
+BEYOND = 9.0
 GENTLE = 1.0
+# An element is looked at in so many parts.
+FINELY = np.linspace(0.0, 1.0, 9)
 # With these schemes in linear elements pressures are off by 2 to 8 % whatever the elements at the ends.
 ROUGH = ("HST", "THST")
 # With "auto" no more unknowns than these are solved for again: what is not asked for must not cost more than a user
@@ -88,15 +94,74 @@ def _is_rounded(model: Model, contact: Contact) -> bool:
 
 
 def grade_ends(model: Model, ends: Sequence[ContactEnd]) -> Model:
-    """The model with the elements of these curves halved until none is longer than `shortest` within the window of an
-    end, and beyond than GROWTH (or GENTLE) times the distance more."""
+    """The model with the elements of these curves divided until none is longer than `shortest` within the window of an
+    end, and beyond than GROWTH (or GENTLE, and BEYOND on the side of the open faces) times the distance more."""
     curves, analysis = dict(model.curves), model.analysis
-    growth = GENTLE if analysis.order == 1 or analysis.scheme in ROUGH else GROWTH
+    gentle = analysis.order == 1 or analysis.scheme in ROUGH
+    growth = (GENTLE, GENTLE) if gentle else (GROWTH, BEYOND)
     ends = [end for end in ends if end.located]
     for name in {name: None for end in ends for name in end.curves}:
         own = [end for end in ends if name in end.curves]
-        curves[name] = divide_curve(model.curves[name], own, growth)
+        curves[name] = _divide_beside(model.curves[name], own, growth)
     return replace(model, curves=curves)
+
+
+def _divide_beside(curve: Curve, ends: Sequence[ContactEnd], growth: tuple[float, float]) -> Curve:
+    """Elements that are too long become as many as are needed, which grow alike; others stay. growth: inside a contact
+    and beyond its end."""
+    turns = (-curve.length, 0.0, curve.length) if curve.closed else (0.0,)
+    places = [(_Scale(end, growth, _points_forward(curve, end)), _find_arc_length(curve, end.place) + turn)
+              for end in ends for turn in turns]
+    legs, begin = [], 0.0
+    for leg in curve.legs:
+        fractions = leg.element_fractions()
+        divided = [fractions[:1]]
+        for first, last in pairwise(fractions):
+            at = first + (last - first) * FINELY
+            for scale, place in places:  # fine enough for the shortest elements
+                middle = (place - begin) / leg.length
+                near = np.concatenate([-scale.spread[::-1], scale.spread]) / leg.length + middle
+                at = np.union1d(at, near[(near > first) & (near < last)])
+            counts = np.max([np.diff(scale.count(begin + at * leg.length - place)) for scale, place in places], axis=0)
+            numbers = np.concatenate([[0.0], np.cumsum(counts)])
+            parts = max(math.ceil(numbers[-1] * (1 - 1e-9)), 1)
+            divided.append(np.interp(np.arange(1, parts) * numbers[-1] / parts, numbers, at))
+            divided.append(np.array([last]))
+        found = np.concatenate(divided)
+        if len(found) > leg.elements + 1:
+            leg = replace(leg, elements=len(found) - 1, fractions=tuple(float(t) for t in found))
+        legs.append(leg)
+        begin += leg.length
+    return Curve(curve.name, tuple(legs))
+
+
+def _points_forward(curve: Curve, end: ContactEnd) -> bool:
+    """Whether the contact lies ahead of its end along the curve."""
+    step = 1e-3 * end.shortest
+    ahead, back = (_find_arc_length(curve, end.place + sign * step * end.inward) for sign in (1, -1))
+    return bool(np.remainder(ahead - back, curve.length) < 0.5 * curve.length)
+
+
+class _Scale:
+    """How many elements there are to be from an end of contact on to a distance along the curve.
+
+    spread: distances, rising, at which that is known well enough for what lies between.
+    """
+
+    def __init__(self, end: ContactEnd, growth: tuple[float, float], forward: bool) -> None:
+        self._shortest, self._window = end.shortest, end.window
+        inside, beyond = growth if forward else growth[::-1]
+        self._ahead, self._behind = inside, beyond
+        self.spread = end.shortest * np.concatenate([np.linspace(0.0, 1.0, 9), np.geomspace(1.1, 1e6, 150)])
+
+    def count(self, distance: Real) -> Real:
+        """Of the distances (k,), negative behind the end."""
+        away = np.abs(distance)
+        growth = np.where(distance > 0, self._ahead, self._behind)
+        beyond = np.maximum(away - self._window, 0.0)
+        number = np.minimum(away, self._window) / self._shortest
+        number = number + np.log1p(growth * beyond / self._shortest) / np.log1p(growth)
+        return np.asarray(np.sign(distance) * number)
 
 
 class _Place(Protocol):

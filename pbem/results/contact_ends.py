@@ -20,12 +20,15 @@ from pbem.solve.problem.step import ContactState
 
 # Of the largest pressure of the contact: what the root falls by over the element in which contact ends, whose nodes are
 # off by at most 0.2 of it. Elements that are made for an end are so long that it falls by TOLERANCE.
-COARSE = 0.04
-TOLERANCE = 0.035
-# By so much of an element's length the ends that were found were off at most, in pins with 32 to 96 elements a circle.
-UNCERTAIN = 0.035
+COARSE = 0.06
+TOLERANCE = 0.05
+# By so much of an element's length the ends that were found were off, in pins with 24 to 96 elements a circle: 0.01 in
+# the middle, 0.03 at most. Where that is not enough a further pass finds them.
+UNCERTAIN = 0.02
 # At least so long are elements, by the length in which the end is looked for.
-PER_WINDOW = 4.0
+PER_WINDOW = 2.0
+# So many nodes tell how the opening bends; by more of an element's length that does not move the end.
+LEAST_BENT, MOST_BENT = 3, 0.2
 # Curves turn by less where two elements meet smoothly (radians).
 SMOOTH = 1e-6
 
@@ -109,12 +112,11 @@ class _Pressed:
         if not self._is_rounded(free):
             return None
         # The opening grows like the distance from the end to the power 3/2.
-        slope, start = np.polyfit(free.distance, np.maximum(self._opening[free.pairs], 0.0) ** (2 / 3), 1)
-        if not slope > 0 or not -last.length <= -start / slope <= 0.5 * free.length:
+        at = self._find_root(free, self._find_beside(beyond, forward), not forward)
+        if not -last.length <= at <= 0.5 * free.length:
             pressed = float(self._pressure[last.pairs].max()) / self._largest
             between = complex((mesh.end if forward else mesh.start)[element])
             return ContactEnd(name, between, curves, np.inf, 0.0, pressed, False) if pressed > COARSE else None
-        at = -start / slope
         over = self._measure_fall(last, at, forward) * np.sqrt(last.length)
         if over <= COARSE * self._largest:
             return None
@@ -127,6 +129,28 @@ class _Pressed:
         leaving, arriving = of.directions()
         return ContactEnd(name, place, curves, shortest, window, over / self._largest,
                           inward=complex(-arriving[0] if forward else leaving[0]), reach=max(last.length, free.length))
+
+    def _find_root(self, free: _Side, after: int | None, at_end: bool) -> float:
+        """Distance from the start of an open element at which the opening to the power 2/3 vanishes; NaN if nowhere.
+
+        It bends as the faces do, which three nodes tell, or those of two elements.
+        """
+        distance, grown = free.distance, np.maximum(self._opening[free.pairs], 0.0) ** (2 / 3)
+        if len(distance) < LEAST_BENT and after is not None:
+            beside = self._see(after, at_end)
+            distance = np.concatenate([distance, beside.distance + free.length])
+            grown = np.concatenate([grown, np.maximum(self._opening[beside.pairs], 0.0) ** (2 / 3)])
+        slope, start = np.polyfit(free.distance, grown[: len(free.distance)], 1)
+        if not slope > 0:
+            return np.nan
+        straight = -start / slope
+        if len(distance) >= LEAST_BENT:
+            bend, slope, start = np.polyfit(distance, grown, 2)
+            left = slope**2 - 4 * bend * start
+            found = -2 * start / (slope + np.sqrt(left)) if left >= 0 and slope > 0 else np.nan
+            if abs(found - straight) <= MOST_BENT * free.length:
+                return float(found)
+        return float(straight)
 
     def _is_rounded(self, side: _Side) -> bool:
         """Whether the faces part as they are rounded: what straight ones do as they bend needs no more than it has."""

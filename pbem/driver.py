@@ -30,6 +30,7 @@ from pbem.parallel import (
 )
 from pbem.passes import Target, blame_pass, blame_tries, plan_finer, plan_graded, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide, refine_marked
+from pbem.results.contact_ends import find_contact_ends
 from pbem.results.doubts import find_smooth
 from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
@@ -156,9 +157,10 @@ def _refine_and_solve(
     # Passes for an accuracy count as graded ones, but never are both asked for.
     first, tries, begun, graded = model, 0, one.number, one.number - 1
     former: FormerPass | None = None
+    made: Mesh | None = None
     while True:
         with clock.piece("reading"):
-            mesh = generate_mesh(model)
+            mesh, made = made or generate_mesh(model), None
             check_shares(model, mesh, watch.comm.size)
             remarks = check_memory(watch.comm, model, mesh)
         watch.begin(model)
@@ -195,7 +197,7 @@ def _refine_and_solve(
             if decision.ends:
                 do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path))
             return
-        model, graded, kept, watch.most = planned.model, graded + 1, None, planned.most
+        model, made, graded, kept, watch.most = planned.model, planned.mesh, graded + 1, None, planned.most
 
 
 def _solve(
@@ -273,7 +275,8 @@ def _fill(
         rules = writer.tip_rules if writer else None
         estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
     tangent = kept.take_tangent(problem) if kept else None
-    guess, passed = former.make_guess(problem) if former else None, FormerPass(mesh)
+    guess = former.make_guess(problem) if former else None
+    passed = FormerPass(mesh, partial(find_contact_ends, model, mesh))
     try:
         steps = clock.each("steps", march(problem, watch, start, tangent, guess, unfinished=unfinished))
         steps = passed.listen(steps if kept else free_at_last(problem, steps))
@@ -284,8 +287,7 @@ def _fill(
     estimator.destroy()
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
-    decision = _conclude(writer, model, mesh, estimator, watch, one, last)
-    return decision, replace(passed, ends=decision.ends)
+    return _conclude(writer, model, mesh, estimator, watch, one, last), passed
 
 
 def _conclude(

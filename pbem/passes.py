@@ -9,6 +9,7 @@ from pathlib import Path
 from pbem.errors import ConvergenceError, PbemError
 from pbem.geometry.junction import format_point
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.mesh import Mesh
 from pbem.model.end_grading import MOST_UNKNOWNS, ContactEnd, grade_ends
 from pbem.model.model import Model
 from pbem.model.refinement import Fractions, bisect_elements, count_elements, impose_fractions, mark_near
@@ -48,12 +49,14 @@ class Target:
 class Finer:
     """A model with shorter elements where contacts did not settle, or end, and a sentence that says so.
 
-    most: iterations after which the run on it is given up where it comes to halve a step; None for any number.
+    most: iterations after which the run on it is given up where it comes to halve a step; None for any number. mesh: of
+    the model, if it was made.
     """
 
     model: Model
     note: str
     most: int | None = None
+    mesh: Mesh | None = None
 
 
 def plan_finer(
@@ -116,7 +119,7 @@ def plan_graded(
             model, f"{where}; grading towards these ends would take {after} elements in place of {before}.{left}"
         )
     try:
-        generate_mesh(finer)
+        mesh = generate_mesh(finer)
     except PbemError as error:
         return Finer(model, f"{where}; with elements graded towards these ends there is no mesh: {error}")
     note = (
@@ -124,7 +127,7 @@ def plan_graded(
         f"{after} in place of {before}, and the run starts again with the statuses found here as a guess.{left}"
     )
     most = FIRST_PATIENCE + PATIENCE * iterations if model.analysis.grade_contact_ends == "auto" else None
-    return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note, most)
+    return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note, most, mesh)
 
 
 def _name_ends(model: Model, ends: Sequence[ContactEnd]) -> str:

@@ -27,6 +27,8 @@ TOLERANCE = 0.05
 UNCERTAIN = 0.02
 # At least so long are elements, by the length in which the end is looked for.
 PER_WINDOW = 2.0
+# Places of an end within its window, and lengths of elements within a factor of 2, that are told apart.
+PLACES, SIZES = 8, 4
 # So many nodes tell how the opening bends; by more of an element's length that does not move the end.
 LEAST_BENT, MOST_BENT = 3, 0.2
 # Curves turn by less where two elements meet smoothly (radians).
@@ -120,9 +122,12 @@ class _Pressed:
         over = self._measure_fall(last, at, forward) * np.sqrt(last.length)
         if over <= COARSE * self._largest:
             return None
+        # Rounded, so that the mesh of the next pass does not change with the rounding of this one's solution.
         window = UNCERTAIN * max(last.length, free.length)
+        at = float(np.rint(PLACES * at / window)) * window / PLACES
+        root = TOLERANCE * self._largest / over
         # Where the place is not known well enough for shorter ones, it will be after them.
-        shortest = max(last.length * (TOLERANCE * self._largest / over) ** 2, window / PER_WINDOW)
+        shortest = max(last.length * 2.0 ** (np.floor(2 * SIZES * np.log2(root)) / SIZES), window / PER_WINDOW)
         inside, along = (last, 1 + at / last.length) if at <= 0 else (free, at / free.length)
         of = mesh.geometry.select(np.array([inside.element]))
         place = complex(of.place_fractions(np.array([[along if forward else 1 - along]]))[0, 0])

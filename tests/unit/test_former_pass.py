@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -70,14 +69,14 @@ def test_pairs_beside_an_end_of_contact_are_what_it_tells() -> None:
     coarse = generate_mesh(model)
     angle = np.degrees(np.angle(coarse.pairs.position + model.origin))
     mode = np.where(np.abs(angle) > 38.0, OPEN, np.where(angle < 0, SLIP, STICK)).astype(np.int8)
-    former = FormerPass(coarse, {(0, 0.5): ModeState(mode, -np.ones(len(mode))),
-                                 (0, 1.0): ModeState(mode, np.where(angle < 0, 1.0, -1.0))})
+    modes = {(0, 0.5): ModeState(mode, -np.ones(len(mode))),
+             (0, 1.0): ModeState(mode, np.where(angle < 0, 1.0, -1.0))}
     at = [np.exp(1j * np.radians(sign * 40.0)) for sign in (-1, 1)]
     ends = [ContactEnd("seat", complex(z) - model.origin, ("rim", "hole"), 0.01, 0.005, inward=complex(turn * z),
                        reach=0.2) for z, turn in zip(at, (1j, -1j), strict=True)]
     finer = grade_ends(model, ends)
     problem = assemble_problem(finer, generate_mesh(finer), world)
-    guess = replace(former, ends=ends).make_guess(problem)
+    guess = FormerPass(coarse, lambda _: (), modes, {(0, 0.5): (), (0, 1.0): ends}).make_guess(problem)
     angle = np.degrees(np.angle(problem.mesh.pairs.position + model.origin))
     memory, none = start_memory(problem.laws), np.zeros(problem.laws.count)
     assert guess(0, 0.25, memory, none) is None

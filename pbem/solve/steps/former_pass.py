@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,38 +13,39 @@ from pbem.contact.laws import OPEN, Memory, ModeState, PairLaws, follow_leaders
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.end_grading import ContactEnd
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.step import Step
+from pbem.solve.problem.step import ContactState, Step
 from pbem.solve.steps.march import Guess, resume_modes
 
 
 @dataclass(frozen=True)
 class FormerPass:
-    """The modes of a pass by stage and fraction, on its mesh; ends: where its contacts end in the last step.
+    """The modes of a pass by stage and fraction, on its mesh; ends: where its contacts end then, as `find` tells.
 
     The search on another mesh begins with them, and with nothing else: slips and the memory of faces are those of the
     march on that mesh, step by step as before.
     """
 
     mesh: Mesh
+    find: Callable[[ContactState], Sequence[ContactEnd]]
     modes: dict[tuple[int, float], ModeState] = field(default_factory=dict)
-    ends: Sequence[ContactEnd] = ()
+    ends: dict[tuple[int, float], Sequence[ContactEnd]] = field(default_factory=dict)
 
     def listen(self, steps: Iterator[Step]) -> Iterator[Step]:
         """The steps of a march, whose modes are noted."""
         for step in steps:
             self.modes[step.stage, step.factor] = resume_modes(step.contact)
+            self.ends[step.stage, step.factor] = self.find(step.contact)
             yield step
 
     def make_guess(self, problem: Problem) -> Guess:
         """The modes of the same step, from the nearest pair of each; None for steps that the pass did not come to."""
         laws, carry = problem.laws, _Carry(self, problem.mesh)
-        last = max(self.modes, default=None)
 
         def guess(stage: int, factor: float, memory: Memory, _: Real) -> ModeState | None:
             found = self.modes.get((stage, factor))
             if found is None:
                 return None
-            return _keep_settled(laws, memory, carry.apply(found, (stage, factor) == last))
+            return _keep_settled(laws, memory, carry.apply(found, self.ends[stage, factor]))
 
         return guess
 
@@ -68,11 +69,11 @@ class _Carry:
         for own, others in self._groups:
             self._nearest[own] = _find_nearest(mesh.pairs.position[own], former.mesh.pairs.position[others], others)
 
-    def apply(self, modes: ModeState, last: bool) -> ModeState:
-        """The modes of the nearest pairs; at the end of a pass those that the ends of contact tell, beside these."""
+    def apply(self, modes: ModeState, ends: Sequence[ContactEnd]) -> ModeState:
+        """The modes of the nearest pairs; those that the ends of contact tell, beside these."""
         nearest = self._nearest.copy()
         is_open = (nearest < 0) | (modes.mode[nearest] == OPEN)
-        for end in self._former.ends if last else ():
+        for end in ends:
             self._move_end(end, modes.mode == OPEN, nearest, is_open)
         mode = np.where(is_open, OPEN, modes.mode[nearest]).astype(np.int8)
         return ModeState(mode, modes.sign[nearest])

@@ -26,7 +26,7 @@ class FormerPass:
     """
 
     mesh: Mesh
-    find: Callable[[ContactState], Sequence[ContactEnd]]
+    find: Callable[[ContactState], Sequence[ContactEnd]] = lambda _: ()
     modes: dict[tuple[int, float], ModeState] = field(default_factory=dict)
     ends: dict[tuple[int, float], Sequence[ContactEnd]] = field(default_factory=dict)
 

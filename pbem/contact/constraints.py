@@ -9,8 +9,10 @@ All unknowns are lengths: a traction is the traction scale (modulus/length) time
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from pbem.arrays import Complex, Integer, Real
@@ -53,26 +55,33 @@ class _Entries:
 
     def __init__(self, nodes: int) -> None:
         self.nodes = nodes
-        self.rows: list[Integer] = []
-        self.columns: list[Integer] = []
+        # As the matrix will have them; all entries together take several times its room.
+        self._index = np.int32 if 4 * nodes < np.iinfo(np.int32).max else np.int64
+        self.rows: list[NDArray[Any]] = []
+        self.columns: list[NDArray[Any]] = []
         self.values: list[Real] = []
 
     def add(self, field: int, node: Integer, unknown: Integer, coefficient: Complex) -> None:
         for component, value in enumerate((coefficient.real, coefficient.imag)):
             kept = value != 0
-            self.rows.append((2 * self.nodes * field + 2 * node + component)[kept])
-            self.columns.append(unknown[kept])
-            self.values.append(value[kept])
+            self._append((2 * self.nodes * field + 2 * node + component)[kept], unknown[kept], value[kept])
 
     def add_entries(self, rows: Integer, columns: Integer, values: Real) -> None:
         """Entries as they are."""
         kept = values != 0
-        self.rows.append(rows[kept])
-        self.columns.append(columns[kept])
-        self.values.append(values[kept])
+        self._append(rows[kept], columns[kept], values[kept])
+
+    def _append(self, rows: Integer, columns: Integer, values: Real) -> None:
+        self.rows.append(rows.astype(self._index))
+        self.columns.append(columns.astype(self._index))
+        self.values.append(values)
 
     def build(self) -> sparse.csr_matrix:
-        entries = (np.concatenate(self.values), (np.concatenate(self.rows), np.concatenate(self.columns)))
+        """The matrix of all entries, which are forgotten."""
+        values, rows, columns = (np.concatenate(parts) for parts in (self.values, self.rows, self.columns))
+        for parts in (self.values, self.rows, self.columns):
+            parts.clear()
+        entries = (values, (rows, columns))
         return sparse.csr_matrix(entries, shape=(4 * self.nodes, 2 * self.nodes))
 
 

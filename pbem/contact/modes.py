@@ -141,17 +141,26 @@ def _linearise_bonds(
         offset[at, G_N:] = size * offset[at, P_N:G_N]
 
 
+# Pairs whose small systems are solved at a time.
+SOLVED = 4096
+
+
 def carry_over(state: Real, after: Linearisation, traction_scale: float) -> Real:
     """Unknowns (m, 2) of pairs with given tractions and jumps (m, 4).
 
     Of a pair's normal and of its tangential values it keeps the one that its mode after leaves free.
     """
-    size = np.abs(after.tangent) / np.array([traction_scale, traction_scale, 1.0, 1.0])[:, None]
-    normal = np.where(size[:, P_N, 0] >= size[:, G_N, 0], P_N, G_N)
-    along = np.where(size[:, P_S, 1] >= size[:, G_S, 1], P_S, G_S)
-    at, both = np.arange(len(state))[:, None], np.stack([normal, along], axis=1)
-    left = (state - after.offset)[at, both]
-    return np.asarray(np.linalg.solve(after.tangent[at, both], left[..., None])[..., 0])
+    units, carried = np.array([traction_scale, traction_scale, 1.0, 1.0])[:, None], np.empty((len(state), 2))
+    for begin in range(0, len(state), SOLVED):
+        own = slice(begin, begin + SOLVED)
+        tangent = after.tangent[own]
+        size = np.abs(tangent) / units
+        normal = np.where(size[:, P_N, 0] >= size[:, G_N, 0], P_N, G_N)
+        along = np.where(size[:, P_S, 1] >= size[:, G_S, 1], P_S, G_S)
+        at, both = np.arange(len(tangent))[:, None], np.stack([normal, along], axis=1)
+        left = (state[own] - after.offset[own])[at, both]
+        carried[own] = np.linalg.solve(tangent[at, both], left[..., None])[..., 0]
+    return carried
 
 
 def measure_law_error(

@@ -376,7 +376,7 @@ def tunnel(d: Drawn) -> Found:
     """A tunnel that a stage excavates in a uniform field (Kirsch, 1898): stresses and displacements of the rock."""
     material, r = d.material(1e3), d.rng
     xx, yy, xy = r.uniform(-2, 0.2), r.uniform(-2, -0.5), r.uniform(-0.5, 0.5)
-    case = {"materials": {"m": material}, "curves": {"wall": d.circle(0, 1, d.rng.choice((24, 32, 48)))},
+    case = {"materials": {"m": material}, "curves": {"wall": d.circle(0, 1, d.rng.choice((32, 48, 64)))},
             "regions": {"core": {"material": "m", "boundary": ["wall"]},
                         "rock": {"material": "m", "infinite": True, "boundary": ["wall"]}},
             "initial_stress": {"m": d.tense(xx, yy, xy, d.stress, "s")},

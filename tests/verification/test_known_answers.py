@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.model.build import build_model
 
 Tables = dict[str, Any]
 
@@ -130,3 +131,13 @@ def test_the_energy_release_of_a_split_beam(height: float, order: int, tmp_path:
     exact = 12 * 0.91 / 1e4 * (8 + 0.673 * height) ** 2 / height**3
     assert tip.J[-1][1] == pytest.approx(exact, rel=1e-2)
     assert tip.KI[-1][1] ** 2 * 0.91 / 1e4 == pytest.approx(tip.J[-1][1], rel=8e-3)
+
+
+@pytest.mark.parametrize(("order", "crack", "told"), [(1, 8.0, True), (2, 8.0, False), (1, 2.0, False)])
+def test_slender_arms_of_linear_elements_are_told(order: int, crack: float, told: bool) -> None:
+    notes = describe_model_notes(make_split_beam(crack, 1.0, order))
+    assert any("bend them too much" in note and "split" in note for note in notes) == told
+
+
+def describe_model_notes(tables: Tables) -> tuple[str, ...]:
+    return build_model(pbem.Case(**tables)).notes

@@ -7,7 +7,8 @@ import numpy as np
 from pbem.contact.laws import SLIP
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
-from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, LONG, Search
+from pbem.solve.nonlinear.forcing import Forcing
+from pbem.solve.nonlinear.search import FUTILE, GLOBALISATIONS, LONG, Search, go_on_warily
 from tests.unit.test_laws import make_modes
 
 COUNT = 100
@@ -107,6 +108,33 @@ def test_a_state_that_comes_back_is_noticed_at_each_level() -> None:
     assert [search.returns(b"a"), search.returns(b"b"), search.returns(b"a")] == [False, False, True]
     search.descend()
     assert not search.returns(b"a")
+
+
+def test_a_cycle_is_noticed_where_it_begins_again_at_the_next_level() -> None:
+    cycle = [bytes([number]) for number in range(8)]
+    search = Search(4)
+    assert [search.returns(each) for each in (*cycle, cycle[0])] == [False] * 8 + [True]
+    search.descend()
+    # One step is chance: three in turn lead round again.
+    assert [search.returns(each) for each in cycle[1:4]] == [False, False, True]
+    search.descend()
+    assert [search.returns(each) for each in (cycle[4], b"new", cycle[6], cycle[7])] == [False] * 4
+
+
+def test_modes_that_follow_as_before_are_no_cycle_where_friction_changes_with_slip() -> None:
+    search = Search(4, varying=True)
+    for each in (b"a", b"b", b"c", b"d", b"a"):
+        search.returns(each)
+    search.descend()
+    assert not any(search.returns(each) for each in (b"b", b"c", b"d"))
+
+
+def test_systems_that_were_solved_in_full_are_not_asked_for_again() -> None:
+    for used, level in ((True, 0), (False, 1)):
+        search, forcing = Search(4), Forcing(True)
+        forcing.used = used
+        assert go_on_warily(forcing, search)
+        assert search.level == level
 
 
 def fail(exhaustive: bool, tried: int) -> Settled:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,8 @@ from pbem.solve.nonlinear.newton import Solution, solve_step
 from pbem.solve.steps import softly as softly_module
 from pbem.solve.steps.softly import SOFTNESS, soften, solve_softly
 from pbem.solve.system.assembly import assemble_problem
+from scripts.torture.kinds import KINDS
+from scripts.torture.runs import run_sample
 from tests.verification.test_limit_load import write_pushed_block
 from tests.verification.test_settling import Listener
 
@@ -75,3 +79,22 @@ def test_a_soft_contact_gives_way_by_its_traction() -> None:
     assert np.abs(expected).max() > 0
     np.testing.assert_allclose(done.pairs.g_n, expected, atol=1e-12 * np.abs(expected).max() + 1e-15)
     assert problem.laws.compliance_n.max() == 0
+
+
+@pytest.mark.parametrize("variant", [0, 2])
+def test_strength_that_comes_back_is_settled_by_softer_contacts(variant: int, tmp_path: Path) -> None:
+    """A tree of cracks, most of which lose tensile strength and cohesion where they part and have them back where they
+    meet: pivoting does not find their statuses, whatever it tries, and is soon given up. In other units, too."""
+    record = run_sample(94118, variant, tmp_path, tuple(KINDS))
+    assert (record.status, record.halved) == ("settled", 0)
+    assert max(record.contact.values()) < 1e-7
+    assert max(record.iterations) <= 30
+
+
+def test_loss_without_an_end_of_the_search_is_tried_with_softer_contacts() -> None:
+    """Whatever it was that did not settle: pairs that were pivoted alone found no modes."""
+    model = parse_model(write_pushed_block(0.2, {"friction": 0.25, "cohesion": 0.01}))[1]
+    problem = assemble_problem(model, generate_mesh(model), world)
+    tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
+    error = ConvergenceError("no admissible modes", "of these pairs")
+    assert isinstance(solve_softly(problem, tangent, start_memory(problem.laws), load, Listener(), error), Solution)

@@ -107,7 +107,7 @@ def solve_step(
     loosely = bool(find_linear(problem.laws).all())
     begin = (resumed["forcing"], resumed["search"]) if resumed else (0, 0)
     for first, forcing in enumerate((Forcing(loosely), Forcing(False))):
-        searches = list_searches(problem, tangent)
+        searches = list_searches(problem, tangent, not once)
         try:
             for second, search in enumerate(searches):
                 if (first, second) < begin:

@@ -72,8 +72,9 @@ PLAIN_FROM_SMOOTHED = 1
 COSTLY = 60
 # Pairs of a group at most where changes no longer fall, even if every pair costs a solution of the whole model.
 MOST_IF_STUCK = 60
-# Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search.
-FUTILE = 6
+# Failures of pivoting one after the other, each with several choices of the pairs that have parted, that end a search;
+# fewer where softer contacts are tried next (see pbem.solve.steps.softly), which find what these do not.
+FUTILE, FUTILE_IF_SOFTENED = 6, 3
 # Where a group fails, all pairs of models with so few are pivoted at once; of those with so many at the end of all.
 FEW_IN_ALL, MOST_IN_ALL = 60, 120
 # So often in a search: where it first fails and before it ends.
@@ -83,6 +84,8 @@ SWEPT = 4
 # After so many iterations it is asked where the contact comes to rest against dashpots; where bodies do not, a search
 # ends after so many.
 LATE, LATEST = 16, 24
+# So many states in turn that follow upon each other as they did before are a cycle.
+ALIKE = 3
 # Where most changing pairs cannot be pivoted, more caution is taken when in so many iterations hardly fewer changed.
 STALLED = 4
 
@@ -95,14 +98,16 @@ class Search:
     has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
     is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
     groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps). wary: whether changes that
-    stall, and a full tangent that leads away, are met with caution where friction changes with slip.
+    stall, and a full tangent that leads away, are met with caution where friction changes with slip. most_futile: see
+    FUTILE.
     """
 
     def __init__(
         self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
-        varying: bool = False, sweeps: bool = False, wary: bool = False,
+        varying: bool = False, sweeps: bool = False, wary: bool = False, most_futile: int = FUTILE,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
+        self.most_futile = most_futile
         self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept = sweeps, False
         self.unsettled = False  # whether it ended as modes came back, or took too long
@@ -127,7 +132,10 @@ class Search:
         self.sweeping = self.sweeps
         self.returned = self.just_returned = False
         self.near, self.error, self.entered = NEAR, np.inf, 0
-        self.seen: set[bytes] = set()
+        self.seen: set[str] = set()
+        # The states of modes that followed upon others at any level, and how many have done so again in turn.
+        self.next_of: dict[str, str] = {}
+        self.last, self.alike = "", 0
 
     def go_on_from_smoothed(self) -> None:
         """Begin anew from modes of smoothed laws: few pairs change, which groups that settle alone would disturb.
@@ -183,7 +191,7 @@ class Search:
 
     def _enter(self, level: int) -> None:
         self.level, self.entered = level, len(self.counts)
-        self.seen.clear()
+        self.forget()
 
     def is_stuck(self) -> bool:
         """Whether in the last LONG iterations no fewer pairs changed than at best in as many or more before."""
@@ -254,7 +262,7 @@ class Search:
         again = self.failed is not None and self.failed.exhaustive and np.array_equal(self.failed_group, self.group)
         self.failed_group, self.failed = self.group, found
         self.futile += found.tried > 1
-        return (again and found.exhaustive) or self.futile >= FUTILE
+        return (again and found.exhaustive) or self.futile >= self.most_futile
 
     def widen(self, ends: bool) -> bool:
         """After a group for which nothing was found: whether all pairs are to be pivoted at once, with the same states.
@@ -277,11 +285,23 @@ class Search:
         return np.flatnonzero(~np.broadcast_to(self.excluded, (count,)) if count else np.zeros(0, dtype=bool))
 
     def returns(self, fingerprint: bytes) -> bool:
-        """Note a state of modes; whether it was there before at this level of caution."""
-        digest = hashlib.sha256(fingerprint).digest()
-        back = digest in self.seen
+        """Note a state of modes; whether it was there before at this level of caution.
+
+        Or whether the search goes the way that it went at another level, so many states in turn that it leads round
+        again. Where friction changes with slip the same modes need not lead to the same ones.
+        """
+        digest = hashlib.sha256(fingerprint).hexdigest()
+        again = not self.varying and self.next_of.get(self.last) == digest
+        self.alike = self.alike + 1 if again else 0
+        self.next_of[self.last], self.last = digest, digest
+        back = digest in self.seen or self.alike >= ALIKE
         self.seen.add(digest)
         return back
+
+    def forget(self) -> None:
+        """Begin anew with the states that may come back, as what changes them is another way."""
+        self.seen.clear()
+        self.alike = 0
 
     def descend(self) -> bool:
         """Move to more caution; False at the end of all.
@@ -291,7 +311,7 @@ class Search:
         """
         if self.sweeping:
             self.sweeping = False
-            self.seen.clear()
+            self.forget()
             return True
         if self.swept:
             return False
@@ -301,16 +321,20 @@ class Search:
         return True
 
 
-def list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
-    """The searches of one step, one after the other where the former does not settle."""
+def list_searches(problem: Problem, tangent: TangentOperator, softened: bool = False) -> list[Search]:
+    """The searches of one step, one after the other where the former does not settle.
+
+    softened: whether softer contacts may be tried after them.
+    """
     settling, linear = tangent.settling, find_linear(problem.laws)
     sweeps = settling.nearby and not is_one_group(problem.mesh) and bool(linear.all())
     interface = problem.mesh.pairs.interface if settling.with_neighbours else None
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
     varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
+    futile = FUTILE_IF_SOFTENED if softened and not varying and not settling.nearby else FUTILE
     return [
-        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary)
+        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile)
         for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
     ]
 
@@ -318,7 +342,7 @@ def list_searches(problem: Problem, tangent: TangentOperator) -> list[Search]:
 def go_on_warily(forcing: Forcing, search: Search) -> bool:
     """Where modes come back: at first with systems that are solved in full, then with more caution; False at the end.
     """
-    if forcing.end():
-        search.seen.clear()
+    if forcing.end() and forcing.used:
+        search.forget()
         return True
     return search.descend()

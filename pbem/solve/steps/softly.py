@@ -23,7 +23,7 @@ from pbem.solve.problem.tangent import TangentOperator
 # Compliances of the pairs, one after the other, in lengths of the pair over the modulus beside it.
 SOFTNESS = (1.0, 0.03, 0.001)
 # What a search can end with that did not settle.
-UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh")
+UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh", "no admissible modes")
 
 
 def solve_softly(

@@ -91,10 +91,13 @@ def test_strength_that_comes_back_is_settled_by_softer_contacts(variant: int, tm
     assert max(record.iterations) <= 30
 
 
-def test_loss_without_an_end_of_the_search_is_tried_with_softer_contacts() -> None:
-    """Whatever it was that did not settle: pairs that were pivoted alone found no modes."""
+@pytest.mark.parametrize("damps", [True, False])
+def test_softer_contacts_are_tried_where_pivoting_finds_no_modes(damps: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless dashpots have told where the contact comes to rest."""
+    monkeypatch.setattr(softly_module, "can_be_damped", lambda problem, tangent: damps)
     model = parse_model(write_pushed_block(0.2, {"friction": 0.25, "cohesion": 0.01}))[1]
     problem = assemble_problem(model, generate_mesh(model), world)
     tangent, load = problem.make_tangent(), problem.evaluate_load(0, 1.0)
     error = ConvergenceError("no admissible modes", "of these pairs")
-    assert isinstance(solve_softly(problem, tangent, start_memory(problem.laws), load, Listener(), error), Solution)
+    found = solve_softly(problem, tangent, start_memory(problem.laws), load, Listener(), error)
+    assert isinstance(found, Solution) != damps

@@ -105,9 +105,10 @@ def solve_step(
     tangent.listen(reporter.must_stop, reporter.pause)
     # Where friction changes with slip, Newton's steps lead through states that have to be followed exactly.
     loosely = bool(find_linear(problem.laws).all())
+    softened = not once and not can_be_damped(problem, tangent)
     begin = (resumed["forcing"], resumed["search"]) if resumed else (0, 0)
     for first, forcing in enumerate((Forcing(loosely), Forcing(False))):
-        searches = list_searches(problem, tangent, not once)
+        searches = list_searches(problem, tangent, softened)
         try:
             for second, search in enumerate(searches):
                 if (first, second) < begin:

@@ -23,7 +23,7 @@ from pbem.solve.problem.tangent import TangentOperator
 # Compliances of the pairs, one after the other, in lengths of the pair over the modulus beside it.
 SOFTNESS = (1.0, 0.03, 0.001)
 # What a search can end with that did not settle.
-UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh", "no admissible modes")
+UNSETTLED = ("iteration limit", "mode cycle", "unsound mesh")
 
 
 def solve_softly(
@@ -37,12 +37,15 @@ def solve_softly(
     A truer error where the bodies do not come to rest. None, too, for crack networks and large models, whose groups
     settle by themselves, for laws that are not linear in each status, and for other errors. resumed: see solve_step.
     """
-    unsettled = error.reason in UNSETTLED or error.unless is not None or resumed is not None
+    damps = can_be_damped(problem, tangent)
+    # Of few pairs dashpots have told by then where they come to rest.
+    unsettled = error.reason in UNSETTLED or (error.reason == "no admissible modes" and not damps)
+    unsettled = unsettled or error.unless is not None or resumed is not None
     if not unsettled or tangent.settling.nearby or not find_linear(problem.laws).all():
         return None
     contacts = (*(soften(problem, softness) for softness in SOFTNESS), problem)
     damped = resumed if resumed and resumed["damped"] else None
-    if not resumed and can_be_damped(problem, tangent):
+    if not resumed and damps:
         rest = find_damped(problem, tangent, begin, load)
         if rest and rest.runs:
             return describe_run(problem, begin, load, rest.runs)

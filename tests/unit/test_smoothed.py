@@ -175,7 +175,8 @@ def test_laws_are_smoothed_where_many_pairs_go_on_changing() -> None:
     assert ask(*[many] * (FIRST + 2)) == [False] * (FIRST - 1) + [True] + [False] * 2
     assert not any(ask(*[many] * (FIRST + 2), allowed=False))
     assert not any(ask(*[LEAST] * (FIRST + 2)))
-    assert not any(ask(*[many + k for k in range(FIRST + 2)][::-1]))
+    assert ask(*[many + k for k in range(FIRST + 2)][::-1]) == [False] * (FIRST - 1) + [True] + [False] * 2
+    assert not any(ask(*[many * 3**k for k in range(FIRST + 2)][::-1]))
     # At once where the changes soar.
     assert ask(many, 2 * many + 1) == [False, True]
     assert ask(many, 2 * many) == [False, False]

@@ -38,8 +38,10 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
 
 # The laws are smoothed where after so many iterations ...
-FIRST = 4
-# ... no fewer pairs change than at best before, and more than this part of all and so many, as pivoting does for fewer;
+FIRST = 3
+# ... no less than this part of the fewest pairs that changed before change (where blocks are held well it is a third at
+# most), and more than this part of all and so many, as pivoting does for fewer;
+SLOWLY = 0.5
 MANY, LEAST = 0.03, 60
 # or, after any number of iterations, as many times as many as at best before.
 SOARED = 2
@@ -58,8 +60,8 @@ MOST_WIDENED = 1e3
 # where tangents cancel these, and so little that blocks hardly feel it.
 PROXIMAL = 1e-5
 # It ends after so many iterations, or one with the last width in which no more than this part of all pairs, or so many,
-# change.
-LONGEST, FEW, FEWEST = 40, 1e-3, 10
+# change: with the true laws the few blocks that are left settle sooner.
+LONGEST, FEW, FEWEST = 40, 1e-2, 10
 # The part of the residual that is left, as blocks that are nearly free move by far more than it tells: for the first
 # width, for narrower ones less, by the root of how much narrower they are, ...
 CLOSELY = 1e-3
@@ -140,7 +142,7 @@ class SmoothSearch:
         if self._first is None:
             self._first = state
         many, fewest = counts[-1] > max(MANY * self._problem.laws.count, LEAST), min(counts[:-1], default=np.inf)
-        stalls = len(counts) >= FIRST and counts[-1] >= fewest
+        stalls = len(counts) >= FIRST and counts[-1] >= SLOWLY * fewest
         if not (self._allowed and many and (stalls or counts[-1] > SOARED * fewest)):
             return False
         self._allowed = False

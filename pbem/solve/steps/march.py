@@ -42,10 +42,6 @@ from pbem.solve.steps.values import refuse_without_value
 TRIED_FROM_REST = 2
 
 
-# What is guessed is nearly the solution; a search that takes longer may end far from it, where bodies roll freely.
-MOST_GUESSED = 8
-
-
 # The modes that are expected at a fraction of a stage, from the memory before it and the fluid's pressure; None where
 # nothing is.
 Guess = Callable[[int, float, Memory, Real], ModeState | None]
@@ -244,11 +240,8 @@ def _solve_guessed(
         return None
     try:
         with attempt.note_phase("guess", guessed=to_plain(guessed)):
-            solver = problem.model.solver
-            briefly = replace(solver, newton_max_iterations=min(solver.newton_max_iterations, MOST_GUESSED))
-            solution = solve_step(
-                replace(problem, model=replace(problem.model, solver=briefly)), tangent, replace(begin, modes=guessed),
-                load, reporter, hurried=True, once=True, resumed=resumed and resumed["inner"])
+            solution = solve_step(problem, tangent, replace(begin, modes=guessed), load, reporter, hurried=True,
+                                  resumed=resumed and resumed["inner"])
     except ConvergenceError:
         return None
     return replace(solution, memory=replace(solution.memory, modes=begin.modes))

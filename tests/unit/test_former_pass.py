@@ -79,7 +79,7 @@ def test_pairs_beside_an_end_of_contact_are_what_it_tells() -> None:
     guess = FormerPass(coarse, lambda _: (), modes, {(0, 0.5): (), (0, 1.0): ends}).make_guess(problem)
     angle = np.degrees(np.angle(problem.mesh.pairs.position + model.origin))
     memory, none = start_memory(problem.laws), np.zeros(problem.laws.count)
-    assert guess(0, 0.25, memory, none) is None
+    assert guess is not None and guess(0, 0.25, memory, none) is None
     found = guess(0, 1.0, memory, none)
     assert found is not None
     np.testing.assert_array_equal(found.mode != OPEN, np.abs(angle) < 40.0)

@@ -12,6 +12,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.contact.laws import OPEN, Memory, ModeState, PairLaws, follow_leaders
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.end_grading import ContactEnd
+from pbem.model.rigid_body_modes import find_rigid_body_modes
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, Step
 from pbem.solve.steps.march import Guess, resume_modes
@@ -37,8 +38,15 @@ class FormerPass:
             self.ends[step.stage, step.factor] = self.find(step.contact)
             yield step
 
-    def make_guess(self, problem: Problem) -> Guess:
-        """The modes of the same step, from the nearest pair of each; None for steps that the pass did not come to."""
+    def make_guess(self, problem: Problem) -> Guess | None:
+        """The modes of the same step, from the nearest pair of each; None for steps that the pass did not come to.
+
+        None at all where contacts alone keep bodies from turning: one that rolls is in balance nearly anywhere, and where it comes to rest
+        depends on where the search begins.
+        """
+        parted = find_rigid_body_modes(problem.model, dict.fromkeys(problem.model.contacts, "none"))
+        if any(turn for mode in parted for _, turn in mode.velocities.values()):
+            return None
         laws, carry = problem.laws, _Carry(self, problem.mesh)
 
         def guess(stage: int, factor: float, memory: Memory, _: Real) -> ModeState | None:

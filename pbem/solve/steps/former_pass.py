@@ -41,8 +41,8 @@ class FormerPass:
     def make_guess(self, problem: Problem) -> Guess | None:
         """The modes of the same step, from the nearest pair of each; None for steps that the pass did not come to.
 
-        None at all where contacts alone keep bodies from turning: one that rolls is in balance nearly anywhere, and where it comes to rest
-        depends on where the search begins.
+        None at all where contacts alone keep bodies from turning: one that rolls is in balance nearly anywhere, and
+        where it comes to rest depends on where the search begins.
         """
         parted = find_rigid_body_modes(problem.model, dict.fromkeys(problem.model.contacts, "none"))
         if any(turn for mode in parted for _, turn in mode.velocities.values()):

@@ -32,7 +32,7 @@ class AnalysisTable(Table):
     grade_contact_ends: Literal["auto"] | Flag = Field(
         "auto",
         description="where contact of rounded faces ends within an element that is too long for the fall of the "
-        "pressure there, shorten the elements of both curves towards that end and solve again from rest; contacts one "
+        "pressure there, shorten the elements of both curves towards that end and solve again; contacts one "
         'of whose curves has a `grading` other than `"auto"` are left as they are; `"auto"`: not beside `accuracy`, '
-        "nor in large models and sweeps; see `pbem help accuracy`",
+        "nor in large models and sweeps, nor on curves that two regions share; see `pbem help accuracy`",
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.geometry.curve import Curve
-from pbem.model.model import Contact, Model
+from pbem.model.model import Law, Model
 
 # An element is at most so many times as long as its distance from an end of contact: a root over so wide a range is
 # followed by three nodes to 3e-3 of its value; beside open faces, which carry nothing, so many times. Two nodes follow
@@ -55,9 +55,10 @@ class ContactEnd:
 def list_gradable(model: Model) -> dict[str, tuple[str, ...]]:
     """Of the contacts whose elements may be graded towards their ends: the curves that are no tools.
 
-    Left out are those both of whose curves are straight, as what these do when they bend needs no more elements than it
-    has; curves of bodies with a grading of the user's; laws under which faces carry something before they touch or
-    after they part; order 0, and with "auto" linear elements under traction equations.
+    With "auto" curves that two regions share are left out: where many of their pairs slip, passes took up to sixty
+    times the run. Left out are also faces both of which are straight, as what these do when they bend needs no more
+    elements than it has; curves of bodies with a grading of the user's; laws under which faces carry something before
+    they touch or after they part; order 0, and with "auto" linear elements under traction equations.
     """
     analysis = model.analysis
     given, linear = analysis.grade_contact_ends, analysis.order == 1 and analysis.scheme in ROUGH
@@ -65,10 +66,14 @@ def list_gradable(model: Model) -> dict[str, tuple[str, ...]]:
         return {}
     tools = {side.curve for region in model.regions if region.rigid for loop in region.loops for side in loop.sides}
     found = {}
-    for name, contact in model.contacts.items():
-        curves = [each for each in (contact.first, contact.second) if each not in tools]
+    meeting: dict[str, tuple[tuple[str, ...], Law]]
+    meeting = {name: ((contact.first, contact.second), contact.law) for name, contact in model.contacts.items()}
+    if given is True:
+        meeting |= {name: ((name,), interface.law) for name, interface in model.interfaces.items() if interface.second}
+    for name, (both, law) in meeting.items():
+        curves = [each for each in both if each not in tools]
         chosen = not any(each in model.given_gradings for each in curves)
-        if chosen and _is_plain(contact) and _is_rounded(model, contact):
+        if chosen and _is_plain(law) and _is_rounded(model, curves, law):
             found[name] = tuple(curves)
     return found
 
@@ -83,15 +88,14 @@ def is_too_large(model: Model, unknowns: int) -> bool:
     return model.analysis.grade_contact_ends == "auto" and unknowns > MOST_UNKNOWNS
 
 
-def _is_plain(contact: Contact) -> bool:
-    law = contact.law
+def _is_plain(law: Law) -> bool:
     held = isinstance(law.tensile_strength, float | int) and law.tensile_strength == 0
     return law.kind == "coulomb" and held and law.normal_stiffness is None
 
 
-def _is_rounded(model: Model, contact: Contact) -> bool:
-    curved = any(leg.turn != 0 for name in (contact.first, contact.second) for leg in model.curves[name].legs)
-    return curved or not isinstance(contact.law.gap, float | int)
+def _is_rounded(model: Model, curves: Sequence[str], law: Law) -> bool:
+    curved = any(leg.turn != 0 for name in curves for leg in model.curves[name].legs)
+    return curved or not isinstance(law.gap, float | int)
 
 
 def grade_ends(model: Model, ends: Sequence[ContactEnd]) -> Model:

@@ -214,6 +214,26 @@ def test_rows_of_a_sweep_are_those_of_single_runs(tmp_path: Path, graded: bool |
         assert found == pytest.approx(least, rel=1e-9)
 
 
+@pytest.mark.parametrize(("graded", "degrees"), [(True, 0.1), ("auto", 4.0)])
+def test_ends_on_a_curve_of_two_regions_are_graded_if_asked_for(
+    graded: bool | str, degrees: float, tmp_path: Path
+) -> None:
+    """A smooth inclusion of its plane's material under tension touches it within 19.6 degrees of the sides of the
+    direction of the tension, whatever the tension (Stippes, Wilson and Krull, 1962)."""
+    case = {"materials": {"m": {"young": 210e3, "poisson": 0.3}},
+            "curves": {"rim": {"center": [40.0, -7.0], "radius": 5.0, "elements": 24}},
+            "regions": {"in": {"material": "m", "boundary": ["rim"]},
+                        "out": {"material": "m", "infinite": True, "boundary": ["rim"]}},
+            "interfaces": {"rim": {"law": "frictionless"}}, "remote": {"sxx": 15.0},
+            "analysis": {"steps": 1, "grade_contact_ends": graded}}  # fmt: skip
+    rim = pbem.run(case, output=tmp_path / "rim.h5").contact["rim"]
+    x, y = (rim.position - [40.0, -7.0]).T
+    closed = rim.mode[-1] != 2
+    beside = np.degrees(np.arctan2(np.abs(x), np.abs(y)))[closed]
+    assert beside.max() == pytest.approx(19.6, abs=degrees)
+    assert (beside.max() > 19.0) == (graded is True)
+
+
 def test_curves_whose_grading_is_given_are_left_alone(tmp_path: Path) -> None:
     text = write_small(tmp_path / "own.toml").read_text().replace("elements = 32", 'elements = 32, grading = "none"')
     (tmp_path / "own.toml").write_text(text)

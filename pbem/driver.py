@@ -18,6 +18,7 @@ from pbem.description.case import UNNAMED
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
+from pbem.model.end_grading import ContactEnd, may_be_graded
 from pbem.model.model import Model, Operator
 from pbem.parallel import (
     Comm,
@@ -49,7 +50,7 @@ from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
 from pbem.solve.petsc.session import petsc_options, petsc_version
-from pbem.solve.problem.step import Reporter, SilentReporter, Step
+from pbem.solve.problem.step import ContactState, Reporter, SilentReporter, Step
 from pbem.solve.steps.former_pass import FormerPass
 from pbem.solve.steps.march import free_at_last, march, start_from
 from pbem.solve.system.assembly import assemble_problem
@@ -276,10 +277,12 @@ def _fill(
         estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
     tangent = kept.take_tangent(problem) if kept else None
     guess = former.make_guess(problem) if former else None
-    passed = FormerPass(mesh, partial(find_contact_ends, model, mesh))
+    passed = FormerPass(mesh, partial(_find_ends, comm, model, mesh))
+    follows = model.analysis.accuracy is not None or may_be_graded(model, 2 * mesh.nodes)
     try:
         steps = clock.each("steps", march(problem, watch, start, tangent, guess, unfinished=unfinished))
-        steps = passed.listen(steps if kept else free_at_last(problem, steps))
+        steps = steps if kept else free_at_last(problem, steps)
+        steps = passed.listen(steps) if follows else steps
         last = store_steps(steps, model.output_every, interior, writer, watch, estimator, comm) or last
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
@@ -288,6 +291,11 @@ def _fill(
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
     return _conclude(writer, model, mesh, estimator, watch, one, last), passed
+
+
+def _find_ends(comm: Comm, model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
+    """Found by the first rank for all, as they are rounded."""
+    return do_on_first(comm, PbemError, lambda: find_contact_ends(model, mesh, contact))
 
 
 def _conclude(

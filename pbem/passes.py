@@ -124,7 +124,7 @@ def plan_graded(
         return Finer(model, f"{where}; with elements graded towards these ends there is no mesh: {error}")
     note = (
         f"{where}, where the pressure falls like a root. Elements are graded towards these ends, "
-        f"{after} in place of {before}, and the run starts again with the statuses found here as a guess.{left}"
+        f"{after} in place of {before}, and the run starts again.{left}"
     )
     most = FIRST_PATIENCE + PATIENCE * iterations if model.analysis.grade_contact_ends == "auto" else None
     return Finer(replace(finer, refined=True, notes=(*model.notes, note)), note, most, mesh)

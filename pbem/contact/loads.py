@@ -129,7 +129,7 @@ def evaluate_load(model: Model, mesh: Mesh, outer: OuterNodes, stage: int, facto
     points = [each for region, particular in zip(model.regions, particulars, strict=True) if region.infinite
               for each in particular.points]
     far = _sample(mesh, [far_solution(model, region, remote) for region in model.regions])
-    particular = balanced[0] + far[0] if any(balanced.strides) else far[0]
+    particular = balanced[0] + far[0] if not _is_nothing(balanced) else far[0]
     rigid = evaluate_rigid(model, stage, factor)
     if any(body.tool for body in model.rigid.values()):
         far = far.copy()
@@ -224,9 +224,14 @@ def _blend_all(values: Sequence[tuple[Value, Value]], owner: Integer, places: Pl
     return result
 
 
+def _is_nothing(field: Complex) -> bool:
+    """Whether a field is zero everywhere and stored as one value."""
+    return not any(field.strides) and not field.any()
+
+
 def _spread_known(mesh: Mesh, balanced: Complex) -> Real:
     """Displacements and tractions (4 nodes,) of the balanced solutions; of cracks the tractions alone."""
-    if not any(balanced.strides):
+    if _is_nothing(balanced):
         return repeat_value(0.0, 4 * mesh.nodes)
     known = np.empty((2, mesh.nodes, 2))
     known[..., 0], known[..., 1] = balanced.real, balanced.imag

@@ -73,7 +73,7 @@ def list_gradable(model: Model) -> dict[str, tuple[str, ...]]:
     for name, (both, law) in meeting.items():
         curves = [each for each in both if each not in tools]
         chosen = not any(each in model.given_gradings for each in curves)
-        if chosen and _is_plain(law) and _is_rounded(model, curves, law):
+        if chosen and _is_plain(law) and _is_rounded(model, both, law):
             found[name] = tuple(curves)
     return found
 

@@ -160,8 +160,10 @@ def test_a_disc_beside_the_middle_of_a_table_stays_upright(load: float, tmp_path
     position, moved = (each[disc] @ [1, 1j] for each in (results.nodes.position, results.displacement[-1]))
     arm = position - position.mean()
     turn = (arm.conj() * (moved - moved.mean())).imag.sum() / (np.abs(arm) ** 2).sum()
-    assert abs(turn) < 0.05 * abs(moved.mean())  # a disc rolls easily
-    assert abs(moved.mean().real) < 0.05 * abs(moved.mean())
+    # It rolls easily, by a small part of the half-width of its contact (Hertz).
+    half_width = np.sqrt(8 * load * (1 - 0.3**2) / 1000.0)
+    assert abs(turn) < 1e-3 * half_width
+    assert abs(moved.mean().real) < 1e-3 * half_width
     # What is left over is that of the table's coarse sides.
     assert results.reactions["bottom"][-1] == pytest.approx([0.0, np.pi * load], rel=1e-4, abs=1e-4 * load)
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, ModeState, PairState
 from pbem.contact.modes import linearise
-from pbem.solve.nonlinear.open_blocks import FALL, FLOATING, PART, OpenBlocks
+from pbem.solve.nonlinear import open_blocks
+from pbem.solve.nonlinear.open_blocks import FALL, FLOATING, OWN, PART, OpenBlocks
 from pbem.solve.nonlinear.smooth_search import SmoothSearch
 from pbem.solve.problem.step import Step
 from tests.unit.test_laws import make_laws, remember
@@ -94,9 +95,13 @@ def test_the_stiffness_falls_once_no_mode_changes_but_around_blocks_that_float()
     assert not blocks.take_off(modes, moved)[1].any()
 
 
-@pytest.mark.parametrize(("drive", "block", "counts"), [
-    (0.5, True, False), (2.0, True, True), (0.5, False, True)])
-def test_what_is_left_over_on_blocks_that_float_does_not_count(drive: float, block: bool, counts: bool) -> None:
+@pytest.mark.parametrize(("drive", "weight", "block", "counts"), [
+    (0.5, 0.0, True, False), (0.5, 0.5, True, False), (0.5, 2.0, True, True), (2.0, 0.0, True, True),
+    (0.5, 0.0, False, True)])
+def test_what_is_left_over_on_blocks_that_float_does_not_count(
+    drive: float, weight: float, block: bool, counts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """weight: of the block itself, to what is left over by a mesh (see measure_drive)."""
     _, blocks, modes, state = make_blocks()
     problem: Any = blocks._problem
     own, other = np.arange(4, COUNT), np.arange(4)
@@ -108,10 +113,11 @@ def test_what_is_left_over_on_blocks_that_float_does_not_count(drive: float, blo
     size = max(np.abs(state.p_n).max(), np.abs(state.p_s).max())
     borne = np.zeros(COUNT)
     borne[own], borne[other] = drive * FLOATING * usual, 1e-7 * size
-    rest, floats = blocks.measure_rest(modes, state, borne)
+    monkeypatch.setattr(open_blocks, "measure_drive", lambda *_: weight * OWN * drive * FLOATING * usual)
+    rest, floats = blocks.measure_rest(modes, state, borne, problem)
     np.testing.assert_allclose(rest, borne[own[0]] / size if counts else 1e-7, rtol=1e-12)
     np.testing.assert_array_equal(floats, (np.arange(COUNT) >= 4) & (not counts))
-    assert blocks.measure_rest(modes, state, np.zeros(COUNT))[0] == 0.0
+    assert blocks.measure_rest(modes, state, np.zeros(COUNT), problem)[0] == 0.0
 
 
 def write_blocks(load: str) -> str:

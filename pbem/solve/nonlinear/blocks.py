@@ -7,6 +7,7 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.contact.floating import measure_space
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
+from pbem.contact.loads import Load
 from pbem.solve.problem.problem import Problem
 
 # Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
@@ -51,3 +52,20 @@ def measure_usual(problem: Problem, state: PairState) -> float:
     """The mean traction of all pairs, or of what jumps as theirs make over the length of the model (stress)."""
     weight, jumps = problem.mesh.pairs.weight, problem.traction_scale * np.hypot(state.g_n, state.g_s)
     return float(weight @ np.maximum(np.hypot(state.p_n, state.p_s), jumps)) / float(weight.sum())
+
+
+def measure_drive(problem: Problem, body: int, load: Load) -> float:
+    """The mean traction (stress) that loads of its own would make along the cracks around a block: weight, point loads,
+    fluids, by the larger one of their force and of their moment, at the distance of the farthest pair.
+    (theory, 127)"""
+    pairs = problem.mesh.pairs
+    own, normal = problem.cut.find_around(body)
+    weight, node = pairs.weight[own], pairs.first[own]
+    at = 2 * (problem.mesh.nodes + node)
+    # The field that balances the loads within acts on the first face as it stands, on the second one against that.
+    sense = np.where(problem.cut.second[own] == body, -1.0, 1.0)
+    balancing = sense * (load.known[at] + 1j * load.known[at + 1])
+    force = weight * (load.pressure[own] * normal - balancing)
+    lever = pairs.position[own] - np.average(pairs.position[own], weights=weight)
+    turn = float((np.conj(lever) * force).imag.sum()) / float(np.abs(lever).max())
+    return float(max(abs(force.sum()), abs(turn)) / weight.sum())

@@ -349,7 +349,7 @@ class Hold:
         if not motions:
             return None
         advice = "hold it by a condition"
-        if any(self.problem.parts.block[each.moving].any() for each in motions):
+        if any(self.problem.parts.block[list(each.moving)].any() for each in motions):
             advice = "let it touch, or be joined, somewhere: bonds, joints of finite stiffness, other loads"
         return ConvergenceError("free motion", f"{self.problem.cut.describe(motions)}; {advice}")
 

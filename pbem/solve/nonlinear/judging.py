@@ -55,7 +55,7 @@ def judge_solution(
         failing = find_failures(laws, pairs, memory, load.pressure, floor)
         tolerance = problem.model.solver.newton_tolerance
         settled = not proposal.changed.any() and law_error <= tolerance
-        off, floats = blocks.measure_rest(modes, pairs, borne) if settled else (np.inf, None)
+        off, floats = blocks.measure_rest(modes, pairs, borne, load) if settled else (np.inf, None)
         return Outcome(pairs, proposal, settled, failing, law_error, floats, off <= tolerance)
 
     return problem.decide(judge)

@@ -7,7 +7,8 @@ where these come to rest it bears nothing, and the true laws hold.
 
 A block that nothing holds comes to rest only as far as the forces on it balance. What meshes and products leave over
 moves it on and on, and no other stiffness would bear it. Where that is next to nothing the block floats: it is told as
-such, and its place is that of the last iteration. All else, thin needles among it, comes to rest the sooner the less
+such, and its place is that of the last iteration. Where loads of its own, as its weight, make up a part of it that
+counts they have to move the block until it lies. All else, thin needles among it, comes to rest the sooner the less
 stiffness there is: it falls once no mode changes, unless systems cannot be solved any more.
 """
 
@@ -19,16 +20,18 @@ import numpy as np
 
 from pbem.arrays import Bool, Real
 from pbem.contact.laws import OPEN, ModeState, PairState
+from pbem.contact.loads import Load
 from pbem.contact.modes import P_N, P_S, Linearisation
-from pbem.solve.nonlinear.blocks import measure_usual
+from pbem.solve.nonlinear.blocks import measure_drive, measure_usual
 from pbem.solve.problem.problem import Problem
 
 # The stiffness is this part of that of the surroundings of each pair alone, in the mean of its curve, ...
 PART = 1e-5
 # ... and falls to this part of itself where no mode changes, but around blocks that float.
 FALL = 1e-2
-# Blocks that nothing holds float where the stiffness bears this part of the mean of all tractions on them.
-FLOATING = 1e-3
+# Blocks that nothing holds float where the stiffness bears this part of the mean of all tractions on them, and their
+# own loads are this part of what it bears.
+FLOATING, OWN = 1e-3, 0.1
 
 
 class OpenBlocks:
@@ -94,9 +97,10 @@ class OpenBlocks:
         by_n, by_s = stiffness * (state.g_n - self.state.g_n), stiffness * (state.g_s - self.state.g_s)
         return replace(state, p_n=state.p_n - by_n, p_s=state.p_s - by_s), np.maximum(np.abs(by_n), np.abs(by_s))
 
-    def measure_rest(self, modes: ModeState, state: PairState, borne: Real) -> tuple[float, Bool]:
+    def measure_rest(self, modes: ModeState, state: PairState, borne: Real, load: Load) -> tuple[float, Bool]:
         """What the stiffness bears (m,), as a part of the largest traction of a state without it, but for what is left
-        over on blocks that float in these modes; the pairs (m,) around these. On one rank. (theory, 127)"""
+        over under a load on blocks that float in these modes; the pairs (m,) around these. On one rank. (theory, 127)
+        """
         size = max(np.abs(state.p_n).max(initial=0.0), np.abs(state.p_s).max(initial=0.0))
         floats, weight = np.zeros(len(borne), dtype=bool), self._problem.mesh.pairs.weight
         if not borne.any():
@@ -104,9 +108,11 @@ class OpenBlocks:
         usual = measure_usual(self._problem, state)
         moving = {body for motion in self._problem.find_cut_motions(modes) for body in motion.moving}
         for body in sorted(moving):
+            if not self._problem.parts.block[body]:
+                continue
             own, _ = self._problem.cut.find_around(body)
-            if self._problem.parts.block[body] and weight[own] @ borne[own] <= FLOATING * usual * weight[own].sum():
-                floats[own] = True
+            mean = weight[own] @ borne[own] / weight[own].sum()
+            floats[own] |= mean <= FLOATING * usual and measure_drive(self._problem, body, load) <= OWN * mean
         return float(borne[~floats].max(initial=0.0) / size) if size > 0 else np.inf, floats
 
     def _find_stiffness(self, modes: ModeState) -> Real:

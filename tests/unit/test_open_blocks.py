@@ -11,17 +11,21 @@ from numpy.typing import NDArray
 
 from pbem.contact.laws import OPEN, SLIP, ModeState, PairState
 from pbem.contact.modes import linearise
+from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import open_blocks
 from pbem.solve.nonlinear.open_blocks import FALL, FLOATING, OWN, PART, OpenBlocks
 from pbem.solve.nonlinear.smooth_search import SmoothSearch
-from pbem.solve.problem.step import Step
+from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.steps.march import march
+from pbem.solve.tangent.krylov import KrylovTangent
 from tests.unit.test_laws import make_laws, remember
-from tests.unit.test_sweeps import many_groups, march_over, write_network
+from tests.unit.test_sweeps import assemble, many_groups, write_network
 
 Real = NDArray[np.float64]
 __all__ = ["many_groups"]
 
 COUNT, SCALE = 12, 7.0
+UNSOLVED = ConvergenceError("linear solver", "GMRES did not end")
 
 
 WEIGHT = np.linspace(0.1, 1.0, COUNT)
@@ -66,7 +70,7 @@ def test_the_stiffness_falls_once_no_mode_changes_but_around_blocks_that_float()
     _, blocks, modes, state = make_blocks()
     floats = np.arange(COUNT) >= 8
     blocks.move_on(state, floats)
-    assert blocks.state is None and not blocks.stiffen_again()
+    assert blocks.state is None and not blocks.stiffen_again(UNSOLVED)
     blocks.begin(state)
     moved = PairState(state.p_n, state.p_s, state.g_n + 1.0, state.g_s)
     held = (modes.mode == OPEN) & (np.arange(COUNT) > 0)
@@ -84,11 +88,14 @@ def test_the_stiffness_falls_once_no_mode_changes_but_around_blocks_that_float()
     blocks.move_on(state, floats)
     check(FALL**2)
     # A system that could not be solved: what was before comes back, and is the least.
-    assert blocks.stiffen_again()
+    assert not blocks.stiffen_again(ConvergenceError("accuracy", "of something else"))
+    check(FALL**2)
+    assert blocks.stiffen_again(UNSOLVED)
     check(FALL)
     blocks.move_on(state, floats)
     check(FALL)
-    assert blocks.stiffen_again() and not blocks.stiffen_again()
+    assert blocks.stiffen_again(ConvergenceError("singular tangent", "of a block"))
+    assert not blocks.stiffen_again(UNSOLVED)
     check(1.0)
     blocks.begin(state)
     blocks.move_on(moved, None)
@@ -135,7 +142,7 @@ def write_blocks(load: str) -> str:
     return text + "[interfaces]\n" + "".join(f'{name} = {{ law = "coulomb", friction = 0.6 }}\n' for name in curves)
 
 
-def solve(text: str, smooths: bool) -> Step:
+def solve(text: str, smooths: bool, reporter: SilentReporter | None = None) -> Step:
     """The step of a case whose laws are smoothed after the first iteration, or never."""
     def begins(search: SmoothSearch, counts: list[int], state: PairState) -> bool:
         search._first, search._allowed, allowed = state, False, search._allowed
@@ -143,7 +150,8 @@ def solve(text: str, smooths: bool) -> Step:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(SmoothSearch, "begins", begins)
-        return march_over(text)
+        (step,) = march(assemble(text), reporter or SilentReporter())
+    return step
 
 
 def test_blocks_in_open_cracks_come_to_the_same_state_by_way_of_smoothed_laws(many_groups: None) -> None:
@@ -155,3 +163,30 @@ def test_blocks_in_open_cracks_come_to_the_same_state_by_way_of_smoothed_laws(ma
     np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
     slip = usual.contact.slip
     np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-6 * np.abs(slip).max())
+
+
+def test_what_is_tried_again_with_more_stiffness_is_told(many_groups: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first system after smoothed laws is not solved, with a stiffness that has fallen: it is told, with its
+    reason, and the state is found."""
+    text, told, solve_system, begun = write_blocks("sxx = 1.0, syy = -0.05, sxy = 0.0"), [], KrylovTangent.solve, []
+    usual = solve(text, True)
+
+    class Log(SilentReporter):
+        def tell(self, text: str) -> None:
+            told.append(text)
+
+    def fail_once(tangent: KrylovTangent, *given: Any, **named: Any) -> Any:
+        if begun and begun[-1].part < PART:
+            raise UNSOLVED
+        return solve_system(tangent, *given, **named)
+
+    def begin(blocks: OpenBlocks, state: PairState, _begin: Any = OpenBlocks.begin) -> None:
+        _begin(blocks, state)
+        blocks.part = FALL * PART
+        begun.append(blocks)
+
+    monkeypatch.setattr(KrylovTangent, "solve", fail_once)
+    monkeypatch.setattr(OpenBlocks, "begin", begin)
+    found = solve(text, True, Log())
+    assert len(told) == 1 and str(UNSOLVED) in told[0]
+    np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)

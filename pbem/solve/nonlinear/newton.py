@@ -206,7 +206,8 @@ def _run_search(
                 if loosely and not outcome.settled:
                     forcing.tighten()
         except ConvergenceError as error:
-            if blocks.stiffen_again():
+            if blocks.stiffen_again(error):
+                reporter.tell(f"  with more stiffness in open pairs again, as an iteration failed: {error}")
                 continue
             forcing.used |= part > 0 and error.reason == "linear solver"  # in full it may be solved
             problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]

@@ -22,6 +22,7 @@ from pbem.arrays import Bool, Real
 from pbem.contact.laws import OPEN, ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.modes import P_N, P_S, Linearisation
+from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.blocks import measure_drive, measure_usual
 from pbem.solve.problem.problem import Problem
 
@@ -32,6 +33,8 @@ FALL = 1e-2
 # Blocks that nothing holds float where the stiffness bears this part of the mean of all tractions on them, and their
 # own loads are this part of what it bears.
 FLOATING, OWN = 1e-3, 0.1
+# The reasons of errors that more stiffness may prevent.
+UNSOLVED = ("linear solver", "singular tangent")
 
 
 class OpenBlocks:
@@ -69,9 +72,10 @@ class OpenBlocks:
             self.floats = floats
             self.part *= FALL if self.part > self.least else 1.0
 
-    def stiffen_again(self) -> bool:
-        """After a system that could not be solved: whether the stiffness had fallen, and is what it was before."""
-        if self.state is None or self.part >= PART:
+    def stiffen_again(self, error: ConvergenceError) -> bool:
+        """After an error: whether it is of a system that could not be solved as the stiffness had fallen, which is now
+        what it was before."""
+        if error.reason not in UNSOLVED or self.state is None or self.part >= PART:
             return False
         self.part /= FALL
         self.least = self.part

@@ -34,7 +34,7 @@ from pbem.model.kinks import list_varying, split_at_kinks
 from pbem.model.law import check_along
 from pbem.model.load_notes import note_jumps, note_loads
 from pbem.model.loading import Loading, list_held, read_loading
-from pbem.model.loads_along import check_loads, list_filled
+from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.origin import move_to_own_origin
@@ -125,8 +125,7 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     overlaps = [(name, table.between, table.overlap) for name, table in case.contacts.items()]
     in_stages = [stage.point_loads for stage in case.stages]
     kinked = [(loc, given) for loc, _, given in list_varying(case)]
-    pointed = (case.point_loads, in_stages, case.point_supports, list_held(loading.conditions), kinked,
-               list_filled(case))
+    pointed = (case.point_loads, in_stages, case.point_supports, list_held(loading.conditions), kinked)
     drawn = (*shown, cut.notes, cut.faults, case.curves, pointed, case.tools, overlaps)
     topology = recall.find("topology", drawn, lambda: _find_topology(cut, loading))
     interior, wrong = list_interior_points(case)
@@ -189,7 +188,7 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
         notes += describe_closing(curves, cracks, loops)
     if not faults:
         written = {name for name in curves if case.curves[name].expression}
-        seats = split_opposite_ends(curves, loops, roles.contacts, written, list_filled(case))
+        seats = split_opposite_ends(curves, loops, roles.contacts, written)
         curves, opposite = seats.curves, seats.opposite
         notes += seats.notes
     points = PointLoads({}, (), ())

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -108,12 +107,6 @@ def list_given(case: Case) -> Iterator[tuple[KeyPath, str, VaryingTable, range]]
             given = getattr(table, key, None)
             if isinstance(given, VaryingTable):
                 yield (*loc, key), curve, given, range(first, _find_next(case, (*loc, key), first))
-
-
-def list_filled(case: Case) -> set[str]:
-    """The contacts whose open faces a fluid presses on."""
-    tables: list[Mapping[str, Any]] = [case.contacts, *(stage.contacts for stage in case.stages)]
-    return {name for each in tables for name, table in each.items() if table.pressure}
 
 
 def _find_next(case: Case, loc: KeyPath, first: int) -> int:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.errors import Fault
 from pbem.geometry.boxes import Boxes
-from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.curve import Curve, Leg, turning_angle
 from pbem.geometry.elements import Elements
 from pbem.geometry.intersection import inner_points, measure_distances, project, surround
 from pbem.geometry.junction import format_point, split_leg
@@ -29,9 +31,11 @@ OVERLAP = 1e-3
 REACH = 2.0
 # A leg is not split nearer to its ends than this part of its mean element.
 LEAST_PIECE = 0.25
-# Nor for faces farther away than this part of the shorter curve, between which there is no fluid. Those that are
-# farther away than this piece have to be opposite within 20 degrees: a disc on a block does not face its top's ends.
-FAR, OPPOSITE_FAR = 0.25, -0.94
+# Faces farther away than this piece have to be opposite within 20 degrees: a disc on a block does not face its top's
+# ends. How far away they are does not matter, as the parts that fall on each other are the same across any gap.
+OPPOSITE_FAR = -0.94
+# A face ends at a corner of its curve, too, that turns away from the other one by more than this (radians).
+CORNER = math.radians(45.0)
 
 
 @dataclass(frozen=True)
@@ -122,26 +126,24 @@ def _face(model: Model, sides: Mapping[str, Side], contact: Contact) -> bool:
 
 def split_opposite_ends(
     curves: Mapping[str, Curve], loops: Loops, contacts: Mapping[str, tuple[str, str]],
-    kept: Set[str] = frozenset(), filled: Set[str] = frozenset(),
+    kept: Set[str] = frozenset(),
 ) -> Seats:
-    """Split the curves of contacts where their normals pass the ends of the curve that they face, and say where.
+    """Split the curves of contacts where their normals pass ends and corners of the curve that they face; say where.
 
-    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well, and
-    faces far away are not, except where a fluid fills what is between them.
-    kept: curves that are not split. filled: contacts with fluid. Ends near those of an element are left.
+    Contact ends there, so that no element has a part that faces nothing; faces that touch are split there as well.
+    kept: curves that are not split, the corners of which end no faces. Ends near those of a leg are left.
     """
     sides = {side.curve: side for own in loops.values() for loop in own for side in loop.sides}
     result, notes = dict(curves), []
     opposite: dict[str, dict[complex, tuple[str, complex]]] = {}
-    for contact, pair in contacts.items():
+    for pair in contacts.values():
         for name, other in (pair, pair[::-1]):
             if name in kept or name not in sides or other not in sides:
                 continue
             shorter = min(curves[name].length, curves[other].length)
-            reach = np.inf if contact in filled else FAR * shorter
             cuts: dict[int, dict[float, complex]] = {}
-            for end, normal in _outward_ends(curves[other], sides[other]):
-                found = _find_opposite(curves[name], sides[name].forward, end, normal, (-OVERLAP * shorter, reach))
+            for end, normal in _outward_ends(curves[other], sides[other], other not in kept):
+                found = _find_opposite(curves[name], sides[name].forward, end, normal, -OVERLAP * shorter)
                 if found is not None:
                     cuts.setdefault(found[0], {})[found[1]] = end
             legs = []
@@ -150,38 +152,38 @@ def split_opposite_ends(
                 legs += split_leg(leg, points)
                 for at, t in points.items():
                     opposite.setdefault(name, {})[at] = (other, cuts[number][t])
-                notes += [f"'{name}' is split at {format_point(at)}, opposite an end of '{other}'." for at in points]
+                    what = "an end" if cuts[number][t] in (curves[other].start, curves[other].end) else "a corner"
+                    notes.append(f"'{name}' is split at {format_point(at)}, opposite {what} of '{other}'.")
             result[name] = Curve(name, tuple(legs))
     return Seats(result, opposite, tuple(notes))
 
 
-def _outward_ends(curve: Curve, side: Side) -> list[tuple[complex, complex]]:
-    """Both ends of a curve with the outward normals there."""
-    if curve.closed:
-        return []
-    sign = 1 if side.forward else -1
-    return [
-        (point, sign * complex(leg.normals(np.array([point]))[0]))
-        for leg, point in ((curve.legs[0], curve.start), (curve.legs[-1], curve.end))
-    ]
+def _outward_ends(curve: Curve, side: Side, with_corners: bool) -> list[tuple[complex, complex]]:
+    """Ends of a curve, and its corners on either side, where it turns away from what it faces, with outward normals."""
+    sign, legs = 1 if side.forward else -1, curve.legs
+    ends = [] if curve.closed else [(legs[0], curve.start), (legs[-1], curve.end)]
+    joints = [*pairwise(legs)] + ([(legs[-1], legs[0])] if curve.closed else [])
+    for before, after in joints if with_corners else ():
+        if sign * turning_angle(before.tangent(at_end=True), after.tangent(at_end=False)) > CORNER:
+            ends += [(before, before.end), (after, after.start)]
+    return [(point, sign * complex(leg.normals(np.array([point]))[0])) for leg, point in ends]
 
 
 def _find_opposite(
-    curve: Curve, forward: bool, end: complex, normal: complex, ahead: tuple[float, float]
+    curve: Curve, forward: bool, end: complex, normal: complex, least: float
 ) -> tuple[int, float] | None:
-    """Number of the leg and fraction of it whose normal meets an end of another curve face to face, so far ahead."""
-    number = min(range(len(curve.legs)), key=lambda at: project(curve.legs[at], end)[1])
-    leg = curve.legs[number]
-    t, distance = project(leg, end)
-    foot = leg.point(np.array([t]))
-    outward = complex(leg.normals(foot)[0]) * (1 if forward else -1)
-    apart = ((end - complex(foot[0])) * outward.conjugate()).real
-    if min(t, 1 - t) * leg.length < LEAST_PIECE * leg.length / leg.elements:
-        return None
-    if not ahead[0] <= apart <= ahead[1] or distance > ahead[1]:
-        return None
-    near = distance <= LEAST_PIECE * leg.length / leg.elements
-    return None if (normal * outward.conjugate()).real > (OPPOSITE if near else OPPOSITE_FAR) else (number, t)
+    """Number of the nearest leg that an end of another curve faces, at least so far ahead, and the fraction there."""
+    feet = [(*project(leg, end)[::-1], number) for number, leg in enumerate(curve.legs)]
+    for distance, t, number in sorted(feet):
+        leg = curve.legs[number]
+        foot = leg.point(np.array([t]))
+        outward = complex(leg.normals(foot)[0]) * (1 if forward else -1)
+        piece = LEAST_PIECE * leg.length / leg.elements
+        facing = (normal * outward.conjugate()).real <= (OPPOSITE if distance <= piece else OPPOSITE_FAR)
+        # The normal of a foot at the end of a leg, which is but the nearest point, passes by the other curve's end.
+        if facing and 0 < t < 1 and ((end - complex(foot[0])) * outward.conjugate()).real >= least:
+            return (number, t) if min(t, 1 - t) * leg.length >= piece else None
+    return None
 
 
 def find_strips(model: Model, region: Region, chosen: Sequence[tuple[str, int]]) -> list[Strip]:

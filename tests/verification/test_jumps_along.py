@@ -127,6 +127,54 @@ def test_fluid_between_a_block_and_a_wider_one(gap: float, turned: bool, tmp_pat
     assert results.reactions["a_below"][-1][1] == pytest.approx(force, rel=1e-3)
 
 
+def cut_faces(kind: str, gap: float) -> tuple[Tables, Tables, dict[str, list[str]]]:
+    """A block over a wider one: curves of both, and the pairs of curves in contact, however the outlines are cut."""
+    lower, upper = box(0, 0, 2, 1, 8, "a"), box(0.3, 1 + gap, 1.7, 2 + gap, 9, "b")
+    y, x = 1 + gap, [0.3, 0.65, 1.0, 1.35, 1.7]
+    if kind == "four":
+        del lower["a_above"], upper["b_below"]
+        ends = [0.0, *x[1:4], 2.0]
+        upper |= {f"b{k}": {"points": [[x[k], y], [x[k + 1], y]], "elements": 3} for k in range(4)}
+        lower |= {f"a{k}": {"points": [[ends[k + 1], 1], [ends[k], 1]], "elements": [3, 2, 2, 3][k]}
+                  for k in reversed(range(4))}
+        return lower, upper, {f"k{k}": [f"b{k}", f"a{k}"] for k in range(4)}
+    if kind == "skirt":  # its ends are those of the block's top
+        del upper["b_below"], upper["b_right"], upper["b_left"]
+        upper["b_below"] = {"points": [[x[0], y + 1], [x[0], y], [x[4], y], [x[4], y + 1]], "elements": 27}
+    if kind == "cup":  # its walls are nearer to the block's ends than its floor
+        points = [[2, 1], [2, 3], [1.9, 3], [1.9, 1], [0.1, 1], [0.1, 3], [0, 3], [0, 1]]
+        lower["a_above"] = {"points": points, "elements": 40}
+    return lower, upper, {"k": ["b_below", "a_above"]}
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("kind", ["one", "four", "skirt", "cup"])
+def test_how_outlines_are_cut_does_not_matter_across_any_gap(
+    kind: str, turned: bool, unit: float, tmp_path: Path
+) -> None:
+    """A hundredth and less of the force hangs on the mesh, and none of it on the gap."""
+    forces = []
+    for gap in (0.0, 0.1, 0.36, 2.5):
+        lower, upper, pairs = cut_faces(kind, gap)
+        curves = {name: {**table, "points": [[unit * x, unit * y] for x, y in table["points"]]}
+                  for name, table in (lower | upper).items()}
+        case = {
+            "materials": {"m": {"young": 1e4, "poisson": 0.3}},
+            "curves": curves,
+            "regions": {"low": {"material": "m", "boundary": list(lower)},
+                        "high": {"material": "m", "boundary": list(upper)}},
+            "contacts": {name: {"between": pair[::-1] if turned else pair, "friction": 0.0}
+                         for name, pair in pairs.items()},
+            "boundary": {"a_below": {"ux": 0.0, "uy": 0.0}, "b_above": {"ux": 0.0, "uy": unit * (-0.02 - gap)}},
+            "analysis": {"steps": 1},
+        }  # fmt: skip
+        results = pbem.run(case, tmp_path / f"cut{gap}.h5")
+        forces.append(results.reactions["b_above"][-1][1] / unit)
+    assert forces[0] == pytest.approx(-175.53, rel=3e-4)
+    np.testing.assert_allclose(forces[1:], forces[0], rtol=1e-9)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_a_block_across_a_gap_presses_like_one_without(friction: float, tmp_path: Path) -> None:
     forces = []

@@ -23,7 +23,7 @@ from pbem.wording import list_names
 # A point lies on a curve that is nearer than this part of the curve's length.
 ON_CURVE = 1e-6
 # A load inside has to be further from curves than this part of their elements, and is told of if nearer than an
-# element: the stress that it brings to a curve changes within its distance.
+# element: the stress that it brings to a curve changes within its distance. Only where the user keeps the elements.
 TOO_NEAR, NEAR = 0.05, 1.0
 # An angle of a corner below this (radians) is no wedge.
 SHARPEST = math.radians(1.0)
@@ -176,10 +176,10 @@ def _check_distance(
 ) -> tuple[list[Fault], list[str]]:
     """Loads inside that are too near to a curve, or so near that its elements should be shorter.
 
-    kept: curves whose grading is the user's; others get shorter elements later.
+    kept: curves whose grading is the user's; others get elements later that are as short as the loads want them.
     """
     near: list[tuple[float, str, float]] = []
-    for curve in curves.values():
+    for curve in (curves[name] for name in curves if name in kept):
         for leg in curve.legs:
             t, distance = project(leg, point)
             ends = leg.element_fractions()
@@ -190,9 +190,10 @@ def _check_distance(
     part, curve_name, distance = min(near)
     where = f"{distance:.3g} from curve '{curve_name}', {part:.2g} times the length of its elements"
     if part < TOO_NEAR:
-        return [Fault.at(loc, f"a point {where}", "a point on the curve, or further away from it, or shorter elements")
-                ], []
-    if part >= NEAR or curve_name not in kept:
+        expected = ("a point on the curve, or further away from it, or shorter elements there, "
+                    "as grading = \"auto\" makes")
+        return [Fault.at(loc, f"a point {where}", expected)], []
+    if part >= NEAR:
         return [], []
     return [], [f"The point load '{name}' lies {where}: shorter ones there are more accurate."]
 

@@ -274,10 +274,30 @@ def test_loads_that_have_no_field_are_refused(load: dict[str, Any], words: str) 
     case = {
         "materials": {"m": MATERIAL},
         "curves": {"bottom": {"points": [[0, 0], [1, 0]], "elements": 4},
-                   "rest": {"points": [[1, 0], [1, 1], [0, 1], [0, 0]], "elements": 12}},
+                   "rest": {"points": [[1, 0], [1, 1], [0, 1], [0, 0]], "elements": 12, "grading": "none"}},
         "regions": {"block": {"material": "m", "boundary": ["bottom", "rest"]}},
         "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}}, "point_loads": {"p": load},
     }  # fmt: skip
     with pytest.raises(pbem.CaseError) as caught:
         pbem.run(case, "none.h5")
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_a_load_is_as_near_to_a_face_as_one_likes_where_the_program_grades(unit: float, tmp_path: Path) -> None:
+    """It comes to be the load on the face. Elements of 0.5 there become as short as it takes."""
+    def displace(depth: float) -> Any:
+        corners = [[0, 0], [4 * unit, 0], [4 * unit, 2 * unit], [0, 2 * unit]]
+        curves = {name: {"points": [corners[k], corners[(k + 1) % 4]], "elements": 8 if k % 2 == 0 else 4}
+                  for k, name in enumerate(("bottom", "right", "top", "left"))}
+        return pbem.run({
+            "materials": {"m": MATERIAL}, "curves": curves,
+            "regions": {"block": {"material": "m", "boundary": list(curves)}},
+            "boundary": {"left": {"ux": 0.0, "uy": 0.0}},
+            "point_loads": {"p": {"at": [2.1 * unit, (2 - depth) * unit], "fx": 0.5, "fy": -1.0}},
+            "analysis": {"steps": 1}, "output": {"points": [[3 * unit, unit], [unit, unit / 2]]},
+        }, tmp_path / f"near{depth}.h5").interior.displacement[-1]  # fmt: skip
+
+    exact = displace(0.0)
+    for depth in (0.02, 1e-3, 1e-5):
+        np.testing.assert_allclose(displace(depth), exact, rtol=0, atol=(0.5 * depth + 2e-4) * np.abs(exact).max())

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pbem.arrays import Complex
 from pbem.description.case import Case
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve
@@ -23,9 +24,10 @@ from pbem.wording import list_names
 
 # Curves and corners that are named in one note.
 MOST_NAMED = 8
-# A crack this much longer than its distance from faces of the body leaves slender arms: with linear elements K was
-# 0.7 % too large at 2, 6 % at 4, 27 % at 8.
-SLENDER = 2.5
+# Faces of the body along a part of a crack that is this much longer than they are away leave slender arms: with linear
+# elements K was 0.7 % too large at 2, 6 % at 4, 27 % at 8. They do so along half of the crack at least (a small hole
+# beside it does not); asked at so many points.
+SLENDER, ALONGSIDE, ASKED = 2.5, 0.5, 20
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def fit_curves(
         return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     graded, near = _grade_contacts(case, sizes.curves, contacts)
-    notes = [*_note_added(curves, sizes.curves), *near, *_note_ties(ties), *_note_long(sizes.long),
+    notes = [*_note_added(curves, sizes.curves, any(inside)), *near, *_note_ties(ties), *_note_long(sizes.long),
              *_note_slender(case, sizes.curves, regions)]
     return FittedCurves(graded, ties, tuple(notes), ())
 
@@ -73,11 +75,13 @@ def _note_slender(case: Case, curves: Mapping[str, Curve], regions: Sequence[Reg
     found = []
     for region in regions:
         faces = [leg for loop in region.loops for side in loop.sides for leg in curves[side.curve].legs]
-        middles = [_find_middle(curves[crack]) for crack in region.cracks]
-        if faces and middles:
-            distances = measure_distances(faces, np.array(middles))
-            found += [crack for crack, distance in zip(region.cracks, distances, strict=True)
-                      if curves[crack].length > SLENDER * distance]
+        if faces and region.cracks:
+            points = np.concatenate([_spread_points(curves[crack]) for crack in region.cracks])
+            distances = np.sort(measure_distances(faces, points).reshape(-1, ASKED))
+            part = (np.arange(ASKED) + 0.5) / ASKED  # of the crack that is no farther from faces
+            for crack, distance in zip(region.cracks, distances, strict=True):
+                if ((part >= ALONGSIDE) & (part * curves[crack].length > SLENDER * distance)).any():
+                    found.append(crack)
     if not found:
         return []
     return [f"The arms between faces of the body and {list_names(found, MOST_NAMED)} are slender. Elements of order "
@@ -85,9 +89,13 @@ def _note_slender(case: Case, curves: Mapping[str, Curve], regions: Sequence[Reg
             "analysis.order = 2 is right there."]
 
 
-def _find_middle(curve: Curve) -> complex:
-    leg = curve.legs[len(curve.legs) // 2]
-    return complex(leg.point(np.array(0.5 if len(curve.legs) % 2 else 0.0)))
+def _spread_points(curve: Curve) -> Complex:
+    """ASKED points, the middles of as many equal parts of the curve."""
+    ends = np.cumsum([0.0, *(leg.length for leg in curve.legs)])
+    along = ends[-1] * (np.arange(ASKED) + 0.5) / ASKED
+    at = np.clip(np.searchsorted(ends, along) - 1, 0, len(curve.legs) - 1)
+    return np.array([complex(curve.legs[number].point(np.array((s - ends[number]) / curve.legs[number].length)))
+                     for s, number in zip(along, at.tolist(), strict=True)])
 
 
 def _grade_contacts(
@@ -122,14 +130,16 @@ def _refuse(excess: Excess) -> Fault:
     return Fault.at(("curves", excess.curve), found, "curves that meet, or that are clearly apart")
 
 
-def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve]) -> list[str]:
+def _note_added(before: Mapping[str, Curve], after: Mapping[str, Curve], loaded: bool) -> list[str]:
+    """loaded: there are point loads inside of regions."""
     old, new = count_elements(before), count_elements(after)
     added = sorted((name for name in new if new[name] != old[name]), key=lambda name: old[name] - new[name])
     if not added:
         return []
     named = [f"'{name}' {old[name]} to {new[name]}" for name in added]
+    near = "near other faces or point loads" if loaded else "near other faces"
     return [
-        "Elements added near other faces, in narrow wedges, beside crack tips or where cracks turn, "
+        f"Elements added {near}, in narrow wedges, beside crack tips or where cracks turn, "
         f"{sum(old.values())} to {sum(new.values())} in all: {list_names(named, MOST_NAMED)}."
     ]
 

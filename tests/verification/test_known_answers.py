@@ -139,5 +139,39 @@ def test_slender_arms_of_linear_elements_are_told(order: int, crack: float, told
     assert any("bend them too much" in note and "split" in note for note in notes) == told
 
 
+@pytest.mark.parametrize(("faced", "told"), [(0.0, False), (0.1, False), (1.0, True)])
+@pytest.mark.parametrize("corner", [0.0, 0.3])
+def test_faces_that_accompany_a_crack_leave_arms_and_a_small_hole_beside_it_leaves_none(
+    faced: float, told: bool, corner: float
+) -> None:
+    """faced: the part of the crack that a slot runs along, with its middle beside that of the crack; 0: a hole."""
+    hole: Tables = {"center": [3.0, 0.2], "radius": 0.05, "elements": 12}
+    if faced:
+        a, b = 3 - faced, 3 + faced
+        points = [[a, 0.15], [b, 0.15], [b, 0.25], [a, 0.25], [a, 0.15]]
+        hole = {"points": points, "elements": 40}
+    crack = {"points": [[2, 0], [3, corner * 1e-2], [4, 0]], "elements": 12}
+    notes = describe_model_notes({
+        "materials": {"m": {"young": 1e4, "poisson": 0.3}}, "curves": {"hole": hole, "split": crack},
+        "regions": {"plane": {"material": "m", "infinite": True, "boundary": ["hole"], "cracks": ["split"]}},
+        "remote": {"syy": 1.0}, "interfaces": {"split": {"law": "open"}}, "analysis": {"steps": 1, "order": 1},
+    })  # fmt: skip
+    assert any("bend them too much" in note and "split" in note for note in notes) == told
+
+
+def test_point_loads_that_add_elements_are_named() -> None:
+    corners = [[0, 0], [4, 0], [4, 2], [0, 2]]
+    tables: Tables = {
+        "materials": {"m": {"young": 1e4, "poisson": 0.3}},
+        "curves": {"root": {"points": [corners[3], corners[0]], "elements": 4},
+                   "edge": {"points": corners, "elements": 20}},
+        "regions": {"block": {"material": "m", "boundary": ["edge", "root"]}},
+        "boundary": {"root": {"ux": 0.0, "uy": 0.0}},
+        "point_loads": {"p": {"at": [2.1, 1.9], "fy": -1.0}},
+    }  # fmt: skip
+    added = [note for note in describe_model_notes(tables) if note.startswith("Elements added")]
+    assert len(added) == 1 and "point loads" in added[0]
+
+
 def describe_model_notes(tables: Tables) -> tuple[str, ...]:
     return build_model(pbem.Case(**tables)).notes

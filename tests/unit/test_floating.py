@@ -11,8 +11,9 @@ import pytest
 from pbem.case.build import parse_model
 from pbem.contact.cut_parts import CutParts
 from pbem.contact.floating import measure_space
-from pbem.contact.laws import OPEN, STICK, ModeState, start_memory
+from pbem.contact.laws import OPEN, STICK, ModeState, PairState, start_memory
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.errors import ConvergenceError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.parts import find_parts
 from pbem.parallel import world
@@ -102,3 +103,26 @@ def test_two_blocks_that_move_together_are_both_named() -> None:
     assert error is not None and error.reason == "free motion"
     for text in ("block near (0.5", "block near (1.5", "let it touch, or be joined, somewhere"):
         assert text in str(error), str(error)
+
+
+@pytest.mark.parametrize(("loads", "free"), [("gravity = { gx = 0.0, gy = -0.3 }", False), ("", True)])
+def test_a_search_that_does_not_settle_leaves_no_block_to_nothing_that_its_weight_lays_down(
+    loads: str, free: bool
+) -> None:
+    text = PLATE + "".join(f"interfaces.{name} = {{ friction = 0.5 }}\n" for name in ("lid", "bowl")) + loads
+    problem = assemble(text)
+    count = problem.mesh.pairs.count
+    modes = ModeState(np.full(count, OPEN, dtype=np.int8), np.ones(count))
+    load = evaluate_load(problem.model, problem.mesh, problem.outer, 0, 1.0)
+    hold = Hold(problem, start_memory(problem.laws), load)
+    none = np.zeros(count)
+    hold.state = PairState(none, none, none + 0.01, none)
+    limit = ConvergenceError("iteration limit", "modes that change")
+    if free:
+        with pytest.raises(ConvergenceError, match="is held by nothing"):
+            hold.doubt_free_motion(modes, limit)
+    else:
+        hold.doubt_free_motion(modes, limit)
+    # Once no mode changes, it is free in them, whatever drives it.
+    error = hold.describe_free_motion(modes)
+    assert error is not None and "is held by nothing" in str(error)

@@ -1,18 +1,22 @@
-"""Blocks between cracks that touch what is around them by chance: where they are laid, and which of them float."""
+"""Blocks between cracks: where they are laid, which of them float, what drives them, and what is said of free ones."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pbem.arrays import Real
+from pbem.contact.cut_parts import CutMotion
 from pbem.contact.floating import measure_space
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
 from pbem.contact.loads import Load
+from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
 
 # Pairs around a block that carry less than this part of the mean of all pairs (or of what jumps as theirs make over the
 # length of the model) carry nothing.
 FAINT = 1e-2
+# Loads of its own drive a block that make more than this part of that mean.
+DRIVING = 1e-6
 
 
 def place_block(problem: Problem, body: int, modes: ModeState, opening: Real, before: ModeState | None) -> ModeState:
@@ -69,3 +73,27 @@ def measure_drive(problem: Problem, body: int, load: Load) -> float:
     lever = pairs.position[own] - np.average(pairs.position[own], weights=weight)
     turn = float((np.conj(lever) * force).imag.sum()) / float(np.abs(lever).max())
     return float(max(abs(force.sum()), abs(turn)) / weight.sum())
+
+
+def list_undriven(
+    problem: Problem, motions: tuple[CutMotion, ...], state: PairState | None, load: Load | None
+) -> tuple[CutMotion, ...]:
+    """The motions without those of blocks alone that loads of their own drive: these come to rest on what encloses
+    them, so that a search in which they are free has not found where. state: the last one that was found."""
+    if state is None or load is None:
+        return motions
+    least, block = DRIVING * measure_usual(problem, state), problem.parts.block
+    return tuple(
+        each for each in motions
+        if not all(block[body] and measure_drive(problem, body, load) > least for body in each.moving)
+    )
+
+
+def describe_cut(problem: Problem, motions: tuple[CutMotion, ...]) -> ConvergenceError | None:
+    """The error that names parts that cracks cut off and that can move freely; None if there are none."""
+    if not motions:
+        return None
+    advice = "hold it by a condition"
+    if any(problem.parts.block[list(each.moving)].any() for each in motions):
+        advice = "let it touch, or be joined, somewhere: bonds, joints of finite stiffness, other loads"
+    return ConvergenceError("free motion", f"{problem.cut.describe(motions)}; {advice}")

@@ -28,7 +28,7 @@ from pbem.errors import ConvergenceError
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance
-from pbem.solve.nonlinear.blocks import open_floating, place_block
+from pbem.solve.nonlinear.blocks import describe_cut, list_undriven, open_floating, place_block
 from pbem.solve.nonlinear.imbalance import DRIVEN
 from pbem.solve.nonlinear.resting import describe_lying, find_idle, find_pairs_around, let_lie, rest_bodies
 from pbem.solve.nonlinear.rolling import roll
@@ -129,9 +129,10 @@ class Hold:
         return held
 
     def doubt_free_motion(self, modes: ModeState, otherwise: ConvergenceError | None = None) -> None:
-        """Raise ConvergenceError if bodies are free in the last modes of a search that ended with an error otherwise.
-        """
+        """Raise ConvergenceError if bodies are free in the last modes of a search that else ended with an error."""
         error, motions = self.describe_free_motion(modes), self.list_free(modes)
+        if error and otherwise and not motions:
+            error = self._describe_undriven(modes)
         if error and motions:
             sticks = (modes.mode != OPEN) & resists_slip(self.problem.laws)
             stuck = ModeState(np.where(sticks, STICK, modes.mode).astype(np.int8), modes.sign)
@@ -330,7 +331,7 @@ class Hold:
         if free:
             advice = "hold it by a condition, or use shorter elements where it touches"
             return ConvergenceError("free motion", f"nothing in the present contact prevents a {free}; {advice}")
-        return self._describe_cut(self._find_cut_motions(modes))
+        return describe_cut(self.problem, self._find_cut_motions(modes))
 
     def describe_floating(self, modes: ModeState) -> ConvergenceError | None:
         """The error of a search that found no end as blocks were held that touch nothing in some place; None if none.
@@ -343,15 +344,12 @@ class Hold:
             if measure_space(self.problem.mesh.pairs.position[own], normal, self.state.g_n[own]).is_wide:
                 mode[own] = OPEN
         free = ModeState(mode, modes.sign)
-        return self._describe_cut(self._find_cut_motions(free)) if (mode != modes.mode).any() else None
+        return self._describe_undriven(free) if (mode != modes.mode).any() else None
 
-    def _describe_cut(self, motions: tuple[CutMotion, ...]) -> ConvergenceError | None:
-        if not motions:
-            return None
-        advice = "hold it by a condition"
-        if any(self.problem.parts.block[list(each.moving)].any() for each in motions):
-            advice = "let it touch, or be joined, somewhere: bonds, joints of finite stiffness, other loads"
-        return ConvergenceError("free motion", f"{self.problem.cut.describe(motions)}; {advice}")
+    def _describe_undriven(self, modes: ModeState) -> ConvergenceError | None:
+        """The error of parts that are free, but for blocks that come to rest somewhere: see list_undriven."""
+        found = self._find_cut_motions(modes)
+        return describe_cut(self.problem, list_undriven(self.problem, found, self.state, self.load))
 
     def describe_collapse(self, modes: ModeState) -> str:
         """The motions that friction alone prevents in some modes, as the end of a sentence; "" if it prevents none."""
@@ -379,7 +377,7 @@ class Hold:
             if block[moving].all() and len(np.unique(moving)) < block.sum():
                 self.floating = floating
             else:
-                error = self._describe_cut(floating)
+                error = describe_cut(self.problem, floating)
         if error:
             raise error
 

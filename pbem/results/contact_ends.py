@@ -132,8 +132,9 @@ class _Pressed:
         of = mesh.geometry.select(np.array([inside.element]))
         place = complex(of.place_fractions(np.array([[along if forward else 1 - along]]))[0, 0])
         leaving, arriving = of.directions()
+        inward = complex(-arriving[0] if forward else leaving[0])
         return ContactEnd(name, place, curves, shortest, window, over / self._largest,
-                          inward=complex(-arriving[0] if forward else leaving[0]), reach=max(last.length, free.length))
+                          inward=inward / abs(inward), reach=max(last.length, free.length))
 
     def _find_root(self, free: _Side, after: int | None, at_end: bool) -> float:
         """Distance from the start of an open element at which the opening to the power 2/3 vanishes; NaN if nowhere.

@@ -65,7 +65,7 @@ def name_pieces(problem: Any, tangent: Any, law: Any, load: Any) -> dict[str, An
     system, operator = problem.system, problem.system.operator
     return {
         "mesh": problem.mesh, "laws": (problem.laws, law), "loads": (problem.outer, load),
-        "map M": tangent.constraints, "trees": operator.parts.forest, "near rows": operator.leaves,
+        "map M": tangent.constraints, "trees": operator.parts.forest, "near rows": operator.near.leaves,
         "source tree": operator.sources, "far rows": (operator.targets, operator.far), "operator, rest": operator,
         "crack points": system.crack_points, "groups": (system.groups, tangent.preconditioner.inverses),
         "preconditioner": tangent.preconditioner, "tangent, rest": tangent, "problem, rest": problem,

@@ -27,17 +27,41 @@ typedef struct {
     Complex first, second, third;
 } Sums;
 
-/* sums[k] += (first, second, third) z^k, k = 0 .. terms */
-INLINE void add_powers(Sums *sums, Complex z, Complex first, Complex second, Complex third, int terms)
+/* What some points add: (first, second, third) z^k. */
+typedef struct {
+    Complex z, first, second, third;
+} Added;
+
+/* Vectors of points that are added at once: the sums are read and written once for all of them. */
+#define TOGETHER 3
+#define BATCH (4 * TOGETHER)
+
+/* sums[k] += (first, second, third) z^k, k = 0 .. terms, of so many vectors of points */
+INLINE void add_powers(Sums *sums, const Added *given, int vectors, int terms)
 {
+    Added at[TOGETHER];
+#pragma GCC unroll 3
+    for (int i = 0; i < vectors; i++) at[i] = given[i];
     for (int k = 0; k <= terms; k++) {
-        sums[k].first = c_add(sums[k].first, first);
-        sums[k].second = c_add(sums[k].second, second);
-        sums[k].third = c_add(sums[k].third, third);
-        first = c_mul(first, z);
-        second = c_mul(second, z);
-        third = c_mul(third, z);
+        Sums own = sums[k];
+#pragma GCC unroll 3
+        for (int i = 0; i < vectors; i++) {
+            own.first = c_add(own.first, at[i].first);
+            own.second = c_add(own.second, at[i].second);
+            own.third = c_add(own.third, at[i].third);
+            at[i].first = c_mul(at[i].first, at[i].z);
+            at[i].second = c_mul(at[i].second, at[i].z);
+            at[i].third = c_mul(at[i].third, at[i].z);
+        }
+        sums[k] = own;
     }
+}
+
+static void add_all_powers(Sums *sums, const Added *given, int64_t vectors, int terms)
+{
+    for (; vectors >= 3; vectors -= 3, given += 3) add_powers(sums, given, 3, terms);
+    if (vectors == 2) add_powers(sums, given, 2, terms);
+    if (vectors == 1) add_powers(sums, given, 1, terms);
 }
 
 INLINE Complex load_parts(const double *re, const double *im)
@@ -74,6 +98,8 @@ static void add_displacements(Sums *sums, const Elements *e, int64_t at, const d
 {
     const double g = c.shear_modulus / (M_PI * (c.kappa + 1)), unit = 1 / c.radius;
     const int64_t count = e->points[at];
+    Added added[BATCH];
+    int vectors = 0;
     for (int64_t q = 0; q < count; q += LANES) {
         const int64_t from = e->begin[at] + q;
         const Complex z = c_scale(unit, c_sub(load_parts(e->x + from, e->y + from), c_spread(c.center)));
@@ -81,7 +107,12 @@ static void add_displacements(Sums *sums, const Elements *e, int64_t at, const d
         const Complex back = c_scale(unit * g, c_times_i(c_conj(load_parts(e->dx + from, e->dy + from))));
         const Complex density = mix_nodes(e->shape + e->shapes[at] + q, count, value, e->nodes);
         const Complex first = c_mul(slope, density);
-        add_powers(sums, z, first, c_sub(c_mul(back, density), c_mul_conj(slope, density)), c_mul_conj(first, z), terms - 1);
+        const Complex second = c_sub(c_mul(back, density), c_mul_conj(slope, density));
+        added[vectors++] = (Added){z, first, second, c_mul_conj(first, z)};
+        if (vectors == BATCH || q + LANES >= count) {
+            add_all_powers(sums, added, vectors, terms - 1);
+            vectors = 0;
+        }
     }
 }
 
@@ -91,6 +122,8 @@ static void add_tractions(Sums *sums, const Elements *e, int64_t at, const doubl
 {
     const double f = -1 / (2 * M_PI * (c.kappa + 1));
     const int64_t count = e->points[at];
+    Added added[BATCH];
+    int vectors = 0;
     double crowded[8];
     for (int n = 0; n < e->nodes; n++)
         for (int i = 0; i < 2; i++) crowded[2 * n + i] = value[2 * n + i] / e->crowd[at * e->nodes + n];
@@ -101,7 +134,11 @@ static void add_tractions(Sums *sums, const Elements *e, int64_t at, const doubl
         const Complex z = c_scale(1 / c.radius, c_sub(load_parts(e->x + from, e->y + from), c_spread(c.center)));
         const Complex density = mix_nodes(e->shape + e->shapes[at] + q, count, crowded, e->nodes);
         const Complex first = c_scale(f * e->length[at] * weight, density);
-        add_powers(sums, z, first, c_conj(first), c_neg(c_mul_conj(first, z)), terms);
+        added[vectors++] = (Added){z, first, c_conj(first), c_neg(c_mul_conj(first, z))};
+        if (vectors == BATCH || q + LANES >= count) {
+            add_all_powers(sums, added, vectors, terms);
+            vectors = 0;
+        }
     }
 }
 

@@ -23,12 +23,13 @@ from scipy.special import comb
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem import _expansions
+from pbem.bem.cluster_rules import choose_points
 from pbem.bem.tree import Branches, Circles
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.shape_functions import interpolate_shapes, tip_shapes
 
-# Integration points come in multiples of so many: the lanes of the vectors of all processors.
-LANES = 4
+# Rows of weights come in multiples of so many: those that are summed at a time.
+WEIGHED = 4
 
 
 @cache
@@ -48,8 +49,8 @@ def far_weights(terms: int) -> Real:
 
 @cache
 def _pad_weights(terms: int) -> Real:
-    """The same with a row of zeros."""
-    return np.concatenate([far_weights(terms), np.zeros((1, terms + 1))])
+    """The same with rows of zeros, up to a multiple of WEIGHED."""
+    return np.concatenate([far_weights(terms), np.zeros((-(terms + 1) % WEIGHED, terms + 1))])
 
 
 @dataclass(frozen=True)
@@ -93,42 +94,34 @@ def _gauss_points(count: int) -> tuple[Real, Real]:
     return np.polynomial.legendre.leggauss(count)
 
 
-def _choose_points(terms: int, order: int) -> tuple[int, int]:
-    """Numbers of integration points: exact for polynomials on straight elements; of all others, where the shapes at
-    tips are exact, too, and arcs less than the reach of the expansion."""
-    few, many = (terms + order + 2) // 2, terms + 4
-    return -(-few // LANES) * LANES, -(-many // LANES) * LANES
-
-
-def place_densities(mesh: Mesh, elements: Integer, terms: int) -> Densities:
-    """Integration points of elements (m,), as many as an expansion with so many terms needs.
+def _make_rule(family: int, count: int, mesh: Mesh) -> tuple[Real, Real, Real]:
+    """Points s (q,), weights and shapes (q, nodes) of a family of elements.
 
     At a tip they are those of the square root of the distance, in which its shapes are polynomials.
     """
+    s, weight = _gauss_points(count)
+    power = np.arange(mesh.order + 1)
+    if family in (0, 3):
+        return s, weight, s[:, None] ** power @ interpolate_shapes(mesh.local if family == 0 else mesh.crack_local)
+    root, half = 0.5 * (1 + s), 0.5 * weight  # t = root^2 from the tip
+    shape = root[:, None] ** (2 * power + 1) @ tip_shapes(tuple(mesh.crack_local))[family - 1]
+    return (2 * root**2 - 1 if family == 1 else 1 - 2 * root**2), 4 * root * half, shape
+
+
+def place_densities(mesh: Mesh, elements: Integer, terms: int, radius: Real) -> Densities:
+    """Integration points of elements (m,), as many as an expansion with so many terms needs about the centres of
+    clusters of which these are the radii (m,)."""
     order, family = mesh.order, mesh.family[elements]
-    few, many = _choose_points(terms, order)
-    tips = tip_shapes(tuple(mesh.crack_local))
-    power = np.arange(order + 1)
-    rules: list[tuple[Real, Real, Real]] = []  # by family, with few and with many points: s, weights, shapes
-    for count in (few, many):
-        s, weight = _gauss_points(count)
-        root, half = 0.5 * (1 + s), 0.5 * weight  # t = root^2 from the tip
-        rooted = root[:, None] ** (2 * power + 1)
-        rules += [
-            (s, weight, s[:, None] ** power @ interpolate_shapes(mesh.local)),
-            (2 * root**2 - 1, 4 * root * half, rooted @ tips[0]),
-            (1 - 2 * root**2, 4 * root * half, rooted @ tips[1]),
-            (s, weight, s[:, None] ** power @ interpolate_shapes(mesh.crack_local)),
-        ]
     geometry = mesh.geometry.select(elements)
-    simple = (geometry.rises() == 0) & ((family == 0) | (family == 3))
-    rule = np.where(simple, 0, 4) + family
-    points = np.where(simple, few, many)
+    straight, tip = geometry.rises() == 0, (family == 1) | (family == 2)
+    length = np.ascontiguousarray(geometry.stretch(np.zeros((len(elements), 1)))[:, 0])
+    points = choose_points(terms, order, length / radius, tip, straight)
+    kinds, rule = np.unique(np.stack([family, points]), axis=1, return_inverse=True)
+    rules = [_make_rule(int(of), int(count), mesh) for of, count in kinds.T]
     begin = np.cumsum(points) - points
     place, slope = (np.zeros(int(points.sum()), dtype=complex) for _ in range(2))
-    for number in np.unique(rule):
-        chosen = np.flatnonzero(rule == number)
-        s, weight, _ = rules[number]
+    for number, (s, weight, _) in enumerate(rules):
+        chosen = np.flatnonzero(rule.ravel() == number)
         own, local = geometry.select(chosen), np.tile(s, (len(chosen), 1))
         at = begin[chosen, None] + np.arange(len(s))
         place[at], slope[at] = own.place(local), own.slope(local) * weight
@@ -136,11 +129,10 @@ def place_densities(mesh: Mesh, elements: Integer, terms: int) -> Densities:
     nodes = np.tile(mesh.local, (len(elements), 1))
     return Densities(
         number=np.arange(len(elements)), family=family.astype(np.int8), begin=begin,
-        points=points, shapes=(order + 1) * starts[rule], place=_split(place), slope=_split(slope),
-        weight=np.concatenate([weight for _, weight, _ in rules]),
-        shape=np.concatenate([shape.T.ravel() for _, _, shape in rules]),
-        length=np.ascontiguousarray(geometry.stretch(np.zeros((len(elements), 1)))[:, 0]),
-        crowd=np.ascontiguousarray(geometry.crowding(nodes)),
+        points=points, shapes=(order + 1) * starts[rule.ravel()], place=_split(place), slope=_split(slope),
+        weight=np.concatenate([np.zeros(0), *(weight for _, weight, _ in rules)]),
+        shape=np.concatenate([np.zeros(0), *(shape.T.ravel() for _, _, shape in rules)]),
+        length=length, crowd=np.ascontiguousarray(geometry.crowding(nodes)),
     )  # fmt: skip
 
 

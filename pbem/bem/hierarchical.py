@@ -16,7 +16,7 @@ from scipy import sparse
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.expansion import FieldPoints, place_densities
 from pbem.bem.farfield import SourceTree, TargetTree, mark_ancestors, see_sources, share_leaves
-from pbem.bem.near import LeafRows, pack_rows
+from pbem.bem.near import LeafRows, NearRows, pack_rows
 from pbem.bem.operator import collect_free_terms, collect_sources, scale_equations
 from pbem.bem.region_sums import (
     Functional,
@@ -128,7 +128,8 @@ def prepare_sources(parts: Sorted, needed: Bool, share: Share) -> SourceTree:
     number = clusters.number[partial]
     return SourceTree(
         forest, share, parts.terms, clusters, np.searchsorted(clusters.number, leaves),
-        place_densities(mesh, elements, parts.terms), first, kappa, modulus, elements, width,
+        place_densities(mesh, elements, parts.terms, np.repeat(forest.radius[leaves], np.diff(first))), first, kappa,
+        modulus, elements, width,
         None if kept.all() else kept, owner, partial,
         share.ranks.find_ghosts(number, owner[number], clusters.number),
     )  # fmt: skip
@@ -163,16 +164,16 @@ def list_columns(mesh: Mesh, nodes: Integer, width: int) -> Integer:
 class HierarchicalOperator:
     """The rows of B of some nodes (k,), in their order; sources and targets are the same trees.
 
-    leaves: emptied where no product is asked for any more, as they are most of the storage. seen: entries of v that
-    this rank needs; of_sources: places among its elements of those of the source tree. motions (seen, f), held (rows,
-    f): what the functionals in `sums` take off before the product, and add to it. anchorings: of all ranks.
+    near: rows of near elements. seen: entries of v that this rank needs; of_sources: places among its elements of those
+    of the source tree. motions (seen, f), held (rows, f): what the functionals in `sums` take off before the product,
+    and add to it. anchorings: of all ranks.
     """
 
     parts: Sorted
     nodes: Integer
     sources: SourceTree
     targets: TargetTree
-    leaves: list[LeafRows]
+    near: NearRows
     far: FarRows
     free: sparse.csr_matrix
     needed: Bool
@@ -203,8 +204,7 @@ class HierarchicalOperator:
         moments = self.sources.collect(take_elements(strained, self.of_sources, self.seen.width))
         arriving = self.targets.start(moments)
         result: Real = self.free @ strained
-        for each in self.leaves:
-            result[each.rows] += each.apply(strained)
+        self.near.add(strained, result)
         fields = self.targets.spread(moments, arriving)
         values = self.far.factor * self.far.points.evaluate(fields, self.targets.clusters)
         result[self.far.rows] += np.stack([values.real, values.imag], axis=1)
@@ -277,8 +277,8 @@ def assemble_hierarchical(
     )
     sums = share_functionals(mesh.region, seen, share, list_motions(rigid))
     return HierarchicalOperator(
-        parts, nodes, sources, targets, leaves, _place_far_rows(parts, far, targets, row_of_node, scale),
-        seen.place_columns(free), needed, seen, np.searchsorted(seen.elements, sources.elements), sums,
+        parts, nodes, sources, targets, NearRows(leaves, seen.count, 2 * len(nodes)),
+        _place_far_rows(parts, far, targets, row_of_node, scale), seen.place_columns(free), needed, seen, np.searchsorted(seen.elements, sources.elements), sums,
         spread_motions(seen, rigid, sums), sparse.csr_matrix((2 * len(nodes), len(sums.number))), rigid,
     )  # fmt: skip
 

@@ -26,6 +26,27 @@ typedef int64_t LaneIndex __attribute__((vector_size(LANES * sizeof(double))));
 #define SHUFFLE(a, b, ...) __builtin_shuffle(a, b, (LaneIndex){__VA_ARGS__})
 #endif
 
+/* As many as a register holds, for sums over much memory; and four, whatever the registers are. */
+#ifdef __AVX512F__
+#define WIDE 8
+#else
+#define WIDE LANES
+#endif
+
+typedef double Wide __attribute__((vector_size(WIDE * sizeof(double))));
+typedef double Four __attribute__((vector_size(4 * sizeof(double))));
+
+/* The same anywhere in memory: arrays of vectors that are copied as a whole stay in memory. */
+typedef double WideLoose __attribute__((vector_size(WIDE * sizeof(double)), aligned(sizeof(double)), may_alias));
+typedef double FourLoose __attribute__((vector_size(4 * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+#ifdef __clang__
+#define SHUFFLE_FOUR(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+typedef int64_t FourIndex __attribute__((vector_size(4 * sizeof(double))));
+#define SHUFFLE_FOUR(a, b, ...) __builtin_shuffle(a, b, (FourIndex){__VA_ARGS__})
+#endif
+
 /* Loops of a fixed number, apart from all others: the compiler gives them to the vector functions of the C library, and
  * the last digit of a value does not depend on how many there are. */
 #define FUNCTION_BATCH 8

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,12 +56,41 @@ class LeafRows:
     def nbytes(self) -> int:
         return self.near.nbytes + sum(each.number.nbytes for each in self.weak)
 
+    def list_blocks(self) -> list[tuple[NDArray[Any], ...]]:
+        """Rows, columns and entries of what is in full, and with its unit of what is weak."""
+        full = (self.rows, self.columns, self.near)
+        return [full, *((self.rows, each.columns, each.number, each.unit) for each in self.weak)]
+
     def apply(self, v: Real) -> Real:
-        """Their product with v."""
-        result = np.ascontiguousarray(self.near @ v[self.columns])
-        for each in self.weak:
-            _expansions.add_whole_rows(each.number, each.unit, v[each.columns], result)
+        """Their product with v (r,)."""
+        near = NearRows([replace(self, rows=np.arange(len(self.rows)))], len(v), len(self.rows))
+        result = np.zeros(len(self.rows))
+        near.add(v, result)
         return result
+
+
+class NearRows:
+    """Rows of all leaves, for a v of so many values (k,) and a result of so many rows (m,).
+
+    Emptied where no product is asked for any more, as they are most of the storage.
+    """
+
+    def __init__(self, leaves: list[LeafRows], values: int, rows: int) -> None:
+        self._size = values, rows
+        self._hold(leaves)
+
+    def _hold(self, leaves: list[LeafRows]) -> None:
+        self.leaves = tuple(leaves)
+        self.nbytes = sum(leaf.nbytes for leaf in leaves)
+        self._tied = _expansions.tie_blocks([block for leaf in leaves for block in leaf.list_blocks()], *self._size)
+
+    def add(self, v: Real, result: Real) -> None:
+        """Add their product with v to the result."""
+        _expansions.add_blocks(self._tied, np.ascontiguousarray(v, dtype=float), result)
+
+    def clear(self) -> None:
+        """Give back the storage."""
+        self._hold([])
 
 
 def choose_weak(tolerance: float, unknowns: int) -> float:

@@ -118,66 +118,114 @@ typedef struct {
     double source, target, length;
 } Carried;
 
-/* weights (terms + 1)^2 times seen, (terms + 1, COLUMNS), of one row into out. */
-INLINE void weigh_two(const double *weights, const double (*seen)[COLUMNS], int terms, double *out, double *next)
+/* Rows of weights that are summed at a time: their sums stay in registers. */
+#define WEIGHED 4
+#define CHUNK (WIDE == 8 ? 4 : 2)
+#define EACH_SUM                                                      \
+    _Pragma("GCC unroll 4") for (int row = 0; row < WEIGHED; row++)   \
+    _Pragma("GCC unroll 4") for (int c = 0; c < CHUNK; c++)
+
+/* out (WEIGHED, COLUMNS) = weights (WEIGHED, terms + 1) times seen (terms + 1, COLUMNS) */
+INLINE void weigh_rows(const double *weights, const double (*seen)[COLUMNS], int terms, double (*out)[COLUMNS])
 {
-    Lanes sum[2][COLUMNS / LANES];
-    for (int c = 0; c < COLUMNS / LANES; c++) sum[0][c] = sum[1][c] = spread(0);
-    const double *other = weights + terms + 1;
-    for (int k = 0; k <= terms; k++) {
-        const double one = weights[k], two = other[k];
-        for (int c = 0; c < COLUMNS / LANES; c++) {
-            Lanes value;
-            memcpy(&value, seen[k] + c * LANES, sizeof value);
-            sum[0][c] += one * value;
-            sum[1][c] += two * value;
+    for (int begin = 0; begin < COLUMNS; begin += CHUNK * WIDE) {
+        Wide sum[WEIGHED][CHUNK];
+        EACH_SUM sum[row][c] = (Wide){0};
+        for (int k = 0; k <= terms; k++) {
+            const WideLoose *value = (const WideLoose *)(seen[k] + begin);
+            EACH_SUM sum[row][c] += weights[row * (terms + 1) + k] * value[c];
         }
+        EACH_SUM *(WideLoose *)(out[row] + begin + c * WIDE) = sum[row][c];
     }
-    memcpy(out, sum[0], sizeof sum[0]);
-    memcpy(next, sum[1], sizeof sum[1]);
 }
 
-/* Fields about the targets from the coefficients of the sources, added (theory, 40). weights: of one row more, of
- * zeros, where their number is odd. */
+/* Powers of a number of each pair, of which the unused ones are 0. */
+typedef struct {
+    double re[MOST_POWERS][PAIRS], im[MOST_POWERS][PAIRS];
+} Powers;
+
+static void take_powers_of_pairs(Powers *power, const cplx *base, int terms)
+{
+    double re[PAIRS], im[PAIRS];
+    for (int j = 0; j < PAIRS; j++) re[j] = creal(base[j]), im[j] = cimag(base[j]);
+    for (int j = 0; j < PAIRS; j++) power->re[0][j] = 1, power->im[0][j] = 0;
+    for (int k = 0; k < terms; k++)
+        for (int j = 0; j < PAIRS; j++) {
+            power->re[k + 1][j] = power->re[k][j] * re[j] - power->im[k][j] * im[j];
+            power->im[k + 1][j] = power->re[k][j] * im[j] + power->im[k][j] * re[j];
+        }
+}
+
+/* Two complex numbers side by side times another one, and parts of both functions of a series. */
+INLINE Four multiply_both(Four both, double re, double im)
+{
+    const Four crossed = {-im, im, -im, im};
+    return both * re + SHUFFLE_FOUR(both, both, 1, 0, 3, 2) * crossed;
+}
+
+INLINE Four load_four(const double *from) { return *(const FourLoose *)from; }
+
+INLINE Four load_both(const cplx *first, const cplx *second)
+{
+    const double *one = (const double *)first, *two = (const double *)second;
+    return (Four){one[0], one[1], two[0], two[1]};
+}
+
+INLINE void add_both(cplx *first, cplx *second, Four value)
+{
+    double *one = (double *)first, *two = (double *)second;
+    one[0] += value[0], one[1] += value[1];
+    two[0] += value[2], two[1] += value[3];
+}
+
+/* The fields far from the sources, added to those of one pair's target. */
+INLINE void add_far(const Carried *pair, const Powers *power, int j, double (*far)[COLUMNS], int terms)
+{
+    const cplx *own = pair->moments, back = conj(pair->distance) / pair->distance;
+    cplx *phi = pair->field, *psi = pair->field + terms + 1;
+    if (own[0] != 0 || own[terms + 1] != 0) {
+        const cplx logarithm = clog(pair->distance / pair->length);
+        const cplx more[2] = {logarithm * own[0], logarithm * own[terms + 1]};
+        for (int f = 0; f < 2; f++) {
+            far[0][4 * j + 2 * f] += creal(more[f]);
+            far[0][4 * j + 2 * f + 1] += cimag(more[f]);
+        }
+    }
+    /* psi about the target: plus conj(distance) phi' */
+    const Four straight = {0, 0, creal(back), creal(back)}, crossed = {0, 0, -cimag(back), cimag(back)};
+    for (int l = 0; l <= terms; l++) {
+        Four value = load_four(far[l] + 4 * j);
+        if (l < terms) {
+            const Four next = load_four(far[l + 1] + 4 * j) * (double)(l + 1);
+            value += SHUFFLE_FOUR(next, next, 0, 1, 0, 1) * straight + SHUFFLE_FOUR(next, next, 1, 0, 1, 0) * crossed;
+        }
+        add_both(phi + l, psi + l, multiply_both(value, power->re[l][j], power->im[l][j]));
+    }
+}
+
+/* Fields about the targets from the coefficients of the sources, added (theory, 40). weights: with rows of zeros up to
+ * a multiple of WEIGHED. Real and imaginary parts of both functions of each pair are side by side. */
 static void carry_series(const Carried *pairs, int count, const double *weights, int terms)
 {
-    double seen[MOST_POWERS][COLUMNS], far[MOST_POWERS + 1][COLUMNS];
-    memset(seen, 0, (terms + 1) * sizeof seen[0]);
+    double seen[MOST_POWERS][COLUMNS], far[MOST_POWERS + WEIGHED][COLUMNS];
+    cplx inner[PAIRS] = {0}, outer[PAIRS] = {0};
+    Powers power;
     for (int j = 0; j < count; j++) {
-        const cplx ratio = pairs[j].source / pairs[j].distance;
-        cplx power = 1;
-        for (int k = 0; k <= terms; k++, power *= ratio)
-            for (int f = 0; f < 2; f++) {
-                const cplx value = pairs[j].moments[f * (terms + 1) + k] * power;
-                seen[k][4 * j + 2 * f] = creal(value);
-                seen[k][4 * j + 2 * f + 1] = cimag(value);
-            }
+        inner[j] = pairs[j].source / pairs[j].distance;
+        outer[j] = pairs[j].target / pairs[j].distance;
     }
-    for (int l = 0; l <= terms; l += 2)
-        weigh_two(weights + l * (terms + 1), (const double (*)[COLUMNS])seen, terms, far[l], far[l + 1]);
-    for (int j = 0; j < count; j++) {
-        const Carried *each = &pairs[j];
-        const cplx *own = each->moments, back = conj(each->distance) / each->distance;
-        const cplx ratio = each->target / each->distance;
-        cplx *phi = each->field, *psi = each->field + terms + 1;
-        if (own[0] != 0 || own[terms + 1] != 0) {
-            const cplx logarithm = clog(each->distance / each->length);
-            const cplx more[2] = {logarithm * own[0], logarithm * own[terms + 1]};
-            for (int f = 0; f < 2; f++) {
-                far[0][4 * j + 2 * f] += creal(more[f]);
-                far[0][4 * j + 2 * f + 1] += cimag(more[f]);
-            }
+    if (count < PAIRS) memset(seen, 0, (terms + 1) * sizeof seen[0]);
+    take_powers_of_pairs(&power, inner, terms);
+    for (int j = 0; j < count; j++)
+        for (int k = 0; k <= terms; k++) {
+            const Four both = load_both(pairs[j].moments + k, pairs[j].moments + terms + 1 + k);
+            const Four value = multiply_both(both, power.re[k][j], power.im[k][j]);
+            *(FourLoose *)(seen[k] + 4 * j) = value;
         }
-        cplx power = 1;
-        for (int l = 0; l <= terms; l++, power *= ratio) {
-            const double *at = far[l] + 4 * j;
-            cplx second = at[2] + I * at[3];
-            /* psi about the target: plus conj(distance) phi' */
-            if (l < terms) second += back * (double)(l + 1) * (at[4 * PAIRS] + I * at[4 * PAIRS + 1]);
-            phi[l] += power * (at[0] + I * at[1]);
-            psi[l] += power * second;
-        }
-    }
+    for (int l = 0; l <= terms; l += WEIGHED)
+        weigh_rows(weights + l * (terms + 1), (const double (*)[COLUMNS])seen, terms, far + l);
+    take_powers_of_pairs(&power, outer, terms);
+    for (int j = 0; j < count; j++) add_far(&pairs[j], &power, j, far, terms);
 }
 
 #endif

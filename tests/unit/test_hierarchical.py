@@ -51,7 +51,7 @@ def test_products_are_those_of_the_dense_rows(name: str, tolerance: float) -> No
     operator = assemble(sample, tolerance)
     targets, elements = operator.targets, sample.mesh.elements
     assert len(targets.target) > elements, "far parts"
-    stored = sum(leaf.near.size for leaf in operator.leaves)
+    stored = sum(leaf.near.size for leaf in operator.near.leaves)
     assert stored < 0.7 * sum(block.matrix.size for block in sample.dense.blocks)
     vectors = list_vectors(sample)
     traction = np.repeat(sample.mesh.traction_equation, 2)
@@ -100,7 +100,7 @@ def test_rows_of_any_nodes_in_any_order(name: str, share: float) -> None:
 
 def measure_parts(operator: HierarchicalOperator, v: np.ndarray) -> float:
     """The largest sum of a row's near parts, each taken positive."""
-    return max(float((np.abs(leaf.near) @ np.abs(v[leaf.columns])).max()) for leaf in operator.leaves)
+    return max(float((np.abs(leaf.near) @ np.abs(v[leaf.columns])).max()) for leaf in operator.near.leaves)
 
 
 def test_rows_of_no_nodes() -> None:
@@ -122,7 +122,7 @@ def test_columns_that_are_not_needed_are_left_out(name: str) -> None:
     exact = assemble_rows(mesh, sample.materials, 0, mesh.nodes, needed, model.size).apply(v)
     assert np.linalg.norm(operator.apply(v) - exact) <= 1e-8 * np.linalg.norm(exact)
     whole = assemble(sample, 1e-8)
-    sizes = [sum(leaf.near.size for leaf in each.leaves) for each in (operator, whole)]
+    sizes = [sum(leaf.near.size for leaf in each.near.leaves) for each in (operator, whole)]
     assert sizes[0] < sizes[1] or needed.all()
 
 

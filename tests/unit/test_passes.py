@@ -156,7 +156,7 @@ def test_arguments_of_wrong_lengths_are_refused() -> None:
     with pytest.raises(ValueError, match="terms; expected 1 to"):
         lift(sources, np.zeros((sources.clusters, 2, 200), dtype=complex))
     mesh, materials, _ = make_mesh("cracks", 2)
-    densities = place_densities(mesh, np.arange(3), 5)
+    densities = place_densities(mesh, np.arange(3), 5, np.ones(3))
     kappa, modulus = name_media(sort_elements(mesh, materials, 5), np.zeros(1, dtype=np.int64))
     with pytest.raises(ValueError, match="bytes, expected"):
         first, center = np.array([0, 2, 3]), np.zeros(1, dtype=complex)
@@ -198,7 +198,7 @@ def test_numbers_of_what_is_not_there_are_refused(at: int) -> None:
 @pytest.mark.parametrize("below", [True, False])
 def test_elements_that_are_not_there_are_refused(key: str, below: bool) -> None:
     mesh, _, _ = make_mesh("cracks", 2)
-    densities, first, ones = place_densities(mesh, np.arange(3), 5), np.array([0, 3]), np.ones(1)
+    densities, first, ones = place_densities(mesh, np.arange(3), 5, np.ones(3)), np.array([0, 3]), np.ones(1)
     arguments = (np.zeros(1, dtype=complex), ones, ones, ones, 5)
     densities.sum_up(make_values(mesh), first, *arguments)
     changed = (first if key == "first" else getattr(densities, key)).copy()
@@ -251,7 +251,7 @@ def test_products_with_weak_entries_are_those_of_the_rows(name: str) -> None:
     parts, sources = sample.sort(1e-10)
     nodes = np.arange(sample.mesh.nodes)
     operator = assemble_hierarchical(parts, sources, nodes, sample.needed, sample.model.size, (), 0.03)
-    assert sum(len(leaf.weak) for leaf in operator.leaves) > 10
+    assert sum(len(leaf.weak) for leaf in operator.near.leaves) > 10
     for kind, v in list_vectors(sample).items():
         exact = sample.dense.apply(v)
         # Those of a rigid motion cancel.

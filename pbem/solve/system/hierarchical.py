@@ -113,7 +113,7 @@ class HierarchicalSystem:
     @property
     def stored(self) -> int:
         """See System."""
-        return sum(leaf.nbytes for leaf in self.operator.leaves)
+        return self.operator.near.nbytes
 
     def apply(self, v: Real) -> Real:
         """See System."""
@@ -142,7 +142,7 @@ class HierarchicalSystem:
 
     def free_products(self) -> None:
         """See System: the rows; what interior points and cracks need of the operator stays."""
-        self.operator.leaves.clear()
+        self.operator.near.clear()
         give_back()
 
     def recover(self, v: Real) -> Real:

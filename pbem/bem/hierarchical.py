@@ -278,7 +278,8 @@ def assemble_hierarchical(
     sums = share_functionals(mesh.region, seen, share, list_motions(rigid))
     return HierarchicalOperator(
         parts, nodes, sources, targets, NearRows(leaves, seen.count, 2 * len(nodes)),
-        _place_far_rows(parts, far, targets, row_of_node, scale), seen.place_columns(free), needed, seen, np.searchsorted(seen.elements, sources.elements), sums,
+        _place_far_rows(parts, far, targets, row_of_node, scale), seen.place_columns(free), needed,
+        seen, np.searchsorted(seen.elements, sources.elements), sums,
         spread_motions(seen, rigid, sums), sparse.csr_matrix((2 * len(nodes), len(sums.number))), rigid,
     )  # fmt: skip
 

@@ -35,6 +35,9 @@ LEAST_TIP = 5e-3
 FIRST, GROWTH = 0.01, 1.0
 # A part of a leg is small enough when it is shorter than this part of the length that is allowed there.
 FINENESS = 0.25
+# Lengths that round numbers make equal are taken as equal, however their rounding tells them apart: a model that is
+# turned, or its mirror image, has the same parts.
+TIE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,8 @@ class LengthField:
         beside_tips = self._measure_from_tips(points, near.tips)
         steepest = max(self.reach.usual, GROWTH, SLOPE, LOADED)
         allowed = np.minimum(allowed, beside_tips)
-        final = (length <= FINENESS * allowed) | (allowed - 0.5 * steepest * length >= cells.wanted) | corner
+        final = (length <= FINENESS * (1 + TIE) * allowed) | corner
+        final |= allowed - 0.5 * steepest * length >= (1 - TIE) * cells.wanted
         return Measured(allowed, final, distance, distances.leg, near)
 
     def measure_by_distance(self, cells: Cells) -> Real:
@@ -254,7 +258,6 @@ class LengthField:
         return _Tips(
             np.array(point, dtype=complex), np.array(length), np.array(slope), np.array(component, dtype=np.int64)
         ), at_tip
-
 
     def _shorten_at_tips(self, at: Sequence[tuple[int, int]], length: Sequence[float]) -> list[float]:
         """Lengths of the elements at tips, the numbers of legs and 0 or 1 for their starts and ends, as short as faces

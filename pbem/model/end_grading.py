@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
 from pbem.arrays import Real
-from pbem.geometry.curve import Curve
+from pbem.geometry.curve import Curve, Leg
+from pbem.model.halving import divide_legs, find_arc_length
 from pbem.model.model import Law, Model
 
 # An element is at most so many times as long as its distance from an end of contact: a root over so wide a range is
@@ -22,8 +22,8 @@ GROWTH, BEYOND = 3.0, 9.0
 GENTLE = 0.75
 # An element is looked at in so many parts.
 FINELY = np.linspace(0.0, 1.0, 9)
-# With these schemes in linear elements pressures are off by 2 to 8 % whatever the elements at the ends: hypersingular
-# integrals of what is linear on elements of unequal lengths do not converge.
+# With these schemes in linear elements pressures of pins were off by 2 to 8 % whatever the elements at the ends. Why
+# was not shown; traction equations take the slope of the displacements, which in linear elements jumps between them.
 ROUGH = ("HST", "THST")
 # With "auto" no more unknowns than these are solved for again: what is not asked for must not cost more than a user
 # would wait for.
@@ -115,10 +115,10 @@ def _divide_beside(curve: Curve, ends: Sequence[ContactEnd], growth: tuple[float
     """Elements that are too long become as many as are needed, which grow alike; others stay. growth: inside a contact
     and beyond its end."""
     turns = (-curve.length, 0.0, curve.length) if curve.closed else (0.0,)
-    places = [(_Scale(end, growth, _points_forward(curve, end)), _find_arc_length(curve, end.place) + turn)
+    places = [(_Scale(end, growth, _points_forward(curve, end)), find_arc_length(curve, end.place) + turn)
               for end in ends for turn in turns]
-    legs, begin = [], 0.0
-    for leg in curve.legs:
+
+    def divide(leg: Leg, begin: float) -> Real:
         fractions = leg.element_fractions()
         divided = [fractions[:1]]
         for first, last in pairwise(fractions):
@@ -132,18 +132,15 @@ def _divide_beside(curve: Curve, ends: Sequence[ContactEnd], growth: tuple[float
             parts = max(math.ceil(numbers[-1] * (1 - 1e-9)), 1)
             divided.append(np.interp(np.arange(1, parts) * numbers[-1] / parts, numbers, at))
             divided.append(np.array([last]))
-        found = np.concatenate(divided)
-        if len(found) > leg.elements + 1:
-            leg = replace(leg, elements=len(found) - 1, fractions=tuple(float(t) for t in found))
-        legs.append(leg)
-        begin += leg.length
-    return Curve(curve.name, tuple(legs))
+        return np.concatenate(divided)
+
+    return divide_legs(curve, divide)
 
 
 def _points_forward(curve: Curve, end: ContactEnd) -> bool:
     """Whether the contact lies ahead of its end along the curve."""
     step = 1e-3 * end.shortest
-    ahead, back = (_find_arc_length(curve, end.place + sign * step * end.inward) for sign in (1, -1))
+    ahead, back = (find_arc_length(curve, end.place + sign * step * end.inward) for sign in (1, -1))
     return bool(np.remainder(ahead - back, curve.length) < 0.5 * curve.length)
 
 
@@ -167,49 +164,3 @@ class _Scale:
         number = np.minimum(away, self._window) / self._shortest
         number = number + np.log1p(growth * beyond / self._shortest) / np.log1p(growth)
         return np.asarray(np.sign(distance) * number)
-
-
-class _Place(Protocol):
-    """See ContactEnd."""
-
-    @property
-    def place(self) -> complex: ...
-    @property
-    def shortest(self) -> float: ...
-    @property
-    def window(self) -> float: ...
-
-
-def divide_curve(curve: Curve, ends: Sequence[_Place], growth: float) -> Curve:
-    """The curve with elements halved until none is longer than `shortest` within the window of a place, and beyond
-    than `growth` times the distance more."""
-    at = np.array([_find_arc_length(curve, end.place) for end in ends])[:, None]
-    shortest = np.array([end.shortest for end in ends])[:, None]
-    window = np.array([end.window for end in ends])[:, None]
-    turns = (-curve.length, 0.0, curve.length) if curve.closed else (0.0,)
-    legs, begin = [], 0.0
-    for leg in curve.legs:
-        fractions = leg.element_fractions()
-        while True:
-            first, last = begin + fractions[:-1] * leg.length, begin + fractions[1:] * leg.length
-            apart = np.min([np.maximum(first - at - turn, at + turn - last) for turn in turns], axis=0)
-            allowed = (shortest + growth * np.maximum(apart - window, 0.0)).min(axis=0)
-            long = np.flatnonzero(last - first > allowed * (1 + 1e-9))
-            if not len(long):
-                break
-            fractions = np.insert(fractions, long + 1, 0.5 * (fractions[long] + fractions[long + 1]))
-        if len(fractions) > leg.elements + 1:
-            leg = replace(leg, elements=len(fractions) - 1, fractions=tuple(float(t) for t in fractions))
-        legs.append(leg)
-        begin += leg.length
-    return Curve(curve.name, tuple(legs))
-
-
-def _find_arc_length(curve: Curve, place: complex) -> float:
-    """Distance along the curve of its point that is nearest to a place."""
-    found, begin = [], 0.0
-    for leg in curve.legs:
-        fraction = min(max(leg.project(place), 0.0), 1.0)
-        found.append((abs(complex(leg.point(np.array(fraction))) - place), begin + fraction * leg.length))
-        begin += leg.length
-    return min(found)[1]

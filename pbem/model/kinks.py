@@ -6,6 +6,7 @@ with a kink; so have the tractions of springs, of a fluid between two faces, and
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -48,10 +49,11 @@ def split_at_kinks(case: Case, curves: Mapping[str, Curve]) -> dict[str, Curve]:
         if name in curves and isinstance(value, Varying) and not value.timed:
             for number, found in _find_on_curve(value, curves[name]):
                 kinks.setdefault(name, {}).setdefault(number, []).extend(found)
+    own = copy.deepcopy(kinks)  # what a curve has from another does not travel on
     for contact in case.contacts.values():
         first, second = contact.between
-        if first in kinks and second in curves:
-            for number, opposite in _find_opposite(curves[first], kinks[first], curves[second]):
+        if first in own and second in curves:
+            for number, opposite in _find_opposite(curves[first], own[first], curves[second]):
                 kinks.setdefault(second, {}).setdefault(number, []).append(opposite)
     return {name: _split(curve, kinks[name]) if name in kinks else curve for name, curve in curves.items()}
 

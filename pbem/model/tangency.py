@@ -14,7 +14,7 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.intersection import measure_distances
-from pbem.model.end_grading import divide_curve
+from pbem.model.halving import halve_towards
 
 # The approach of two bodies that is to be seen, as a part of the smaller of both curves' lengths and the radius
 # 1/kappa: a strain of this size.
@@ -68,7 +68,7 @@ def find_tangencies(first: Curve, second: Curve) -> Iterator[Tangency]:
 
 def grade_tangencies(curves: Mapping[str, Curve], found: Mapping[str, list[Tangency]]) -> dict[str, Curve]:
     """The curves with elements near their tangencies halved until they are short enough."""
-    return {name: divide_curve(curve, found[name], GROWTH) if found.get(name) else curve
+    return {name: halve_towards(curve, found[name], GROWTH) if found.get(name) else curve
             for name, curve in curves.items()}
 
 

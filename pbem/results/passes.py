@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
@@ -76,14 +77,21 @@ def keep_pass(target: Path) -> KeptPass:
 
 def expect_no_pass(path: Path) -> None:
     """Say in the file of a finished pass that no other one follows. Raises ResultFileError."""
+    try:
+        with change_attributes(path) as attributes:
+            attributes.pop(MAY_FOLLOW, None)
+    except OSError as error:
+        raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
+
+
+@contextmanager
+def change_attributes(path: Path) -> Iterator[MutableMapping[str, Any]]:
+    """Those of a closed file, as the block leaves them; as they were if it raises. Raises ResultFileError, OSError."""
     with refuse_damage(path):
         storage = Store(path)
     try:
-        storage.file.attrs.pop(MAY_FOLLOW, None)
+        yield storage.file.attrs
         storage.close()
-    except OSError as error:
-        storage.drop()
-        raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
     except BaseException:
         storage.drop()
         raise
@@ -114,16 +122,10 @@ class KeptPass:
     def restore(self, reasons: Mapping[str, str]) -> None:
         """Put it back in the place of the pass that failed, with the attributes that say why."""
         self._release()
-        with refuse_damage(self._path):
-            storage = Store(self._path)
-        try:
-            storage.file.attrs.update(reasons)
+        with change_attributes(self._path) as attributes:
+            attributes.update(reasons)
             if not reasons:  # it is the last one
-                storage.file.attrs.pop(MAY_FOLLOW, None)
-            storage.close()
-        except BaseException:
-            storage.drop()
-            raise
+                attributes.pop(MAY_FOLLOW, None)
         self._path.replace(self._target)
 
     def drop(self) -> None:

@@ -149,7 +149,7 @@ def measure_disc(results: Results) -> tuple[complex, float]:
 @pytest.mark.parametrize("load", [1e-6, 0.1])
 def test_a_disc_on_the_middle_of_a_table_stays_upright(load: float, tmp_path: Path) -> None:
     results = run_disc(tmp_path, load, 0.0)
-    moved, turn = measure_disc(results)
+    _, turn = measure_disc(results)
     # On as small a contact as the lighter load's (Hertz's half-width) it rolls so easily that rounding of where the
     # faces part rolls it by a small part of that; the estimate of displacements says so.
     half_width = np.sqrt(8 * load * (1 - 0.3**2) / 1000.0)

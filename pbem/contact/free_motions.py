@@ -142,6 +142,12 @@ def find_contacts_of(mesh: Mesh, motions: Sequence[RigidBodyMode]) -> Bool:
     return np.asarray((own[pairs.first] | own[pairs.second]) & ~pairs.crack)
 
 
+def close_all(laws: PairLaws) -> ModeState:
+    """Modes with all pairs closed that may be, and sticking where anything resists slip."""
+    mode = np.where(laws.parted, OPEN, np.where(resists_slip(laws), STICK, SLIP)).astype(np.int8)
+    return ModeState(mode, np.ones(laws.count))
+
+
 def close_nearest_pairs(
     mesh: Mesh, laws: PairLaws, modes: ModeState, opening: Real, least: int = CLOSED_AT_LEAST,
     left: Bool | None = None,

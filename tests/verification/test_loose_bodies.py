@@ -105,6 +105,41 @@ def test_no_force_is_left_on_a_loose_pin(gap: float, law: str, tmp_path: Path) -
     assert results.balance.relative[-1, pin] < 1e-4
 
 
+PRESSED_DISC = """
+materials.m = {{ young = 1000.0, poisson = 0.2 }}
+materials.g = {{ young = {young}, poisson = 0.3 }}
+curves.a = {{ points = [[-2, -2], [2, -2]], elements = 8 }}
+curves.b = {{ points = [[2, -2], [2, 2]], elements = 8 }}
+curves.c = {{ points = [[2, 2], [-2, 2]], elements = 8 }}
+curves.d = {{ points = [[-2, 2], [-2, -2]], elements = 8 }}
+curves.i = {{ center = [0.17, 0.3], radius = 1.0, elements = 24 }}
+regions.p = {{ material = "m", boundary = ["a", "b", "c", "d", "i"] }}
+regions.g = {{ material = "g", boundary = ["i"] }}
+interfaces.i = {{ law = "coulomb", friction = {friction}, gap = {gap} }}
+boundary.a = {{ un = 0.0, us = 0.0 }}
+boundary.b = {{ tn = -0.1, ts = 0.0 }}
+boundary.c = {{ tn = -1.0, ts = 0.17 }}
+boundary.d = {{ tn = -0.1, ts = 0.0 }}
+analysis = {{ order = 1, scheme = "{scheme}", steps = 1 }}
+"""
+
+
+@pytest.mark.parametrize(("young", "friction", "gap", "scheme"), [
+    (1000.0, 0.034, 1.5e-5, "DBEM"), (200.0, 0.012, 3e-6, "HST"),
+])  # fmt: skip
+def test_a_disc_that_slips_all_around_is_stopped_by_its_friction(
+    young: float, friction: float, gap: float, scheme: str, tmp_path: Path
+) -> None:
+    # Held by its anchor, it would stay where friction turns it: with 3e-2 and 8e-3 of the forces on it left over.
+    case = tmp_path / "disc.toml"
+    case.write_text(PRESSED_DISC.format(young=young, friction=friction, gap=gap, scheme=scheme), encoding="utf-8")
+    results = pbem.run(case, tmp_path / "disc.h5")
+    assert results.balance is not None
+    disc = results.balance.names.index("g")
+    assert results.balance.relative[-1, disc] < 4e-3
+    assert results.balance.carried[-1].max() < 1e-9
+
+
 def test_a_body_that_stays_free_is_anchored(tmp_path: Path) -> None:
     case = write_stack(tmp_path / "loose.toml", 1.0, PRESSED)
     results = pbem.run(case, tmp_path / "loose.h5")

@@ -59,6 +59,22 @@ def measure_balance(problem: Problem, v: Real, load: Load, support: FreeMotions)
     )
 
 
+def measure_friction(problem: Problem, v: Real, load: Load, p_s: Real) -> Real:
+    """The friction (regions,) without signs over the sum of all forces on each region.
+
+    p_s (m,): shear tractions of slipping pairs, else 0. What anchors carry of a turn is wrong if not small against it.
+    """
+    mesh, count = problem.mesh, len(problem.mesh.region_names)
+    whole, known = (part[2 * mesh.nodes :: 2] + 1j * part[2 * mesh.nodes + 1 :: 2] for part in (v, load.known))
+    faces, of = _collect_faces(problem, whole, known)
+    forces = _add_up(faces, of, count, _find_least_traction(problem, v, np.abs(whole).max(initial=0.0))).forces
+    friction = np.zeros(count)
+    borne = np.where(mesh.pairs.crack, 0.0, np.abs(p_s))
+    for side in (mesh.pairs.first, mesh.pairs.second):
+        np.add.at(friction, mesh.node_region[side], mesh.weight[side] * borne)
+    return _divide(friction, forces)
+
+
 def _balance_tools(problem: Problem, regions: _Sums, load: Load) -> _Sums:
     """The sums with what is left over on tools: tractions and given forces; where motions are given, nothing."""
     force, moment = regions.force.copy(), regions.moment.copy()

@@ -14,6 +14,7 @@ from pbem.contact.floating import measure_space
 from pbem.contact.free_motions import (
     CLOSED_AT_LEAST,
     FreeMotions,
+    close_all,
     close_nearest_beside,
     close_nearest_pairs,
     find_contacts_of,
@@ -27,9 +28,9 @@ from pbem.contact.separating import stick_bonded
 from pbem.errors import ConvergenceError
 from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.parallel import broadcast
-from pbem.solve.nonlinear.balance import measure_balance
+from pbem.solve.nonlinear.balance import measure_balance, measure_friction
 from pbem.solve.nonlinear.blocks import describe_cut, list_undriven, open_floating, place_block
-from pbem.solve.nonlinear.imbalance import DRIVEN
+from pbem.solve.nonlinear.imbalance import are_driven
 from pbem.solve.nonlinear.resting import describe_lying, find_idle, find_pairs_around, let_lie, rest_bodies
 from pbem.solve.nonlinear.rolling import roll
 from pbem.solve.nonlinear.unsettled import Unsettled
@@ -60,15 +61,14 @@ class Hold:
     balance. If that is more than its bound, the place is further on against the sense of what it carries.
 
     Free motions that were so at the start have anchors, which do where the loads balance. Where they do not, as single
-    pairs push the body, it moves until its contacts hold it: from then on (driven) no free motion is left to anchors.
-    """
+    pairs push the body, it moves until its contacts hold it: from then on (driven) only what all pairs leave is left to
+    anchors."""
 
     def __init__(self, problem: Problem, memory: Memory, load: Load | None = None) -> None:
         self.problem, self.memory, self.load = problem, memory, load
         self.settled: PairState | None = None
         self.pairs: Integer = np.zeros(0, dtype=np.int64)
-        self.count = 0
-        self.driven = False
+        self.count, self.driven = 0, False
         # The anchors that act in the present solution, and how often contacts left bodies to more of them.
         self.acting: Real | None = None
         self.left = 0
@@ -102,13 +102,13 @@ class Hold:
     def is_driven(self, modes: ModeState, v: Real, load: Load) -> bool:
         """Whether anchors carry what the loads do not balance: for v (4 nodes,), by the first rank.
 
-        Once so, `apply` holds the bodies by pairs, and what they cannot hold is refused.
-        """
+        Once so, `apply` holds the bodies by pairs, and what they cannot hold is refused."""
         if self.driven or not self.problem.anchors:
             return False
         support = self._find_free_motions(modes)
-        carried = measure_balance(self.problem, v, load, support).carried.max(initial=0.0) > DRIVEN
-        self.driven = broadcast(self.problem.comm, bool(carried))
+        p_s = np.where(modes.mode == SLIP, 0.0 if self.state is None else self.state.p_s, 0.0)
+        balance = measure_balance(self.problem, v, load, support)
+        self.driven = broadcast(self.problem.comm, are_driven(balance, measure_friction(self.problem, v, load, p_s)))
         return self.driven
 
     def apply(self, modes: ModeState, opening: Real, slip: Real, before: ModeState | None = None) -> ModeState:
@@ -301,7 +301,9 @@ class Hold:
     def find_free(self, modes: ModeState) -> str | None:
         """The motions that neither pairs nor anchors hold, in words; None if there are none."""
         support = self._find_free_motions(modes)
-        return (support.text or None) if self.driven else support.unheld
+        # Turns of smooth round bodies are nothing that contacts could hold, wherever else loads drive them.
+        least = self._find_free_motions(close_all(self.problem.laws)) if self.driven else support
+        return support.text if len(support.motions) > len(least.motions) else support.unheld
 
     def list_free(self, modes: ModeState) -> tuple[RigidBodyMode, ...]:
         """The motions of bodies that are free, if neither pairs nor anchors hold one of them."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pbem.arrays import Real
 from pbem.contact.cut_parts import name_part
 from pbem.errors import ConvergenceError
 from pbem.solve.problem.problem import Problem
@@ -13,10 +14,22 @@ from pbem.wording import write_percent
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
 # anchors hold it, and that make a result wrong, where they are more than WEIGHTY of those on the most loaded region.
 NOTED, DRIVEN, NOT_IN_BALANCE, WEIGHTY = 1e-3, 3e-2, 1e-1, 1e-2
+# Bodies that slip all around are driven, too, by this part of their friction, which would stop them: of no less than so
+# much of all forces, as less than that is as little as what meshes leave over.
+STOPPED, ROUGH = 0.3, 1e-2
 # The same of a net force on an infinite region that prescribed displacements or springs bring about.
 NET_FORCE = 1e-2
 # Parts that cracks cut off are judged if they carry more than this part of what the most loaded region does.
 SLIGHT = 1e-2
+
+
+def are_driven(balance: Balance, friction: Real) -> bool:
+    """Whether anchors carry more of the forces on a region than a mesh leaves over, or than its friction lets pass.
+
+    friction (regions,): see measure_friction.
+    """
+    bound = np.where(friction > ROUGH, np.minimum(STOPPED * friction, DRIVEN), DRIVEN)
+    return bool((balance.carried > bound).any())
 
 
 def describe_imbalance(problem: Problem, balance: Balance) -> str | None:

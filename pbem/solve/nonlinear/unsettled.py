@@ -57,17 +57,22 @@ def describe_unsettled(
             _list_places(problem, group[failed.wrong]),
         )
     if reason == "no admissible modes" and failed is not None:
-        loses = bool((problem.laws.tensile_strength[group] > 0).any())
         certainty = "fulfils" if failed.exhaustive else "was found that fulfils"
-        lost = "tensile strength and cohesion are" if loses else "cohesion is"
         return ConvergenceError(
             reason,
             f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these "
-            f"{len(group)}: {_name(problem, group)}; {lost} lost at once where faces part, and back "
-            "where they meet: cohesion_lost = true makes that loss last",
+            f"{len(group)}: {_name(problem, group)}; {_advise(problem.laws, group)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
                             _list_places(problem, np.flatnonzero(proposal.changed)))
+
+
+def _advise(laws: PairLaws, group: Integer) -> str:
+    """Why pairs have no modes, and what to do, where they lose what they have back at once; else what may help."""
+    if not find_losing(laws)[group].any():
+        return "try shorter elements there, or smaller steps"
+    lost = "tensile strength and cohesion are" if (laws.tensile_strength[group] > 0).any() else "cohesion is"
+    return f"{lost} lost at once where faces part, and back where they meet: cohesion_lost = true makes that loss last"
 
 
 def find_losing(laws: PairLaws) -> Bool:

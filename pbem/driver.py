@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pbem.arrays import Integer
 from pbem.case.build import Source, find_file, make_checked_model
 from pbem.case.changed import Label, label_key
 from pbem.clock import clock
@@ -18,7 +16,7 @@ from pbem.description.case import UNNAMED
 from pbem.errors import CaseError, ConvergenceError, Fault, PbemError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.end_grading import ContactEnd, may_be_graded
+from pbem.model.end_grading import MOST_UNKNOWNS, ContactEnd, may_be_graded
 from pbem.model.model import Model, Operator
 from pbem.parallel import (
     Comm,
@@ -27,9 +25,9 @@ from pbem.parallel import (
     broadcast,
     check_communicator,
     do_on_first,
-    lacks_memory,
 )
-from pbem.passes import Target, blame_pass, blame_tries, plan_finer, plan_graded, recall_mesh
+from pbem.pass_file import PassFile, expect_writer, write_pass
+from pbem.passes import Finer, Target, blame_tries, plan_finer, plan_graded, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide, refine_marked
 from pbem.results.contact_ends import find_contact_ends
 from pbem.results.doubts import find_smooth
@@ -37,7 +35,7 @@ from pbem.results.estimator import Estimator
 from pbem.results.model_text import describe_size
 from pbem.results.output import check_output_path
 from pbem.results.overrides import choose_overrides
-from pbem.results.passes import KeptPass, PassOutput, expect_no_pass, open_beside, read_refinement
+from pbem.results.passes import expect_no_pass, read_refinement
 from pbem.results.reader import Results, open_results
 from pbem.results.resume import is_finished
 from pbem.results.tip_notes import compare_release
@@ -49,14 +47,14 @@ from pbem.solve.launch.start import check_shares, check_start
 from pbem.solve.launch.watch import Watch
 from pbem.solve.petsc.log import petsc_log
 from pbem.solve.petsc.options import check_options
-from pbem.solve.petsc.session import petsc_options, petsc_version
+from pbem.solve.petsc.session import petsc_options
 from pbem.solve.problem.step import ContactState, Reporter, SilentReporter, Step
 from pbem.solve.steps.former_pass import FormerPass
 from pbem.solve.steps.march import free_at_last, march, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
-from pbem.storing import make_estimator, store_steps
+from pbem.storing import WaitingSteps, make_estimator, store_steps
 
 
 def run(
@@ -157,7 +155,7 @@ def _refine_and_solve(
     notes: Sequence[str] = (*model.notes, *find_smooth(model))
     # Passes for an accuracy count as graded ones, but never are both asked for.
     first, tries, begun, graded = model, 0, one.number, one.number - 1
-    former: FormerPass | None = None
+    former: _Done | None = None
     made: Mesh | None = None
     while True:
         with clock.piece("reading"):
@@ -172,10 +170,12 @@ def _refine_and_solve(
             watch.note(note)
         now = replace(one, first_unknowns=one.first_unknowns or 2 * mesh.nodes)
         try:
-            decision, former = _solve(model, mesh, target, options, watch, signals, now, kept, former)
+            done = _solve(model, mesh, target, options, watch, signals, now, kept, former, graded)
         except ConvergenceError as error:
             if one.spare:
                 watch.note(f"The run on that mesh did not converge ({error.reason}): the results are those before.")
+                if former and former.store:
+                    former.store()
                 return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
             once = target.resume or kept
@@ -187,11 +187,13 @@ def _refine_and_solve(
             continue
         # The next pass takes the place of this one in the file.
         target = Target(target.path, False, True)
+        decision, former = done.decision, done
         one = Pass(one.number + 1, now.first_unknowns, spare=decision.marked is None)
         if decision.marked is not None:
             model = refine_marked(model, decision)
             continue
-        planned = plan_graded(model, decision.ends, graded, 2 * mesh.nodes, watch.iterations, bool(kept))
+        planned = done.planned or plan_graded(
+            model, decision.ends, graded, 2 * mesh.nodes, watch.iterations, bool(kept))
         if planned:
             watch.note(planned.note)
         if planned is None or planned.model is model:
@@ -201,63 +203,56 @@ def _refine_and_solve(
         model, made, graded, kept, watch.most = planned.model, planned.mesh, graded + 1, None, planned.most
 
 
+@dataclass(frozen=True)
+class _Done:
+    """What a pass has come to: what follows, and its modes. planned: the pass that was found to take its place before
+    anything of it was stored; store: does that after all."""
+
+    decision: Decision
+    modes: FormerPass
+    planned: Finer | None = None
+    store: Callable[[], None] | None = None
+
+
 def _solve(
     model: Model, mesh: Mesh, target: Target, options: Mapping[str, str], watch: Watch, signals: StopSignals,
-    one: Pass, kept: KeptProblems | None, former: FormerPass | None,
-) -> tuple[Decision, FormerPass]:
-    """March through the load history; the first rank writes. Returns what follows, and the modes of this pass."""
+    one: Pass, kept: KeptProblems | None, former: _Done | None, graded: int,
+) -> _Done:
+    """March through the load history; the first rank writes. graded: see `plan_graded`."""
     with clock.piece("evaluation"):
         interior = InteriorField(model, mesh, watch.comm) if model.interior_points else None
     region = None if interior is None else interior.location.region
     if target.resume and do_on_first(watch.comm, PbemError, lambda: is_finished(target.path, model, mesh)):
         watch.note(f"{target.path} is finished: nothing is left to be computed, and it stays as it is.")
-        return Decision(), FormerPass(mesh)
+        return _Done(Decision(), FormerPass(mesh))
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
-    with clock.piece("writing"):
-        output = do_on_first(
-            watch.comm, PbemError,
-            lambda: _open(model, mesh, target, options, region, one, watch.comm.size), share=False,
-        ) or PassOutput()
-    try:  # from here on whatever happens has to leave a closed file
-        found = _fill(output.writer, model, mesh, interior, watch, signals, one, kept, former)
-    except BaseException as error:
-        told = error if one.number == 1 or one.spare or target.resume else blame_pass(error, one, 2 * mesh.nodes)
-        if output.writer:
-            _end_badly(output.writer, told, output.former, one.spare)
-        if told is error:
-            raise
-        raise told from error
-    with clock.piece("writing"):
-        if output.former:
-            output.former.drop()
-        watch.comm.Barrier()
-    return found
 
+    def store(waiting: WaitingSteps) -> None:
+        """What a later pass was to take the place of."""
+        again = replace(file, target=Target(target.path, False, True), beside=False)
+        write_pass(again, watch.comm, lambda writer: _store(
+            writer, model, mesh, interior, waiting.replay(), watch, signals, one, None, None))
+        do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path))
 
-def _open(
-    model: Model, mesh: Mesh, target: Target, options: Mapping[str, str], region: Integer | None, one: Pass,
-    ranks: int,
-) -> PassOutput:
-    """The result file to go on with, or a new one beside which the former pass is kept."""
-    flat = [f"{name}={value}" for name, value in options.items()]
-    if target.resume:
-        return PassOutput(ResultWriter.resume(target.path, model, mesh, ranks, petsc_version(), flat, region))
-
-    def create() -> ResultWriter:
-        return ResultWriter(target.path, model, mesh, ranks, petsc_version(), flat, region, force=target.force)
-
-    return open_beside(target.path, create) if one.number > 1 else PassOutput(create())
+    # What is not stored has no file to be kept.
+    beside = one.number > 1 and not (former and former.store)
+    file = PassFile(model, mesh, target, options, region, one, beside)
+    modes = former.modes if former else None
+    return write_pass(file, watch.comm, lambda writer: _fill(
+        writer, model, mesh, interior, watch, signals, one, kept, modes, graded, store))
 
 
 def _fill(
     writer: ResultWriter | None, model: Model, mesh: Mesh, interior: InteriorField | None, watch: Watch,
-    signals: StopSignals, one: Pass, kept: KeptProblems | None, former: FormerPass | None,
-) -> tuple[Decision, FormerPass]:
-    """Assemble, march, store the steps as they come, and judge their errors. former: with whose modes to begin."""
+    signals: StopSignals, one: Pass, kept: KeptProblems | None, former: FormerPass | None, graded: int,
+    store: Callable[[WaitingSteps], None],
+) -> _Done:
+    """Assemble, march, store the steps as they come, and judge their errors. former: with whose modes to begin. store:
+    what to do with steps that are not stored if no other pass takes the place of this one after all."""
     comm = watch.comm
     if model.analysis.accuracy is not None or one.number > 1:
-        do_on_first(comm, PbemError, lambda: _check(writer).note_pass(one.number, one.first_unknowns))
+        do_on_first(comm, PbemError, lambda: expect_writer(writer).note_pass(one.number, one.first_unknowns))
     last, unfinished, before = broadcast(
         comm, (writer.last_step, writer.unfinished, writer.former) if writer else (None, None, None))
     signals.at_once = comm.size == 1
@@ -272,25 +267,47 @@ def _fill(
         with clock.piece("evaluation"):
             interior.prepare(problem.system)
     start = None if last is None else start_from(problem, last, before)
-    with clock.piece("estimate"):
-        rules = writer.tip_rules if writer else None
-        estimator = make_estimator(model, mesh, last, comm, kept, signals, rules)
     tangent = kept.take_tangent(problem) if kept else None
     guess = former.make_guess(problem) if former else None
     passed = FormerPass(mesh, partial(_find_ends, comm, model, mesh))
-    follows = model.analysis.accuracy is not None or may_be_graded(model, 2 * mesh.nodes)
+    gradable = may_be_graded(model, 2 * mesh.nodes)
+    steps = clock.each("steps", march(problem, watch, start, tangent, guess, unfinished=unfinished))
+    steps = steps if kept else free_at_last(problem, steps)
+    steps = passed.listen(steps) if gradable or model.analysis.accuracy is not None else steps
+    if gradable and kept is None and last is None and 2 * mesh.nodes <= MOST_UNKNOWNS:
+        waiting = WaitingSteps(steps)
+        ends = passed.find_last() if waiting.whole else ()
+        planned = plan_graded(model, ends, graded, 2 * mesh.nodes, watch.iterations)
+        if planned and planned.model is not model:
+            if writer:
+                writer.fail("grading", "elements were to be graded towards ends of contact", "stopped")
+            return _Done(Decision(ends=tuple(ends)), passed, planned, partial(store, waiting))
+        if one.spare and isinstance(waiting.error, ConvergenceError):
+            watch.check()
+            raise waiting.error
+        # Who stops a run gets what is known by then, the errors of these steps with it.
+        signals = StopSignals() if isinstance(waiting.error, StopError | KeyboardInterrupt) else signals
+        steps = waiting.replay()
+    return _Done(_store(writer, model, mesh, interior, steps, watch, signals, one, kept, last), passed)
+
+
+def _store(
+    writer: ResultWriter | None, model: Model, mesh: Mesh, interior: InteriorField | None, steps: Iterator[Step],
+    watch: Watch, signals: StopSignals, one: Pass, kept: KeptProblems | None, last: Step | None,
+) -> Decision:
+    """Store the steps as they come, and judge their errors. last: the step before them, if any."""
+    with clock.piece("estimate"):
+        rules = writer.tip_rules if writer else None
+        estimator = make_estimator(model, mesh, last, watch.comm, kept, signals, rules)
     try:
-        steps = clock.each("steps", march(problem, watch, start, tangent, guess, unfinished=unfinished))
-        steps = steps if kept else free_at_last(problem, steps)
-        steps = passed.listen(steps) if follows else steps
-        last = store_steps(steps, model.output_every, interior, writer, watch, estimator, comm) or last
+        last = store_steps(steps, model.output_every, interior, writer, watch, estimator, watch.comm) or last
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
         raise
     estimator.destroy()
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
-    return _conclude(writer, model, mesh, estimator, watch, one, last), passed
+    return _conclude(writer, model, mesh, estimator, watch, one, last)
 
 
 def _find_ends(comm: Comm, model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
@@ -310,32 +327,15 @@ def _conclude(
         decision: Decision = do_on_first(
             watch.comm, PbemError,
             lambda: decide(
-                model, mesh, _check(writer).relative_errors, estimator, one, None if last is None else last.contact))
+                model, mesh, expect_writer(writer).relative_errors, estimator, one,
+                None if last is None else last.contact))
     for note in decision.notes:
         watch.note(note)
     if decision.failure:
         raise ConvergenceError("accuracy", decision.failure)
     with clock.piece("writing"):
-        do_on_first(watch.comm, PbemError, lambda: _end_pass(_check(writer), decision))
+        do_on_first(watch.comm, PbemError, lambda: _end_pass(expect_writer(writer), decision))
     return decision
-
-
-def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | None, spare: bool) -> None:
-    """Close the file. A pass that was stopped can be gone on with, one that has failed gives way to the former one."""
-    reached = isinstance(error, ConvergenceError) and error.reason == "accuracy"
-    stopped = isinstance(error, StopError | KeyboardInterrupt) and writer.steps_stored > 0
-    # PETSc and what lies below it have errors of their own for want of memory.
-    reasons = writer.abandon(MemoryError(" ".join(str(error).split())) if lacks_memory(error) else error)
-    if former and (reached or stopped):
-        former.drop()
-    elif former:
-        with suppress(PbemError, OSError):  # what ended the run must be what the user hears of
-            former.restore({} if spare and isinstance(error, ConvergenceError) else reasons)
-
-
-def _check(writer: ResultWriter | None) -> ResultWriter:
-    assert writer is not None, "the first rank writes"
-    return writer
 
 
 def _end_pass(writer: ResultWriter, decision: Decision) -> None:

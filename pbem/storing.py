@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pbem.arrays import Real
 from pbem.clock import clock
-from pbem.errors import ConvergenceError, PbemError
+from pbem.errors import ConvergenceError, LawError, PbemError, StopError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
 from pbem.parallel import Comm, StopSignals, do_on_first, world
@@ -21,6 +21,9 @@ from pbem.solve.problem.step import Reporter, SilentReporter, Step
 from pbem.solve.steps.march import note_place
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
+
+# So many steps at most wait for what follows their pass.
+MOST_WAITING = 20
 
 
 def make_estimator(
@@ -41,6 +44,37 @@ def make_estimator(
     except PbemError as error:
         missing = f"the second solution cannot be computed ({error})"
     return Estimator(model, mesh, beside, second, missing, comm.rank == 0, rules)
+
+
+class WaitingSteps:
+    """The first steps of a march, which wait until it is known whether another pass takes the place of this one: then
+    neither their errors are estimated nor are they stored, which takes a third of a small run.
+
+    At most MOST_WAITING, so that little is lost where a process is killed. error: what has ended the march; made by all
+    ranks together, as the steps are.
+    """
+
+    def __init__(self, steps: Iterator[Step]) -> None:
+        self._held: list[Step] = []
+        self._rest = steps
+        self.error: PbemError | KeyboardInterrupt | None = None
+        self.whole = False
+        try:
+            for step in steps:
+                self._held.append(step)
+                if len(self._held) > MOST_WAITING:
+                    return
+            self.whole = True
+        except (ConvergenceError, LawError, StopError, KeyboardInterrupt) as error:
+            self.error = error
+
+    def replay(self) -> Iterator[Step]:
+        """These steps and those that follow, or what has ended the march."""
+        yield from self._held
+        if self.error is not None:
+            raise self.error
+        if not self.whole:
+            yield from self._rest
 
 
 def store_steps(

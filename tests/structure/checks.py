@@ -13,16 +13,16 @@ from pathlib import Path
 # The package itself comes last: it offers what they define.
 ORDER = (
     "geometry", "description", "model", "mesh", "bem", "contact", "forecast", "bundled", "case", "importing", "solve",
-    "results", "progress", "passes", "storing", "driver", "sweeps", "terminal", "make_command", "import_command",
-    "check_command", "run_command", "sweep_command", "export_command", "info_command", "plot_command", "pages", "cli",
-    "__main__", "__init__",
+    "results", "progress", "passes", "pass_file", "storing", "driver", "sweeps", "terminal", "make_command",
+    "import_command", "check_command", "run_command", "sweep_command", "export_command", "info_command", "plot_command",
+    "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
 BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock",
         "heap", "uniform")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = (
-    "solve", "storing", "driver", "sweeps", "run_command", "sweep_command", "cli", "__main__", "parallel",
+    "solve", "pass_file", "storing", "driver", "sweeps", "run_command", "sweep_command", "cli", "__main__", "parallel",
 )
 
 # Each of these comes in by one door only.

@@ -18,7 +18,7 @@ MODULES = checks.read_modules(Path(pbem.__file__).parent)
 each_module = pytest.mark.parametrize("module", MODULES.values(), ids=MODULES.keys())
 
 # Whoever only reads cases and results waits for no MPI, and needs none.
-WITH_MPI = ("parallel", "solve", "storing", "driver", "sweeps", "__main__")
+WITH_MPI = ("parallel", "solve", "pass_file", "storing", "driver", "sweeps", "__main__")
 WITHOUT_MPI = [name for name, module in MODULES.items() if module.part not in WITH_MPI]
 
 

@@ -38,6 +38,10 @@ class FormerPass:
             self.ends[step.stage, step.factor] = self.find(step.contact)
             yield step
 
+    def find_last(self) -> Sequence[ContactEnd]:
+        """Where contacts end in the last step so far."""
+        return next(reversed(self.ends.values()), ())
+
     def make_guess(self, problem: Problem) -> Guess | None:
         """The modes of the same step, from the nearest pair of each; None for steps that the pass did not come to.
 

@@ -1,0 +1,90 @@
+"""The result file of a pass: opened, and closed however the pass ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+from pbem.arrays import Integer
+from pbem.clock import clock
+from pbem.errors import ConvergenceError, PbemError, StopError
+from pbem.mesh.mesh import Mesh
+from pbem.model.model import Model
+from pbem.parallel import Comm, do_on_first, lacks_memory
+from pbem.passes import Target, blame_pass
+from pbem.results.accuracy import Pass
+from pbem.results.passes import KeptPass, PassOutput, open_beside
+from pbem.results.writer import ResultWriter
+from pbem.solve.petsc.session import petsc_version
+
+Written = TypeVar("Written")
+
+
+@dataclass(frozen=True)
+class PassFile:
+    """What the file of a pass begins with; region: of the interior points; beside: the former pass has a file, which is
+    kept until this one is finished."""
+
+    model: Model
+    mesh: Mesh
+    target: Target
+    options: Mapping[str, str]
+    region: Integer | None
+    one: Pass
+    beside: bool
+
+
+def write_pass(file: PassFile, comm: Comm, work: Callable[[ResultWriter | None], Written]) -> Written:
+    """Do something with the open file, which the first rank alone has; by all ranks together."""
+    one = file.one
+    with clock.piece("writing"):
+        output = do_on_first(comm, PbemError, lambda: _open(file, comm.size), share=False) or PassOutput()
+    try:  # from here on whatever happens has to leave a closed file
+        found = work(output.writer)
+    except BaseException as error:
+        first = one.number == 1 or one.spare or file.target.resume
+        told = error if first else blame_pass(error, one, 2 * file.mesh.nodes)
+        if output.writer:
+            _end_badly(output.writer, told, output.former, one.spare)
+        if told is error:
+            raise
+        raise told from error
+    with clock.piece("writing"):
+        if output.former:
+            output.former.drop()
+        comm.Barrier()
+    return found
+
+
+def _open(file: PassFile, ranks: int) -> PassOutput:
+    """The result file to go on with, or a new one beside which the former pass is kept, if there is a file of it."""
+    model, mesh, target, region = file.model, file.mesh, file.target, file.region
+    flat = [f"{name}={value}" for name, value in file.options.items()]
+    if target.resume:
+        return PassOutput(ResultWriter.resume(target.path, model, mesh, ranks, petsc_version(), flat, region))
+
+    def create() -> ResultWriter:
+        return ResultWriter(target.path, model, mesh, ranks, petsc_version(), flat, region, force=target.force)
+
+    return open_beside(target.path, create) if file.beside else PassOutput(create())
+
+
+def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | None, spare: bool) -> None:
+    """Close the file. A pass that was stopped can be gone on with, one that has failed gives way to the former one."""
+    reached = isinstance(error, ConvergenceError) and error.reason == "accuracy"
+    stopped = isinstance(error, StopError | KeyboardInterrupt) and writer.steps_stored > 0
+    # PETSc and what lies below it have errors of their own for want of memory.
+    reasons = writer.abandon(MemoryError(" ".join(str(error).split())) if lacks_memory(error) else error)
+    if former and (reached or stopped):
+        former.drop()
+    elif former:
+        with suppress(PbemError, OSError):  # what ended the run must be what the user hears of
+            former.restore({} if spare and isinstance(error, ConvergenceError) else reasons)
+
+
+def expect_writer(writer: ResultWriter | None) -> ResultWriter:
+    """On the first rank."""
+    assert writer is not None, "the first rank writes"
+    return writer

@@ -280,7 +280,7 @@ def _fill(
         planned = plan_graded(model, ends, graded, 2 * mesh.nodes, watch.iterations)
         if planned and planned.model is not model:
             if writer:
-                writer.fail("grading", "elements were to be graded towards ends of contact", "stopped")
+                writer.fail("accuracy", "a mesh graded towards ends of contact was to follow", "stopped")
             return _Done(Decision(ends=tuple(ends)), passed, planned, partial(store, waiting))
         if one.spare and isinstance(waiting.error, ConvergenceError):
             watch.check()

@@ -15,10 +15,11 @@ import pytest
 import pbem
 from pbem import driver
 from pbem.case.build import parse_model
-from pbem.errors import CaseError, ConvergenceError
+from pbem.errors import CaseError, ConvergenceError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.end_grading import ContactEnd, grade_ends
 from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
+from pbem.results.writer import ResultWriter
 from pbem.solve.problem.step import SilentReporter
 from tests.verification.rigid_sample import UNMOVED, Place, compare_pressures, find_persson_force, write_pin
 
@@ -200,6 +201,50 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     np.testing.assert_array_equal(np.asarray(results.contact["seat"].traction_n), plain)
     assert pbem.run(tmp_path / "pin.toml", tmp_path / "pin.h5", resume=True).status == "finished" and len(marches) == 2
     assert not list(tmp_path.glob("pin.h5?*"))
+
+def test_only_the_last_pass_is_stored_with_its_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What another pass follows is neither written nor followed by a second solution; its errors are those of a run
+    on that mesh alone."""
+    estimated, written = [], []
+    make, append = driver.make_estimator, ResultWriter.append
+    monkeypatch.setattr(driver, "make_estimator", lambda *given: estimated.append(given[1].nodes) or make(*given))
+    monkeypatch.setattr(ResultWriter, "append", lambda *given: written.append(given[1].number) or append(*given))
+    results = pbem.run(write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5")
+    assert results.fractions is not None and results.status == "finished"
+    assert estimated == [len(results.nodes.position)] and written == [1, 2]
+    assert np.isfinite(np.asarray(results.errors.relative["tractions"])).all()
+
+
+@pytest.mark.parametrize("most", [0, 1, 5])
+def test_steps_that_waited_are_those_of_a_run_that_did_not(
+    most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where they are too many to wait, or a stop comes between."""
+    case = write_small(tmp_path / "pin.toml")
+    whole = pbem.run(case, tmp_path / "whole.h5")
+    monkeypatch.setattr("pbem.storing.MOST_WAITING", most)
+    found = pbem.run(case, tmp_path / "found.h5")
+    assert repr(found.fractions) == repr(whole.fractions)
+    size = np.abs(whole.contact["seat"].traction_n).max()
+    np.testing.assert_allclose(found.contact["seat"].traction_n, whole.contact["seat"].traction_n, rtol=0,
+                               atol=1e-6 * size)
+    np.testing.assert_allclose(found.errors.relative["tractions"], whole.errors.relative["tractions"], rtol=1e-4)
+    march = driver.march
+
+    def stop(*given: Any, **named: Any) -> Iterator[Any]:
+        yield next(march(*given, **named))
+        raise StopError("SIGTERM", "stopped by SIGTERM", 143)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(driver, "march", stop)
+        with pytest.raises(StopError):
+            pbem.run(case, tmp_path / "part.h5")
+    part = pbem.open_results(tmp_path / "part.h5")
+    assert part.status == "stopped" and len(part.steps) == 1
+    assert np.isfinite(np.asarray(part.errors.relative["tractions"])).all()
+    again = pbem.run(case, tmp_path / "part.h5", resume=True)
+    np.testing.assert_allclose(again.contact["seat"].traction_n, whole.contact["seat"].traction_n, rtol=0,
+                               atol=1e-6 * size)
 
 
 @pytest.mark.parametrize("graded", [True, "auto"])

@@ -242,6 +242,7 @@ def assemble_hierarchical(
 
     finite: numbers of regions that have an outer boundary. weak: see pbem.bem.near.choose_weak. All ranks call this
     together.
+    (theory, 130)
     """
     mesh, forest, share = parts.mesh, parts.forest, sources.share
     row_of_node = np.full(mesh.nodes, -1)
@@ -276,12 +277,39 @@ def assemble_hierarchical(
         if motions.interpolated or len(motions.columns) > 2 * SMALL_REGION * (mesh.order + 1)
     )
     sums = share_functionals(mesh.region, seen, share, list_motions(rigid))
-    return HierarchicalOperator(
+    none = sparse.csr_matrix((2 * len(nodes), len(sums.number)))
+    operator = HierarchicalOperator(
         parts, nodes, sources, targets, NearRows(leaves, seen.count, 2 * len(nodes)),
         _place_far_rows(parts, far, targets, row_of_node, scale), seen.place_columns(free), needed,
         seen, np.searchsorted(seen.elements, sources.elements), sums,
-        spread_motions(seen, rigid, sums), sparse.csr_matrix((2 * len(nodes), len(sums.number))), rigid,
+        sparse.csr_matrix((seen.count, len(sums.number))), none, rigid,
     )  # fmt: skip
+    free_of_all = _free_translations(operator, [each.region for each in find_rigid_motions(mesh, finite, needed)])
+    return replace(operator, free=free_of_all, motions=spread_motions(seen, rigid, sums))
+
+
+def _free_translations(operator: HierarchicalOperator, regions: Sequence[int]) -> sparse.csr_matrix:
+    """The free terms, and beside them what lets B of translations of regions be zero: see assemble_rows.
+
+    What rounding and expansions leave of them is taken off each node's own columns. Nodes on cracks, whose own column
+    is a jump, stay as they are. All ranks call this together.
+    (theory, 130)
+    """
+    parts, mesh = operator.parts, operator.parts.mesh
+    elastic = [region for region in regions if parts.materials[region].rigid is None]
+    if not elastic:
+        return operator.free
+    moved = np.isin(mesh.node_region, elastic) & ~mesh.node_crack
+    translations = np.zeros((2, mesh.nodes, 2, 2))
+    translations[0] = moved[:, None, None] * np.eye(2)
+    left = np.stack([operator.apply(each) for each in translations.reshape(-1, 2).T], axis=1).reshape(-1, 2, 2)
+    own = np.flatnonzero(moved[operator.nodes])
+    rows = np.broadcast_to((2 * own[:, None] + np.arange(2))[:, :, None], (len(own), 2, 2))
+    columns = np.broadcast_to((2 * operator.nodes[own, None] + np.arange(2))[:, None], (len(own), 2, 2))
+    taken = sparse.csr_matrix(
+        (-left[own].ravel(), (rows.ravel(), columns.ravel())), shape=(operator.rows, 4 * mesh.nodes)
+    )
+    return operator.free + operator.seen.place_columns(taken)
 
 
 def _see_elements(parts: Sorted, sources: SourceTree, near: Integer) -> SeenEntries:

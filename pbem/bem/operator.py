@@ -92,12 +92,14 @@ def collect_sources(mesh: Mesh, materials: Sequence[Material]) -> list[Sources]:
 
 
 def assemble_rows(
-    mesh: Mesh, materials: Sequence[Material], first_node: int, last_node: int, needed: Bool, length: float
+    mesh: Mesh, materials: Sequence[Material], first_node: int, last_node: int, needed: Bool, length: float,
+    finite: Sequence[int] = (),
 ) -> RowOperator:
     """Rows of B of the nodes in [first_node, last_node) (theory, 7, 8).
 
     needed (4 nodes,): entries of v that can ever differ from zero; the other columns are not stored.
-    length: the model's size; see scale_equations.
+    length: the model's size; see scale_equations. finite: regions (numbers) that have an outer boundary: B of their
+    translations is zero but for the rounding of sums (theory, 130).
     """
     nodes = np.arange(first_node, last_node)
     scale = scale_equations(mesh, materials, length)
@@ -118,7 +120,9 @@ def assemble_rows(
         scratch = _allocate_scratch(sources[region])
         for part, where in _list_chunks(own, mesh.traction_equation, scratch):
             traction = bool(mesh.traction_equation[part[0]])
-            values = _evaluate_columns(mesh, sources[region], int(region), part, columns, traction, scratch)
+            values = _evaluate_columns(
+                mesh, sources[region], int(region), part, columns, traction, scratch, int(region) in finite
+            )
             matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
         blocks.append(RegionRows(int(region), rows, columns, matrix))
     return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
@@ -238,8 +242,12 @@ def _evaluate_columns(
     columns: Integer,
     traction: bool,
     scratch: tuple[Real, Real],
+    free: bool = False,
 ) -> Real:
-    """Values at nodes (displacement, or traction on the node's normal) in the given columns of v."""
+    """Values at nodes (displacement, or traction on the node's normal) in the given columns of v.
+
+    free: translations of the region leave nothing, see _free_translations.
+    """
     own = _region_nodes(mesh, region)
     first = own[0]
     on = mesh.node_element[nodes] - mesh.node_element[first]
@@ -249,7 +257,23 @@ def _evaluate_columns(
         sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions,
         mesh.node_local[nodes], scratch,
     )
+    if free:
+        _free_translations(displacement, ~mesh.node_crack[own], nodes - first, 0.0 if traction else 0.5)
     parts = [displacement[:, columns[of_displacement] - 2 * first]]
     if tractions is not None:
         parts.append(tractions[:, columns[~of_displacement] - 2 * (mesh.nodes + first)])
     return np.concatenate(parts, axis=1)
+
+
+def _free_translations(rows: Real, bounding: Bool, own: Integer, half: float) -> None:
+    """Let rows (2 k, 2 n) of a region's displacements give half of its translations, which the free terms take off.
+
+    What rounding leaves is taken off the points' own columns, in place. bounding (n,): nodes that are on no crack.
+    own (k,): which of the nodes the points are. Points on cracks, whose own column is a jump, stay as they are.
+    (theory, 130)
+    """
+    translations = np.repeat(bounding, 2)[:, None] * np.tile(np.eye(2), (len(bounding), 1))
+    left = (rows @ translations).reshape(-1, 2, 2) - half * np.eye(2)
+    on = np.flatnonzero(bounding[own])
+    at, columns = (2 * each[:, None] + np.arange(2) for each in (on, own[on]))
+    rows[at[:, :, None], columns[:, None, :]] -= left[on]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.geometry.carrier import Carriers
 from pbem.geometry.elements import Elements
 from pbem.mesh.shape_functions import place_crack_nodes, place_nodes
 
@@ -27,6 +28,7 @@ class Chain:
     elements: Elements
     first_node: int
     order: int
+    carriers: Carriers
     rigid: bool = False
 
     @property

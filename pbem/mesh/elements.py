@@ -22,6 +22,11 @@ def divide_curve(curve: Curve) -> Elements:
     return replace(pieces, start=start, end=end)
 
 
+def count_elements(curve: Curve) -> list[int]:
+    """Of each of its legs."""
+    return [len(leg.element_fractions()) - 1 for leg in curve.legs]
+
+
 def weigh_nodes(elements: Elements, local: Real) -> Real:
     """Weights (m, p) that integrate a traction along the elements' length from its values at the nodes at s (p,)."""
     return np.asarray(elements.stretch(local) * integrate_shapes(local))

@@ -7,8 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from pbem.arrays import Bool
+from pbem.geometry.carrier import find_carriers
 from pbem.mesh.chain import Chain
-from pbem.mesh.elements import divide_curve, weigh_nodes
+from pbem.mesh.elements import count_elements, divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
 from pbem.mesh.mesh import Links, Mesh, Pairs
 from pbem.mesh.mortar_pairs import describe_sparse_meshes
@@ -74,16 +75,19 @@ def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: 
 def _list_chains(model: Model, equations: Equations) -> list[Chain]:
     order = model.analysis.order
     chains: list[Chain] = []
+    carriers = find_carriers(model.curves)
     first_node = 0
     for number, region in enumerate(model.regions):
         sides = [(side.curve, side.forward, False) for loop in region.loops for side in loop.sides]
         for curve, forward, crack in [*sides, *((crack, True, True) for crack in region.cracks)]:
             elements = divide_curve(model.curves[curve])
+            leg = np.repeat(np.arange(len(model.curves[curve].legs)), count_elements(model.curves[curve]))
             # A crack always has the traction equation.
             traction = np.array(equations.traction[number, curve]) if not crack else np.full(elements.count, True)
             if not forward:
-                elements, traction = elements.reverse(), traction[::-1]
-            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order, region.rigid))
+                elements, traction, leg = elements.reverse(), traction[::-1], leg[::-1]
+            chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order,
+                                carriers[curve].select(leg), region.rigid))
             first_node += elements.count * (order + 1)
     return chains
 

@@ -17,10 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.geometry.carrier import measure_distances
 from pbem.geometry.elements import Elements
+from pbem.mesh.chain import Chain
 from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.projection import find_hidden, project_nodes
 from pbem.mesh.shape_functions import interpolate_shapes
+from pbem.model.rigid_body_modes import ROUNDINGS
 
 # Gauss points on every piece of an element that faces one element of the other side.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -53,15 +56,14 @@ class Coupling:
     shared: Real
 
 
-def couple_curves(
-    slave: Elements, master: Elements, local: Real, others: Elements, overlap: float = 0.0
-) -> Coupling:
-    """Integrate products of shapes over the parts of the slave whose normals meet the master (theory, 64).
+def couple_curves(one: Chain, other: Chain, others: Elements, overlap: float = 0.0) -> Coupling:
+    """Integrate products of shapes over the parts of the slave whose normals meet the master (theory, 64, 131).
 
-    others: elements that hide the master where they stand in between; the slave's and the master's may be among them.
-    overlap: how far behind the slave the master may lie (length).
+    one: the slave; other: the master. others: elements that hide the master where they stand in between; the slave's
+    and the master's may be among them. overlap: how far behind the slave the master may lie (length).
     """
-    shapes = interpolate_shapes(local)
+    slave, master, local = one.elements, other.elements, one.local
+    shapes, rounding = interpolate_shapes(local), find_rounding(slave, master)
     count = len(local)
     cover, distance = np.zeros(slave.count * count), np.zeros(slave.count * count)
     own_weight, own_length, length = weigh_nodes(slave, local), slave.lengths, master.lengths
@@ -79,11 +81,15 @@ def couple_curves(
         away = np.flatnonzero(hit & (seen.distance > CLEAR * own_length[element]))
         if len(away):
             hit[away] = ~find_hidden(x[away], n[away], seen.distance[away], others)
+        apart = measure_distances(
+            x[hit], n[hit], one.carriers.select(np.full(int(hit.sum()), element)),
+            other.carriers.select(seen.element[hit]), seen.distance[hit], rounding,
+        )
         stretched = weight * single.stretch(s)[0]
         mine = (s[:, None] ** np.arange(count) @ shapes)[hit] * stretched[hit, None]
         own = element * count + np.arange(count)
         cover[own] = mine.sum(axis=0) / own_weight[element]
-        distance[own] = (mine * seen.distance[hit, None]).sum(axis=0) / own_weight[element]
+        distance[own] = (mine * apart[:, None]).sum(axis=0) / own_weight[element]
         theirs = seen.local[hit][:, None] ** np.arange(count) @ shapes
         for facing in np.unique(seen.element[hit]):
             at = seen.element[hit] == facing
@@ -102,6 +108,11 @@ def couple_curves(
         master_element=np.array([each[1] for each in met], dtype=np.int64),
         shared=np.array([each[2] for each in met], dtype=float),
     )
+
+
+def find_rounding(*sides: Elements) -> float:
+    """Below this length a distance between the elements is nothing but rounding of their coordinates."""
+    return ROUNDINGS * float(np.finfo(float).eps) * max(side.extent for side in sides)
 
 
 def measure_contrast(coupling: Coupling, slave: Elements, master: Elements) -> tuple[float, float]:

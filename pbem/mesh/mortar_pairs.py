@@ -13,7 +13,6 @@ from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.mortar import LEAST_COVER, OVERLAP, Coupling, couple_curves, measure_contrast
 from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
-from pbem.model.rigid_body_modes import ROUNDINGS
 from pbem.model.sight import REACH
 
 Columns = dict[str, np.ndarray]
@@ -60,7 +59,7 @@ def pair_contact(
     behind = REACH * joint.overlap
     if joint.slave:
         slave, master = both if both[0].curve == joint.slave else both[::-1]
-        seen = couple_curves(slave.elements, master.elements, slave.local, others, behind)
+        seen = couple_curves(slave, master, others, behind)
     else:
         slave, master, seen = _choose_slave(both[0], both[1], others, behind)
     met = seen.cover > LEAST_COVER
@@ -96,9 +95,8 @@ def pair_contact(
         "second": slave_node if follows else nearest,
         "slave": slave_node,
         "sense": np.full(len(nodes), 1.0 if follows else -1.0),
-        "distance": np.where(
-            (distance if behind == 0 else np.abs(distance)) > _rounding(slave.elements, master.elements), distance, 0.0
-        ),
+        # Faces may overlap by the chords of curved sides.
+        "distance": np.maximum(distance, 0.0) if behind == 0 else distance,
     }
     return made, links
 
@@ -118,18 +116,18 @@ def _choose_slave(one: Chain, other: Chain, others: Elements, behind: float) -> 
     elements are so long that they lose much of the length over which the two face each other."""
     if one.rigid or other.rigid:  # a tool has no tractions of its own
         slave, master = (other, one) if one.rigid else (one, other)
-        return slave, master, couple_curves(slave.elements, master.elements, slave.local, others, behind)
-    seen = couple_curves(one.elements, other.elements, one.local, others, behind)
+        return slave, master, couple_curves(slave, master, others, behind)
+    seen = couple_curves(one, other, others, behind)
     worse, better = measure_contrast(seen, one.elements, other.elements)
     longer = one.elements.lengths.sum() > (1 + EQUAL) * other.elements.lengths.sum()
     if longer and 0 < max(worse, better) <= 1 + ALIKE:
         one, other = other, one
-        seen = couple_curves(one.elements, other.elements, one.local, others, behind)
+        seen = couple_curves(one, other, others, behind)
         worse, better = 1.0, 1.0
     chosen = (one, other, seen)
     if worse <= better * (1 + EQUAL) and 0 < seen.shared.sum() <= _carried(chosen) / MOST_CARRIED:
         return chosen
-    exchanged = (other, one, couple_curves(other.elements, one.elements, other.local, others, behind))
+    exchanged = (other, one, couple_curves(other, one, others, behind))
     coarser, finer = (chosen, exchanged) if worse <= better * (1 + EQUAL) else (exchanged, chosen)
     return finer if _carried(coarser) < MOST_CARRIED * _carried(finer) else coarser
 
@@ -167,7 +165,3 @@ def _place_on_first(slave: Chain, master: Chain, nodes: Integer, slave_first: bo
         "arc_length": along if master.forward else total - along,
     }
 
-
-def _rounding(*sides: Elements) -> float:
-    """Below this length a distance between the elements is nothing but rounding of their coordinates."""
-    return ROUNDINGS * float(np.finfo(float).eps) * max(side.extent for side in sides)

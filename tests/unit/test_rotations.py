@@ -64,6 +64,30 @@ def test_the_operator_of_a_rotation_is_zero(
         np.testing.assert_allclose(rows, 0.0, atol=limit * np.abs(u).max())
 
 
+@pytest.mark.parametrize("operator", ["dense", "hierarchical"])
+@pytest.mark.parametrize("scheme", ["SST", "DBEM", "HST"])
+def test_translations_leave_nothing_on_short_elements(
+    scheme: str, operator: Literal["dense", "hierarchical"]
+) -> None:
+    """Integrals over elements of 2e-6 of the radius are known to 1e-11, their sums to the rounding of sums."""
+    hole = "hole = {{ center = [0.1, 0.05], radius = 0.4, elements = 14 }}"
+    parts = "".join(
+        f"{name} = {{{{ center = [0.1, 0.05], radius = 0.4, angles = {angles}, elements = {count} }}}}\n"
+        for name, angles, count in (("hole", [70.0005, 430.0], 14), ("chip", [70.0, 70.0005], 4))
+    )
+    text = DISC.replace(hole, parts).replace('"hole"]', '"hole", "chip"]')
+    text = text.replace("[boundary]", 'chip = {{ law = "coulomb", friction = 0.2 }}\n[boundary]')
+    model = parse_model(text.format(shear=0.0, scheme=scheme, order=1))[1]
+    model = replace(model, solver=replace(model.solver, operator=operator))
+    problem = assemble_problem(model, generate_mesh(model), world)
+    mesh = problem.mesh
+    assert np.abs(mesh.end - mesh.start).min() < 1e-6
+    for direction in (1.0, 1j):
+        v = np.concatenate([np.where(mesh.node_region == 0, direction, 0.0), np.zeros(mesh.nodes)])
+        rows = problem.system.apply(np.stack([v.real, v.imag], axis=1).ravel())
+        np.testing.assert_allclose(rows, 0.0, atol=2e-13)
+
+
 @pytest.mark.parametrize(("order", "limit"), [(0, 1e-9), (1, 1e-2)])
 def test_a_disc_that_slides_in_its_hole_carries_no_moment(order: int, limit: float, tmp_path: Path) -> None:
     """Its mesh does not hold it: constant elements did, with a moment of 0.6 of the friction times the radius."""

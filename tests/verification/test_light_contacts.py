@@ -100,3 +100,24 @@ def test_an_untouched_disc_is_not_pressed(tmp_path: Path) -> None:
     """The lid goes up: nothing presses, and that is told."""
     results = pbem.run(_make(-1e-4), output=tmp_path / "disc.h5")
     assert abs(complex(*results.reactions["lid"][-1])) < 1e-12
+
+
+@pytest.mark.parametrize(("approach", "scheme", "operator", "unit", "turn"), [
+    (3e-4, "SST", "dense", 3e-7, 0.0), (2e-4, "SST", "hierarchical", 1.0, 0.7), (1e-3, "HST", "dense", 7e5, 0.7),
+])  # fmt: skip
+def test_the_same_pressures_elsewhere(
+    approach: float, scheme: str, operator: str, unit: float, turn: float, tmp_path: Path
+) -> None:
+    """On elements of 1e-5 of the radius, whose ends, gaps and sums over whole bodies are rounded otherwise: 1e-6 to
+    3e-5 of the largest pressure, if each place is rounded for itself."""
+    pressures = []
+    for name, case in (("here", _make(approach, elements=12, scheme=scheme)),
+                       ("there", _make(approach, unit, turn=turn, elements=12, scheme=scheme))):
+        case["solver"] = {"operator": operator, "newton_tolerance": 1e-10}
+        results = pbem.run(case, output=tmp_path / f"{name}.h5")
+        assert len(results.elements.vertices) > 100, "graded"
+        pressures.append([results.contact[contact].traction_n[-1] for contact in ("below", "above")])
+    # Linear equations of the hierarchical operator are solved to 1e-9 or so.
+    least = 1e-8 if operator == "dense" else 1e-7
+    for here, there in zip(*pressures, strict=True):
+        assert np.abs(there - here).max() < least * np.abs(here).max()

@@ -76,6 +76,9 @@ class Arc(Kind):
     def fraction(self, e: Shape, s: Any) -> Any:
         return 0.5 + 2 * np.arctan(_tangent(e) * s) / e.sweep
 
+    def carrier(self, e: Shape) -> tuple[Any, Any, Any]:
+        return e.center, 0j, abs(e.start - e.center)
+
     def walk(self, e: Shape, t: Any) -> Any:
         return e.center + (e.start - e.center) * np.exp(1j * e.sweep * t)
 

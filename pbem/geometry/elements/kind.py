@@ -116,6 +116,10 @@ class Kind(ABC):
         """t at s."""
 
     @abstractmethod
+    def carrier(self, e: Shape) -> tuple[Any, Any, Any]:
+        """What it is cut out of: of a line a point, the unit direction and 0, of a circle the centre, 0, the radius."""
+
+    @abstractmethod
     def walk(self, e: Shape, t: Any) -> Any:
         """Points at t, but for rounding at the ends."""
 

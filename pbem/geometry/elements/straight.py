@@ -55,6 +55,9 @@ class Straight(Kind):
     def fraction(self, e: Shape, s: Any) -> Any:
         return 0.5 * (1 + s)
 
+    def carrier(self, e: Shape) -> tuple[Any, Any, Any]:
+        return e.start, (e.end - e.start) / abs(e.end - e.start), 0.0
+
     def walk(self, e: Shape, t: Any) -> Any:
         return e.start + (e.end - e.start) * t
 

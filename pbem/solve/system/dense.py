@@ -63,7 +63,7 @@ class DenseSystem:
         offsets = share_nodes(costs, comm.size)
         first, last = int(offsets[comm.rank]), int(offsets[comm.rank + 1])
         needed = need_rotations(mesh, finite, find_needed_columns(model, mesh, outer))
-        operator = assemble_rows(mesh, materials, first, last, needed, model.size)
+        operator = assemble_rows(mesh, materials, first, last, needed, model.size, finite)
         free_rotations(operator, find_rigid_motions(mesh, finite, needed), 4 * mesh.nodes)
         for anchor in anchors:
             add_anchor(operator, mesh, anchor.region, anchor.nodes, anchor.pattern, anchor.functional)

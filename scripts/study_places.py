@@ -91,6 +91,8 @@ STIFFNESSES = {"kn", "ks", "kx", "ky", "normal_stiffness", "tangential_stiffness
 ENERGIES = {"fracture_energy", "fracture_energy_shear"}
 # What changes its sign in a mirror.
 HANDED = {"us", "ts", "end_s", "moment", "rotation"}
+# What varies and is seen to by what it belongs to.
+MOVED_LATER = {"gap", "sxx", "syy", "sxy", "ux", "uy", "un", "us", "tx", "ty", "fx", "fy"}
 # What stages leave out stays as it was.
 KEPT = {"ux", "uy", "tx", "ty", "fx", "fy"}
 
@@ -140,10 +142,10 @@ def _scale(value: Any, move: Move, size: float) -> Any:
         unit = _find_unit(key, move)
         if unit is not None and isinstance(each, int | float) and not isinstance(each, bool):
             result[key] = each * unit
-        elif unit is not None and isinstance(each, dict) and "table" in each:
-            result[key] = {"table": [[s * move.length, value * unit] for s, value in each["table"]]}
-        elif unit is not None and isinstance(each, dict) and "expression" in each:
-            result[key] = {"expression": f"{unit!r}*({_move_back(each['expression'], move, size)})"}
+        elif isinstance(each, dict) and "table" in each and key not in MOVED_LATER:
+            result[key] = {"table": [[s * move.length, value * (unit or 1.0)] for s, value in each["table"]]}
+        elif isinstance(each, dict) and isinstance(each.get("expression"), str) and key not in MOVED_LATER:
+            result[key] = {"expression": f"{unit or 1.0!r}*({_move_back(each['expression'], move, size)})"}
         else:
             result[key] = _scale(each, move, size)
     return result

@@ -18,6 +18,9 @@ from pbem.results.tail import DamageError, find_unapplied
 # What h5py and NumPy raise when a file holds other kinds of things than it should.
 DAMAGE = (KeyError, ValueError, RuntimeError, TypeError, AttributeError, IndexError, MemoryError, OverflowError)
 
+# What HDF5 says of a file that this process has open already, with other locks than are asked for now.
+OTHER_LOCKS = "file locking flag values don't match"
+
 
 @contextmanager
 def open_quietly(path: Path) -> Iterator[h5py.File]:
@@ -38,6 +41,20 @@ def has_journal(path: Path) -> bool:
         os.close(disk)
 
 
+def open_unlocked(path: Path) -> h5py.File:
+    """A file to be read, without locks, unless this process has it open with them: HDF5 then asks for the same again.
+
+    Raises OSError where it cannot be read.
+    """
+    for locking in (False, None, True):
+        try:
+            return h5py.File(path, "r", locking=locking)
+        except OSError as error:
+            if OTHER_LOCKS not in str(error):
+                raise
+    return h5py.File(path, "r", locking="best-effort")
+
+
 @contextmanager
 def _open(path: Path) -> Iterator[h5py.File]:
     disk = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
@@ -46,7 +63,7 @@ def _open(path: Path) -> Iterator[h5py.File]:
     finally:
         os.close(disk)
     if tail is None:
-        with h5py.File(path, "r", locking=False) as file:
+        with open_unlocked(path) as file:
             yield file
         return
     # Its run was killed while it wrote the pages of its journal to their places.

@@ -12,6 +12,7 @@ import h5py
 from pbem.errors import ResultFileError
 from pbem.results.free_lists import empty_free_lists
 from pbem.results.journal import JournaledFile, lock
+from pbem.results.opening import open_unlocked
 from pbem.results.trial import try_reading
 
 # The 1.8 format stores long lists of names. Only views need more; a file that is all of the 1.10 format could not be
@@ -51,7 +52,7 @@ class Store:
 
     def _open(self) -> h5py.File:
         # What HDF5 itself refuses ends badly in h5py when the file is not a path: it is tried as one before.
-        h5py.File(self.path, "r", locking=False).close()
+        open_unlocked(self.path).close()
         return h5py.File(self._journal, "r+", libver=VERSIONS)
 
     @property

@@ -149,6 +149,19 @@ def test_a_running_file_can_be_read_while_it_grows(tmp_path: Path) -> None:
     assert open_results(tmp_path / "a.h5").status == "finished"
 
 
+@pytest.mark.parametrize("locking", [None, True, False, "best-effort"])
+def test_a_file_that_this_process_has_open_otherwise_is_read(tmp_path: Path, locking: bool | str | None) -> None:
+    """HDF5 refuses a file that it has open with other locks; that was told as if the file were no HDF5 file."""
+    path = tmp_path / "a.h5"
+    write(path).finish()
+    with h5py.File(path, "r", locking=locking) as file:
+        results = open_results(path)
+        assert np.array_equal(results.displacement, file["fields/displacement"][()])
+    results = open_results(path)
+    with h5py.File(path, "r", locking=locking) as file:
+        assert np.array_equal(results.traction, file["fields/traction"][()])
+
+
 def test_nothing_but_the_result_file_is_left_behind(tmp_path: Path) -> None:
     write(tmp_path / "a.h5").finish()
     assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]

@@ -65,7 +65,6 @@ class Store:
         """Bring what was written to the disk. Raises OSError if there is no room; the file is then as before."""
         self.file.flush()
         self._journal.commit()
-        empty_free_lists()
 
     def roll_back(self) -> None:
         """Forget what was written since the last commit."""

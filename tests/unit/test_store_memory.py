@@ -5,13 +5,15 @@ from __future__ import annotations
 import ctypes
 import errno
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-from pbem.results import journal
+from pbem.results import free_lists, journal
 from pbem.results.store import Store, create_store
 from pbem.results.tail import PAGE
 from pbem.results.views import create_array, create_group
@@ -57,6 +59,37 @@ def test_hdf5_keeps_nothing_for_objects_to_come(tmp_path: Path) -> None:
     store = create_store(tmp_path / "a.h5", False, fill_groups)
     assert count_kept() < 0.5 * plain  # some belongs to the file that is open
     store.close()
+    expect_groups(tmp_path / "a.h5")
+
+
+def test_nothing_is_left_to_free_after_a_commit(tmp_path: Path) -> None:
+    """What HDF5 keeps then is of the open file, which is why the lists are emptied after the header alone."""
+    store = create_store(tmp_path / "a.h5", False, fill_groups)
+    for step in range(3):
+        for number in range(0, GROUPS, 3):
+            store.file[f"g{number}"].create_dataset(f"s{step}", data=np.arange(6.0))
+        store.commit()
+    before = count_kept()
+    assert free_lists.empty_free_lists()
+    assert count_kept() > 0.7 * before
+    store.close()
+
+
+@pytest.mark.parametrize("missing", ["_objects", "h5f"])
+def test_files_are_written_without_h5pys_inner_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str
+) -> None:
+    own = SimpleNamespace(h5f=h5py.h5f, _objects=SimpleNamespace(phil=nullcontext()))
+    delattr(own, missing)
+    monkeypatch.setattr(free_lists, "h5py", own)
+    free_lists._find_collector.cache_clear()
+    try:
+        assert not free_lists.empty_free_lists()
+        store = create_store(tmp_path / "a.h5", False, fill_groups)
+        store.commit()
+        store.close()
+    finally:
+        free_lists._find_collector.cache_clear()
     expect_groups(tmp_path / "a.h5")
 
 

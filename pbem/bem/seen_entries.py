@@ -36,7 +36,8 @@ class SeenEntries:
 
     def list_entries(self) -> Integer:
         """Their numbers in v (k,)."""
-        return self.take(np.arange(2 * self.width * self.all_elements))
+        one = (self.width * self.elements[:, None] + np.arange(self.width)).ravel()
+        return np.concatenate([one, one + self.width * self.all_elements])
 
     def take(self, v: NDArray[Scalar]) -> NDArray[Scalar]:
         """These entries of v (4 nodes,)."""

@@ -16,6 +16,7 @@ from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, s
 from pbem.contact.loads import Load
 from pbem.contact.modes import linearise
 from pbem.errors import ConvergenceError
+from pbem.heap import give_back
 from pbem.parallel import StopSignals, do_on_first
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.launch.watch import Watch
@@ -68,8 +69,21 @@ class SecondSolution:
         """The same load step on the coarser mesh, from its own memory, begun with the run's modes.
 
         Raises ConvergenceError; the next step then starts from the run's memory, carried over. Raises LawError where a
-        custom law fails with what it is asked here; there is no further step then.
+        custom law fails with what it is asked here; there is no further step then. With the run's last step the storage
+        is freed, before what the steps differ by is measured and written.
         """
+        last = step.stage == len(self.beside.model.stages) - 1 and step.factor >= 1.0
+        try:
+            found = self._follow(step)
+        except ConvergenceError:  # of other exceptions one rank alone may know
+            if last:
+                self.destroy()
+            raise
+        if last:
+            self.destroy()
+        return found
+
+    def _follow(self, step: Step) -> Step:
         if not self._ready:
             self._prepare()
         if step.stage != self._stage:
@@ -159,6 +173,13 @@ class SecondSolution:
         )
 
     def destroy(self) -> None:
-        """Free the storage; after an exception of one rank it is not called."""
-        if self._ready:
-            self._arranged.leave()
+        """Free the storage, but of what is kept; after an exception of one rank it is not called."""
+        if not self._ready:
+            return
+        self._arranged.leave()
+        if self._kept is None:
+            self.problem.system.free_products()
+        for name in ("problem", "_whole", "_arranged", "tangent"):
+            vars(self).pop(name, None)
+        self._ready = False
+        give_back()

@@ -138,6 +138,7 @@ def march(
                     reporter.accept(step)
                 if reached >= 1.0 and stage == len(whole.model.stages) - 1:
                     arranged.leave()
+                    del tangent  # it holds maps and factors' shapes even so, while the step is judged and written
                 yield step
     except (ConvergenceError, GeneratorExit):
         # Not after other exceptions: one rank alone would wait here for the others, which takes all of them.

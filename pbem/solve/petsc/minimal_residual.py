@@ -10,7 +10,7 @@ operator, so that a system that was solved loosely is solved in full by going on
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 import numpy as np
@@ -25,7 +25,7 @@ from pbem.solve.petsc.session import PETSc
 FELL = 0.9
 # A product that is the same as a sum of those before, but for this part, adds nothing.
 NOTHING = 1e-14
-# Columns by which the stored basis grows.
+# Vectors of the stored basis in an array. It grows by arrays: a larger one beside the former would take twice as much.
 GROWTH = 32
 
 
@@ -49,6 +49,43 @@ class Rows(Protocol):
         """1 for equations whose residuals are minimised, 0 for those that are fulfilled afterwards."""
 
 
+class Columns:
+    """Vectors (k,) one after the other, as the columns of a matrix."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._blocks: list[Real] = []
+
+    def append(self, vector: Real) -> None:
+        """One further column."""
+        if self.count == GROWTH * len(self._blocks):
+            self._blocks.append(np.empty((len(vector), GROWTH), order="F"))
+        self._blocks[-1][:, self.count % GROWTH] = vector
+        self.count += 1
+
+    @property
+    def last(self) -> Real:
+        """The last column."""
+        column: Real = self._blocks[-1][:, (self.count - 1) % GROWTH]
+        return column
+
+    def _parts(self) -> Iterator[tuple[slice, Real]]:
+        for begin, block in zip(range(0, self.count, GROWTH), self._blocks, strict=True):
+            end = min(begin + GROWTH, self.count)
+            yield slice(begin, end), block[:, : end - begin]
+
+    def dot(self, vector: Real) -> Real:
+        """Products (count,) of all columns with a vector."""
+        return np.concatenate([np.zeros(0), *(part.T @ vector for _, part in self._parts())])
+
+    def add_up(self, shares: Real, rows: int) -> Real:
+        """The sum (rows,) of so much of each column."""
+        result = np.zeros(rows)
+        for own, part in self._parts():
+            result += part @ shares[own]
+        return result
+
+
 class MinimalResidual:
     """See the module; the context of a PETSc KSP of type "python".
 
@@ -66,9 +103,12 @@ class MinimalResidual:
 
     def forget(self) -> None:
         """Drop all directions, as those of another operator."""
-        self._count = 0
-        self._directions = self._products = np.zeros((0, 0))
+        self._directions, self._products = Columns(), Columns()
         self._factor = np.zeros((0, 0))
+
+    @property
+    def _count(self) -> int:
+        return self._products.count
 
     def solve(self, solver: PETSc.KSP, right: PETSc.Vec, left: PETSc.Vec) -> None:
         """What PETSc asks of a Krylov method; begins at zero (theory, 87)."""
@@ -78,19 +118,19 @@ class MinimalResidual:
             self.forget()
         shares, first = np.zeros(self._count), self._measure(residual)
         for _ in range(2 if self._count else 0):  # the first leaves rounding of the largest vectors
-            share = self._dot(self._basis, judged * residual)
-            residual = residual - self._basis @ share
+            share = add_up(self._comm, self._products.dot(judged * residual))
+            residual = residual - self._products.add_up(share, len(residual))
             shares += share
         norm, before, number = self._measure(residual), np.inf, 0
         reason = _ask(solver, 0, norm, first)
         while not reason:
             from_residual = norm <= FELL * before or not self._count
-            given = residual if from_residual else judged * self._products[:, self._count - 1]
+            given = residual if from_residual else judged * self._products.last
             if not self._add(self._rows.turn_back(given)):
                 reason = PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
                 break
-            last = self._products[:, self._count - 1]
-            share = self._dot(last[:, None], judged * residual)
+            last = self._products.last
+            share = add_up(self._comm, np.array([last @ (judged * residual)]))
             residual = residual - share[0] * last
             shares = np.append(shares, share)
             before, norm, number = norm, self._measure(residual), number + 1
@@ -103,15 +143,8 @@ class MinimalResidual:
             self.forget()
             shares, residual = np.zeros(0), begun
         parts = solve_triangular(self._factor[: self._count, : self._count], shares) if self._count else shares
-        left.setArray(self._directions[:, : self._count] @ parts if self._count else np.zeros(len(residual)))
+        left.setArray(self._directions.add_up(parts, len(residual)))
         self.residual = self._rows.turn_back(residual)
-
-    @property
-    def _basis(self) -> Real:
-        return self._products[:, : self._count]
-
-    def _dot(self, vectors: Real, judged: Real) -> Real:
-        return add_up(self._comm, np.asarray(vectors.T @ judged))
 
     def _measure(self, residual: Real) -> float:
         return norm_of_parts(self._comm, self._rows.judged * residual)
@@ -123,28 +156,21 @@ class MinimalResidual:
         judged, whole = self._rows.judged, self._measure(product)
         factor = np.zeros(self._count + 1)
         for _ in range(2):
-            share = self._dot(self._basis, judged * product) if self._count else np.zeros(0)
-            product = product - self._basis @ share if self._count else product
+            share = add_up(self._comm, self._products.dot(judged * product)) if self._count else np.zeros(0)
+            product = product - self._products.add_up(share, len(product))
             factor[:-1] += share
         factor[-1] = self._measure(product)
         if not factor[-1] > NOTHING * whole:
             return False
-        self._make_room(len(direction))
-        self._directions[:, self._count] = direction
-        self._products[:, self._count] = product / factor[-1]
+        room = self._factor.shape[1]
+        if self._count == room:
+            wider = np.zeros((room + GROWTH, room + GROWTH))
+            wider[:room, :room] = self._factor
+            self._factor = wider
         self._factor[: len(factor), self._count] = factor
-        self._count += 1
+        self._directions.append(direction)
+        self._products.append(product / factor[-1])
         return True
-
-    def _make_room(self, rows: int) -> None:
-        if self._count < self._factor.shape[1]:
-            return
-        room = self._count + GROWTH
-        for name, size in (("_directions", rows), ("_products", rows), ("_factor", room)):
-            wider = np.zeros((size, room), order="F")
-            old = getattr(self, name)
-            wider[: old.shape[0], : self._count] = old[:, : self._count]
-            setattr(self, name, wider)
 
 
 def _ask(solver: PETSc.KSP, number: int, norm: float, first: float) -> int:

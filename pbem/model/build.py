@@ -55,6 +55,7 @@ from pbem.model.rigid_body_modes import (
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
+from pbem.model.steep_loads import shorten_under_loads
 from pbem.model.support_motions import check_independent
 from pbem.model.tools import check_tools, divide_tools, make_tool_regions, orient_tools
 from pbem.model.varying import Varying
@@ -248,10 +249,10 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
     tools = make_tool_regions(case, curves, loading.rigid.bodies, topology.loops)
     jointed = frozenset(loading.interfaces) | frozenset(roles.in_contact)
     loads = tuple(topology.points.loads.values())
-    fitted = recall.find(
+    fitted = shorten_under_loads(case, recall.find(
         "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts, loads),
         lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts, loads),
-    )
+    ))
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",
         regions=(*regions, *tools), curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,

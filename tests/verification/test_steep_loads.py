@@ -1,0 +1,102 @@
+"""Smooth loads that are narrower than the elements that were asked for: their resultants, and what the user is told."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import pbem
+from pbem.model import steep_loads
+from pbem.solve.problem.step import SilentReporter
+
+Tables = dict[str, Any]
+
+
+class Notes(SilentReporter):
+    """Keeps them."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.texts.append(text)
+
+
+def write_gauss(middle: float, width: float, unit: float, factor: str = "1") -> Tables:
+    return {"expression": f"{factor} * exp(-((x - {middle * unit}) / {width * unit})**2)"}
+
+
+def press_block(load: Tables, order: int, elements: int, unit: float = 1.0, **curve: Any) -> Tables:
+    """A block on its lower side, 4 by 2, under a pressure on its upper one."""
+    corners = [[0.0, 0.0], [4 * unit, 0.0], [4 * unit, 2 * unit], [0.0, 2 * unit]]
+    curves: Tables = {side: {"points": [corners[k], corners[(k + 1) % 4]], "elements": elements}
+                      for k, side in enumerate("brtl")}
+    curves["t"] |= curve
+    return {"materials": {"m": {"young": 1e3, "poisson": 0.3}}, "curves": curves,
+            "regions": {"r": {"material": "m", "boundary": list(curves)}},
+            "boundary": {"b": {"ux": 0.0, "uy": 0.0}, "t": {"pressure": load}},
+            "analysis": {"steps": 1, "order": order}}  # fmt: skip
+
+
+def integrate(middle: float, width: float) -> float:
+    """From 0 to 4."""
+    return 0.5 * math.sqrt(math.pi) * width * (math.erf((4 - middle) / width) + math.erf(middle / width))
+
+
+@pytest.mark.parametrize(("middle", "width", "order", "elements", "unit"), [
+    (1.7, 0.1, 2, 8, 1.0), (2.03, 0.1, 1, 8, 1e3), (1.234, 0.02, 2, 8, 1e-3), (2.0, 0.3, 3, 8, 1.0),
+    (2.9, 0.1, 2, 1, 1.0), (0.0, 0.05, 2, 4, 1.0), (3.3, 0.7, 1, 5, 1.0),
+])  # fmt: skip
+def test_the_resultant_of_a_narrow_load(
+    middle: float, width: float, order: int, elements: int, unit: float, tmp_path: Path
+) -> None:
+    """On the elements that are asked for it was 2 to 100 % off."""
+    case = press_block(write_gauss(middle, width, unit), order, elements, unit)
+    results = pbem.run(pbem.Case(**case), tmp_path / "block.h5")
+    found = results.reactions["b"][-1, 1] / unit
+    assert found == pytest.approx(integrate(middle, width), rel=0.2 * steep_loads.TOLERANCE)
+
+
+def test_a_load_that_grows_and_moves_with_time(tmp_path: Path) -> None:
+    load = {"expression": "t * exp(-((x - 1 - 2 * t) / 0.1)**2)"}
+    results = pbem.run(pbem.Case(**press_block(load, 2, 8) | {"analysis": {"steps": 2}}), tmp_path / "block.h5")
+    assert results.reactions["b"][:, 1] == pytest.approx(
+        [0.5 * integrate(2.0, 0.1), integrate(3.0, 0.1)], rel=0.2 * steep_loads.TOLERANCE)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_K_under_a_fluid_on_a_short_part_of_a_crack(order: int, tmp_path: Path) -> None:
+    """By the weight function of Griffith's crack."""
+    case: Tables = {
+        "materials": {"m": {"young": 1e3, "poisson": 0.3}},
+        "curves": {"c": {"points": [[-1.0, 0.0], [1.0, 0.0]], "elements": 8}},
+        "regions": {"r": {"material": "m", "infinite": True, "cracks": ["c"]}},
+        "interfaces": {"c": {"law": "open", "pressure": write_gauss(0.3, 0.04, 1.0)}},
+        "analysis": {"steps": 1, "order": order},
+    }
+    results = pbem.run(pbem.Case(**case), tmp_path / "crack.h5")
+    found = np.sort(np.asarray(results.tips["c"].KI)[-1])
+    exact = [quad(lambda x, s=s: math.exp(-(((x - 0.3) / 0.04) ** 2)) * math.sqrt((1 + s * x) / (1 - s * x)),
+                  0.1, 0.5)[0] / math.sqrt(math.pi) for s in (-1, 1)]  # fmt: skip
+    assert found == pytest.approx(exact, rel=0.02)
+
+
+def test_what_is_left_as_it_is_is_told(tmp_path: Path) -> None:
+    """A grading of the user's; a curve that would get too many elements; neither where the elements are good."""
+
+    def list_notes(load: Tables, **curve: Any) -> list[str]:
+        notes = Notes()
+        pbem.run(pbem.Case(**press_block(load, 2, 8, **curve)), tmp_path / "b.h5", force=True, reporter=notes)
+        return [text for text in notes.texts if "oad varies" in text or "oads vary" in text]
+
+    narrow, wild = write_gauss(1.7, 0.2, 1.0), {"expression": "1 + sin(400 * x)"}
+    assert [text[:50] for text in list_notes(narrow)] == ["Elements added where a load varies within one: 't'"]
+    for load, curve in ((narrow, {"grading": "none"}), (wild, {})):
+        told, = list_notes(load, **curve)
+        assert told.startswith("Loads vary within elements by more than these can follow") and "'t' by " in told
+    assert not list_notes({"expression": "x**2 + 3 * x + sin(x)"}) and not list_notes(write_gauss(2.0, 2.0, 1.0))

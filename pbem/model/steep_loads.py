@@ -6,6 +6,7 @@ than an element has another resultant: a Gauss load of width 0.1 on elements of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +17,8 @@ from pbem.description.case import Case
 from pbem.geometry.curve import Curve, Leg
 from pbem.model.fitting import FittedCurves
 from pbem.model.given import read_value
-from pbem.model.kinks import list_varying
 from pbem.model.lengths import count_elements
+from pbem.model.loads_along import ENDS, list_given
 from pbem.model.touching import place_on_leg
 from pbem.model.varying import Varying
 from pbem.wording import list_names
@@ -25,8 +26,6 @@ from pbem.wording import list_names
 # Parts of the largest value of a load on its curve by which it may differ from its polynomial on an element. Errors of
 # what is far away are far smaller, as they depend on the mean of the difference.
 TOLERANCE = 0.05
-# Of these keys of a condition and of the faces of an interface.
-LOADS = frozenset(("ux", "uy", "un", "us", "tx", "ty", "tn", "ts", "pressure"))
 # Parts in which an element is looked at.
 PARTS = 64
 # Elements are halved so often at most, and a curve gets so many times its elements, and so many more, at most.
@@ -42,11 +41,11 @@ def shorten_under_loads(case: Case, fitted: FittedCurves) -> FittedCurves:
     too many elements: the user is told of both. Constant elements are left alone: nothing follows a slope there."""
     curves = fitted.curves
     given: dict[str, list[_Shape]] = {}
-    times = _list_times(case)
-    for loc, name, table in list_varying(case) if case.analysis.order else ():
-        value = read_value(loc, table, timed=True)[0] if loc[-1] in LOADS else None
+    for loc, name, table, stages in list_given(case) if case.analysis.order else ():
+        value = read_value(loc, table, timed=True)[0] if loc[-1] not in ENDS else None
         if isinstance(value, Varying) and name in curves:
-            given.setdefault(name, []).extend(_Shape(value, time) for time in (times if value.timed else times[:1]))
+            times = _list_times(case, stages) if value.timed else [0.0]
+            given.setdefault(name, []).extend(_Shape(value, time) for time in times)
     found, left, notes = dict(curves), {}, []
     for name, values in given.items():
         curve = curves[name]
@@ -82,11 +81,11 @@ class _Shape:
         return np.broadcast_to(found, fractions.size).reshape(fractions.shape)
 
 
-def _list_times(case: Case) -> list[float]:
-    """Times in and at the end of stages, of many stages some; stages without durations take 1 each."""
+def _list_times(case: Case, stages: Sequence[int]) -> list[float]:
+    """Times in the middle and at the end of stages, of many some; stages without durations take 1 each."""
     durations = [stage.duration or 1.0 for stage in case.stages] or [1.0]
     ends = np.cumsum(durations)
-    chosen = np.unique(np.linspace(0, len(ends) - 1, min(len(ends), MOST_STAGES)).round().astype(int))
+    chosen = stages[:: max(1, len(stages) // MOST_STAGES)]
     return [float(ends[k] - part * durations[k]) for k in chosen for part in (0.0, 0.5)]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -157,6 +158,34 @@ def test_faces_that_accompany_a_crack_leave_arms_and_a_small_hole_beside_it_leav
         "remote": {"syy": 1.0}, "interfaces": {"split": {"law": "open"}}, "analysis": {"steps": 1, "order": 1},
     })  # fmt: skip
     assert any("bend them too much" in note and "split" in note for note in notes) == told
+
+
+def make_bar(points: list[list[float]], order: int, infinite: bool = False) -> Tables:
+    """A closed polyline around a body, or around a slot in a plane."""
+    names = [f"side{k}" for k in range(4)]
+    region = {"material": "m", "boundary": names} | ({"infinite": True} if infinite else {})
+    return {"materials": {"m": {"young": 1e4, "poisson": 0.3}},
+            "curves": {name: {"points": [points[k], points[(k + 1) % 4]], "elements": 8}
+                       for k, name in enumerate(names)},
+            "regions": {"r": region}, "boundary": {} if infinite else {"side3": {"ux": 0.0, "uy": 0.0}},
+            "analysis": {"steps": 1, "order": order}}  # fmt: skip
+
+
+@pytest.mark.parametrize(("thick", "order", "infinite", "told"), [
+    (0.2, 1, False, True), (0.2, 2, False, False), (1.0, 1, False, False), (0.2, 1, True, False),
+])  # fmt: skip
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_thin_bodies_of_linear_elements_are_told(
+    thick: float, order: int, infinite: bool, told: bool, reverse: bool, unit: float
+) -> None:
+    """But no slot as thin."""
+    points = [[0.0, 0.0], [4 * unit, 0.3 * unit], [4 * unit, (0.3 + thick) * unit], [0.0, thick * unit]]
+    if reverse:
+        points = [points[k] for k in (1, 0, 3, 2)]
+    notes = describe_model_notes(make_bar(points, order, infinite))
+    found, = [set(re.findall(r"'(side.)'", note)) for note in notes if "too stiff" in note] or [set()]
+    assert found == ({"side0", "side2"} if told else set())
 
 
 def test_point_loads_that_add_elements_are_named() -> None:

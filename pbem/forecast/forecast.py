@@ -77,6 +77,10 @@ class Forecast:
         }  # fmt: skip
 
 
+# What a hierarchical run frees with its last step.
+OPERATORS = ("operator", "preconditioner", SETTLING)
+
+
 def make_forecast(
     model: Model, mesh: Mesh, ranks: int, timed: bool = True, cores: float | None = None
 ) -> Forecast:
@@ -97,8 +101,8 @@ def make_forecast(
     if second is not None:
         used = list_memory(second, ranks, 0.0, size.steps)
         most = sum(each for name, each in used.items() if name not in (BESIDE, SETTLING))
-        # It begins from statuses that are settled; of a run of one step it comes after the run's own groups have gone.
-        gone = memory.get(SETTLING, 0.0) if size.steps == 1 else 0.0
+        # It begins from statuses that are settled; of a run of one step it comes after the run's own storage has gone.
+        gone = sum(memory.get(name, 0.0) for name in OPERATORS) if work.hierarchical and size.steps == 1 else 0.0
         memory["second solution, for the estimate"] = max(most - gone, 0.0)
     speed = measure_speed(model, mesh) if timed else None
     seconds: dict[str, float] = {}

@@ -23,7 +23,7 @@ from pbem.model.model import Model
 # the dense and with the hierarchical operator, of one step and of several, between which directions are kept.
 STARTED, EVERYWHERE, EVERYWHERE_FAR, EVERYWHERE_FAR_STEPS = 142e6, 2300.0, 850.0, 1280.0
 # With the hierarchical operator, of which all else is small: what the first rank has beside, and for each unknown.
-FIRST, FIRST_UNKNOWN, BESIDE = 17e6, 1200.0, "case, file, or groups while they are formed"
+FIRST, FIRST_UNKNOWN, BESIDE = 17e6, 300.0, "case, file, or groups while they are formed"
 # What a network's parts keep to settle by themselves (see pbem.solve.tangent.sweeps).
 SETTLING = "groups of cracks that settle"
 # Columns that are formed and solved for at a time (see pbem.solve.tangent), how many copies of them there are where no

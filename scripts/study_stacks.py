@@ -8,8 +8,9 @@ elements, and how far the force is from that without gaps and pressed by as much
 Without its gaps a wedge touches two jaws that were moved towards it along the normals of their faces: normals and
 partners of faces are those of the bodies as given, whereas a wedge that slides home meets other points of the jaws, by
 1.4 times the gap, and its force differs by about 1.5 times the gap (`slid`, for comparison). What is left over is a
-sum with signs, which can pass through zero between two meshes: where twice the elements leave more, four times as many
-have to leave less than a half of that.
+sum with signs, which can pass through zero between two meshes: where twice the elements leave more, eight times as many
+have to leave FALLS of what four times as many do. (Traction equations leave as much as element lengths to the power of
+0.7 to 0.9: the stress at held or pressed corners is infinite.)
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ KINDS = ("stack", "grains", "wedge", "pin")
 SCHEMES = ("SST", "DBEM", "HST", "THST")
 # Parts of the force that may be left over, and by which it may differ.
 LEFT_OVER, OFF = 1e-3, 1e-2
-# What four times the elements may leave of what twice as many do, where these leave more than the given mesh.
-HALVED = 0.5
+# What eight times the elements may leave of what four times as many do, where twice as many leave more than the given
+# mesh: more than half a power of the length.
+FALLS = 0.7
 HALF_ANGLE = math.radians(35)
-COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "finest", "off", "slid", "error")
+COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "fourfold", "finest", "off", "slid", "error")
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Text:
         self.lines = [
             "materials.a = { young = 1000.0, poisson = 0.2 }",
             f"materials.b = {{ young = {1000 * sample.stiffness!r}, poisson = 0.3 }}",
-            f'analysis = {{ steps = 1, scheme = "{sample.scheme}" }}',
+            "analysis.steps = 1", f'analysis.scheme = "{sample.scheme}"',
         ]
 
     def add_body(self, name: str, corners: list[complex], material: str, elements: int) -> None:
@@ -186,10 +188,12 @@ def _write_pin(sample: Sample, text: Text, gap: float, elements: int, contact: s
              f"elements = {2 * elements} }}",
              f"curves.x = {{ center = {at[1]}, radius = {radius!r}, angles = [0, 180], elements = {2 * elements} }}",
              f"curves.y = {{ center = {at[1]}, radius = {radius!r}, angles = [180, 360], elements = {2 * elements} }}",
-             f"curves.z = {{ center = {at[1]}, radius = 0.1, elements = 16 }}",
+             f"curves.z = {{ center = {at[1]}, radius = 0.1, elements = {16 * elements // sample.elements} }}",
              'regions.q = { material = "b", boundary = ["x", "y", "z"] }',
              'contacts.k = { between = ["x", "u"], ' + contact + " }",
              'contacts.l = { between = ["y", "v"], ' + contact + " }",
+             # Also where twice the elements are too many for ends of contact to be graded without being asked.
+             "analysis.grade_contact_ends = true",
              "boundary.p0 = { ux = 0.0, uy = 0.0 }",
              f"boundary.z = {{ ux = 0.0, uy = {-(radius * gap + sample.approach)!r} }}")
     text.lines = [line.replace('["p0", "p1", "p2", "p3"]', '["p0", "p1", "p2", "p3", "u", "v"]') for line in text.lines]
@@ -218,7 +222,10 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
 
             row["left"], force = run(sample.elements, False)
             row["finer"] = run(2 * sample.elements, False)[0] if operator == "dense" else math.nan
-            row["finest"] = run(4 * sample.elements, False)[0] if leaves_more(row) else math.nan
+            row["fourfold"], row["finest"] = (
+                run(times * sample.elements, False, "hierarchical")[0] if leaves_more(row) else math.nan
+                for times in (4, 8)
+            )
             row["off"] = math.nan
             if sample.kind != "pin":
                 expected = run(sample.elements, True)[1]
@@ -243,7 +250,7 @@ def is_wrong(row: dict[str, Any]) -> bool:
     """Whether a run failed, is out of balance, does not come closer to it or has another force."""
     if "error" in row or row["left"] > LEFT_OVER or row["off"] > OFF:
         return True
-    return leaves_more(row) and not row["finest"] < HALVED * row["finer"]
+    return leaves_more(row) and not row["finest"] < FALLS * row["fourfold"]
 
 
 def describe(row: dict[str, Any]) -> str:
@@ -253,7 +260,7 @@ def describe(row: dict[str, Any]) -> str:
     if "slid" in row:
         found += ", slid {slid:.1e}".format(**row)
     if row.get("finest", math.nan) > 0:
-        found += ", finest {finest:.1e}".format(**row)
+        found += ", fourfold {fourfold:.1e}, finest {finest:.1e}".format(**row)
     return drawn + found + ("  WRONG" if is_wrong(row) else "")
 
 

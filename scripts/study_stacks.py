@@ -39,7 +39,8 @@ LEFT_OVER, OFF = 1e-3, 1e-2
 # mesh: more than half a power of the length.
 FALLS = 0.7
 HALF_ANGLE = math.radians(35)
-COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "fourfold", "finest", "off", "slid", "error")
+COLUMNS = ("seed", "kind", "scheme", "operator", "gap", "friction", "left", "finer", "fourfold",
+           "finest", "off", "slid", "error")
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,9 @@ each pair. Statuses, iterations, steps and the reason of an end must be the same
 displacements and tractions is told. Models are those of scripts/torture.py of up to --nodes nodes. Exit code 1 if any
 pair differs or does not end. Every third model takes the hierarchical operator, the others the one that the program
 chooses.
+
+With --libraries each model is run on one rank, in a process whose NumPy and BLAS take their own instructions, and again
+in one where they take those of an old processor; the kernels are the same.
 """
 
 from __future__ import annotations
@@ -31,6 +34,11 @@ ROOT = Path(__file__).resolve().parent.parent
 COMPILED = {"_kernels": ("rows",), "_expansions": ("expansion", "near")}
 # Other instructions, another order of sums, no vector functions: the last bits differ in most entries.
 OTHER_FLAGS = "-O1 -mno-avx -mno-avx2 -mno-fma"
+# The environment in which NumPy and OpenBLAS take other instructions.
+OTHER_LIBRARIES = {
+    "OPENBLAS_CORETYPE": "Nehalem",
+    "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL",
+}
 Found = dict[str, Any]
 
 
@@ -43,7 +51,14 @@ def main() -> int:
     parser.add_argument("--records", type=Path, help="a line for each pair is added; pairs that are there are not run")
     parser.add_argument("--timeout", type=float, default=600.0, help="seconds for a pair")
     parser.add_argument("--worker", nargs=2, metavar=("FOLDER", "RECORDS"), help=argparse.SUPPRESS)
+    parser.add_argument("--libraries", action="store_true", help="other instructions of NumPy and BLAS, on one rank")
+    parser.add_argument("--alone", type=Path, metavar="FOLDER", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.alone:
+        run_alone(options.alone, options.first, options.count, options.nodes)
+        return 0
+    if options.libraries:
+        return compare_libraries(options)
     if options.worker:
         work(Path(options.worker[0]), Path(options.worker[1]), options.first, options.count, options.nodes)
         return 0
@@ -79,7 +94,11 @@ def launch_all(others: Path, records: Path, options: argparse.Namespace) -> int:
             with records.open("a") as file:
                 file.write(json.dumps({"seed": first, "equal": False, "differs": [text]}) + "\n")
             done, first = read_records(records), first + 1
-    pairs = [each for each in done if "equal" in each]
+    return report([each for each in done if "equal" in each])
+
+
+def report(pairs: list[Found]) -> int:
+    """Print what differs, and the sum of it; the exit code."""
     for each in pairs:
         if not each["equal"]:
             print(each)
@@ -172,6 +191,47 @@ def work(others: Path, records: Path, first: int, count: int, most_nodes: int) -
                     file.write(json.dumps(found) + "\n")
             seed += 1
         world.Barrier()
+
+
+def compare_libraries(options: argparse.Namespace) -> int:
+    """The same models in two processes; returns the exit code."""
+    import pbem
+
+    with tempfile.TemporaryDirectory() as name:
+        folders = [Path(name) / "own", Path(name) / "other"]
+        for folder, environment in zip(folders, ({}, OTHER_LIBRARIES), strict=True):
+            folder.mkdir()
+            command = [sys.executable, "-m", "scripts.compare_kernels", "--first", str(options.first), "--count",
+                       str(options.count), "--nodes", str(options.nodes), "--alone", str(folder)]
+            subprocess.run(command, cwd=ROOT, env=os.environ | environment, check=True, stdout=subprocess.DEVNULL)
+        pairs = []
+        for end in sorted(folders[0].glob("*.end")):
+            ends = [
+                ((folder / end.name).read_text(), pbem.open_results(target) if target.exists() else None)
+                for folder in folders for target in (folder / f"{end.stem}.h5",)
+            ]
+            pairs.append({"seed": int(end.stem), **compare(*ends)})
+    return report(pairs)
+
+
+def run_alone(folder: Path, first: int, count: int, most_nodes: int) -> None:
+    """So many models from a seed on, in this process: their results, and how they ended, into the folder."""
+    from pbem.case.build import read_model
+    from pbem.errors import CaseError
+    from pbem.mesh.generate import generate_mesh
+
+    seed = first
+    while count:
+        case = folder / f"{seed}.toml"
+        write_case(seed, case)
+        try:
+            nodes = generate_mesh(read_model(case)[1]).nodes
+        except CaseError:  # which other instructions do not change
+            nodes = 0
+        if 0 < nodes <= most_nodes:
+            case.with_suffix(".end").write_text(compute(case, case.with_suffix(".h5"))[0])
+            count -= 1
+        seed += 1
 
 
 def compute(case: Path, target: Path) -> tuple[str, Any]:

@@ -16,7 +16,7 @@ sound model, and then Lemke's pivoting ends with a solution for any friction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg.lapack import dgesvx
@@ -35,7 +35,7 @@ from pbem.contact.laws import (
     resists_slip,
     tensile_limit,
 )
-from pbem.contact.pivoting import solve_by_pivoting
+from pbem.contact.pivoting import Effort, solve_by_pivoting
 from pbem.contact.seat import evaluate_dilation, read_dilation
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
@@ -75,12 +75,13 @@ class Response:
 
 @dataclass(frozen=True)
 class Subset:
-    """Laws, memory and pressure of s pairs, and their modes at present."""
+    """Laws, memory and pressure of s pairs, and their modes at present; effort: what their problems may take."""
 
     laws: PairLaws
     memory: Memory
     pressure: Real
     modes: ModeState
+    effort: Effort = field(default_factory=Effort)
 
 
 def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState, pairs: Integer) -> Subset:
@@ -132,6 +133,7 @@ class PairProblem:
     rough: Bool
     sign: Real
     climb: Real
+    effort: Effort
 
 
 def pose(subset: Subset, response: Response) -> PairProblem:
@@ -162,7 +164,7 @@ def pose(subset: Subset, response: Response) -> PairProblem:
     adhesion = np.where(adhesion > ROUNDING * np.abs(constant[0]).max(initial=0.0), adhesion, 0.0)
     return PairProblem(
         constant, change, adhesion, friction, limit / unit, tension / unit, resists_slip(laws), subset.modes.sign,
-        rises.by_slip,
+        rises.by_slip, subset.effort,
     )  # fmt: skip
 
 
@@ -216,6 +218,7 @@ def pivot_pairs(pairs: PairProblem, compliance: Real, detached: Bool) -> ModeSta
     # Many bounds are zero at rest: unequal small numbers keep the pivoting from going round among them.
     constant += PERTURBATION * np.abs(constant).max(initial=0.0) * (1 + np.arange(len(constant)) * 0.6180339887 % 1)
     found = solve_by_pivoting(matrix, constant)
+    pairs.effort.take(4.0 * found.pivots * len(constant) ** 2)
     if found.ended != "solution":
         return None
     mode, sign = np.full(count, OPEN, dtype=np.int8), pairs.sign.copy()
@@ -255,6 +258,7 @@ def solve_in_modes(pairs: PairProblem, modes: ModeState) -> Real | None:
     size = np.abs(matrix).max(axis=1)
     if not (size > 0).all():
         return None
+    pairs.effort.take(2.0 / 3.0 * len(right) ** 3)
     found = dgesvx(matrix / size[:, None], (right / size)[:, None], fact="N")
     d, condition = np.asarray(found[7])[:, 0], float(found[8])
     return d if condition >= REGULAR and np.isfinite(d).all() else None

@@ -19,6 +19,7 @@ from pbem.arrays import Real
 from pbem.contact.complementarity import Response, Subset, find_compliance, pose, solve_in_modes
 from pbem.contact.laws import OPEN, ModeState, PairState, plastic_slip
 from pbem.contact.modes import Proposal, measure_law_error
+from pbem.contact.pivoting import Effort
 from pbem.contact.running import NEAR, Rest
 from pbem.contact.subset import settle_subset
 
@@ -34,6 +35,8 @@ APPROACH = 1e-6
 # Problems of contact at most, of so many pairs, as in pbem.contact.running; of more pairs fewer. Friction that changes
 # with slip is taken at the slips of the problem before, in one instant so often at most.
 MOST_SOLVED, OF_PAIRS, MOST_TAKEN = 1000, 100, 100
+# Operations that they may take, all together.
+MOST_EFFORT = 5e10
 
 Judge = Callable[[ModeState, PairState], Proposal]
 
@@ -60,6 +63,7 @@ def come_to_rest(
     single pairs give way in the wrong sense. (theory, 129)
     """
     own, instants = _measure_stiffness(response), 0
+    subset = replace(subset, effort=Effort(MOST_EFFORT))
     if not _is_sound(subset, _damp(response, SOFTEST * own, response.values[:, 2:])):
         return Damped(None, None, 0)
     runs: ModeState | None = None

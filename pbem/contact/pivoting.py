@@ -22,6 +22,29 @@ ROUNDING = 1e-11
 MOST_PIVOTS = 20
 
 
+# What a problem takes beside its arithmetic.
+ALWAYS = 1e6
+
+
+@dataclass
+class Effort:
+    """What problems of contact may take yet, floating-point operations: a count, which is the same on every machine.
+
+    Once it is used up nothing is found any more.
+    """
+
+    most: float = np.inf
+    taken: float = 0.0
+
+    def take(self, operations: float) -> None:
+        """Note what a problem took."""
+        self.taken += ALWAYS + operations
+
+    @property
+    def is_spent(self) -> bool:
+        return self.taken >= self.most
+
+
 @dataclass(frozen=True)
 class Pivoted:
     """The end of the pivoting.

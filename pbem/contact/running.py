@@ -58,6 +58,8 @@ def run_on(
     modes, present = ModeState(begins.astype(np.int8), memory.modes.sign), response
     most = round(MOST_RUN * min(OF_PAIRS / laws.count, 1.0) ** 2)
     for _ in range(max(most, LEAST_RUN)):
+        if subset.effort.is_spent:
+            return None
         frozen = replace(subset, modes=modes)
         problem = pose(frozen, present)
         d = solve_in_modes(problem, modes) if holds(modes) else None

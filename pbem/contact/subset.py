@@ -51,13 +51,14 @@ class Settled:
 
     modes: None if none were found. exhaustive: whether then every choice was tried and there are none at all (while the
     other pairs keep their modes). tried: number of complementarity problems that were solved. wrong (s,): pairs whose
-    own compliance has the wrong sign, on meshes that cannot carry contact.
+    own compliance has the wrong sign, on meshes that cannot carry contact. effort: what that took (see Effort).
     """
 
     modes: ModeState | None
     exhaustive: bool
     tried: int
     wrong: Bool
+    effort: float = 0.0
 
 
 def settle_subset(
@@ -66,13 +67,23 @@ def settle_subset(
 ) -> Settled:
     """Find modes of s pairs that `judge` leaves as they are; the judge sees modes and states of these pairs alone.
 
-    holds: whether all bodies are held in modes of these pairs; modes that free one are none.
+    holds: whether all bodies are held in modes of these pairs; modes that free one are none. Nothing more is looked for
+    once the subset's effort is spent.
     """
+    before = subset.effort.taken
+    found = _settle(subset, response, judge, holds)
+    return replace(found, effort=subset.effort.taken - before)
+
+
+def _settle(
+    subset: Subset, response: Response, judge: Callable[[ModeState, PairState], Proposal],
+    holds: Callable[[ModeState], bool],
+) -> Settled:
     problem = pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
     compliance, sprung = find_compliance(problem)
     none = np.zeros(len(loses), dtype=bool)
-    if compliance is None:
+    if compliance is None or subset.effort.is_spent:
         return Settled(None, False, 0, none)
     wrong = none if sprung else (np.diag(compliance) >= 0).reshape(2, -1).any(axis=0)
     stepped = _step(problem, subset.modes, response, judge, holds)
@@ -89,6 +100,8 @@ def settle_subset(
         follow: Bool | None = detached
         while follow is not None and follow.tobytes() not in tried and len(tried) < count_most_tried(loses):
             tried.add(follow.tobytes())
+            if subset.effort.is_spent:
+                return Settled(None, False, len(tried), wrong)
             modes = pivot_pairs(problem, compliance, follow)
             # Whether pivoting ends on a ray or in modes that free a body, and whether their equations then have a
             # solution, is a matter of the last bits: both are no modes.
@@ -118,7 +131,7 @@ def _step(
         if share == 1.0 and len(modes.mode) > MOST_STEPS:  # it would not come to the end
             break
         seen: set[bytes] = set()
-        while len(seen) < MOST_STEPS and modes.fingerprint() not in seen:
+        while len(seen) < MOST_STEPS and not problem.effort.is_spent and modes.fingerprint() not in seen:
             seen.add(modes.fingerprint())
             d = solve_in_modes(problem, modes) if holds(modes) else None
             if d is None:
@@ -144,7 +157,7 @@ def _release(
     whole, nothing = pose(subset, response), np.zeros(len(loses), dtype=bool)
     for lost in (nothing, loses & (subset.modes.mode == OPEN)):
         back = nothing
-        while True:
+        while not subset.effort.is_spent:
             broken = subset.memory.broken | lost
             modes = pivot_pairs(
                 pose(replace(subset, memory=subset.memory.lose(broken)), response), compliance, nothing

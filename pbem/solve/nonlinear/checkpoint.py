@@ -37,7 +37,7 @@ GIVEN = {
     "forcing": (),
     "fixed_point": (),
     "hold": ("problem", "memory", "load", "settled", "floating"),
-    "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "most_futile",
+    "search": ("most_pivoted", "interface", "excluded", "varying", "sweeps", "wary", "most_futile", "most_effort",
                "proposal"),
     "running": ("_interface", "_runs", "_joins", "_beside", "_cheap"),
     "smoothing": ("_problem", "_memory", "_load", "smooth", "_shape"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -303,9 +303,14 @@ def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> Converg
     search.unsettled = reason != "no admissible modes"
     if search.collapse:
         return ConvergenceError("limit load", search.collapse)
+    spent = search.is_spent() and reason == "mode cycle"
 
     def describe() -> ConvergenceError:
-        error = describe_unsettled(hold.problem, reason, proposal, search.failed_group, search.failed)
+        error = describe_unsettled(
+            hold.problem, "iteration limit" if spent else reason, proposal, search.failed_group, search.failed)
+        if search.is_spent() and error.reason == "iteration limit":
+            taken = "pivoting has taken all that so many iterations may (solver.newton_max_iterations)"
+            error = ConvergenceError(error.reason, f"{error.detail}; {taken}", error.places, error.unless)
         hold.doubt_free_motion(proposal.modes, error)
         return hold.describe_floating(proposal.modes) or error
 
@@ -332,7 +337,7 @@ def _pivot(
     if not len(group):
         return None
     response = find_response(problem, tangent, constraints, load, law, solved, group)
-    subset = take_subset(problem.laws, memory, load.pressure, modes, group)
+    subset = search.limit(take_subset(problem.laws, memory, load.pressure, modes, group))
 
     # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
     alone = search.excluded
@@ -347,15 +352,24 @@ def _pivot(
     def settle() -> Settled:
         if tangent.settling.nearby and len(group) > MOST_ASKED:
             return settle_parts(subset, response, search.proposal.modes, group, judge)
-        found = _settle(True)
+        found, refused = _settle(True)
         # Modes that other anchors hold are still nearer, where there are none with those that act.
-        return found if found.modes is not None or not problem.anchors else _settle(False)
+        return _settle(False)[0] if found.modes is None and refused else found
 
-    def _settle(anchored: bool) -> Settled:
-        return settle_subset(
-            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
-            lambda own: not hold.leaves_free(complete(own), anchored),
-        )
+    def _settle(anchored: bool) -> tuple[Settled, bool]:
+        """What is found, and whether modes were refused only as other anchors than those that act would hold them."""
+        refused = False
+
+        def holds(own: ModeState) -> bool:
+            nonlocal refused
+            if not hold.leaves_free(complete(own), anchored):
+                return True
+            refused = refused or (anchored and not hold.leaves_free(complete(own)))
+            return False
+
+        found = settle_subset(
+            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure), holds)
+        return replace(found, effort=subset.effort.taken), refused
 
     found: Settled = problem.decide(settle)
     ends = search.conclude(found)

@@ -103,10 +103,10 @@ def find_rest(
     In the result modes, normal tractions and slips are those of all pairs (m,); nan at pairs that did not run.
     """
     problem, group = hold.problem, running.choose(search, modes)
-    if not len(group):
+    if not len(group) or search.is_spent():
         return None
     response = find_response(problem, tangent, constraints, load, law, solved, group)
-    subset = take_subset(problem.laws, memory, load.pressure, modes, group)
+    subset = search.limit(take_subset(problem.laws, memory, load.pressure, modes, group))
     judge = make_judge(problem, solved, search.globalisation)
 
     def complete(own: ModeState) -> ModeState:
@@ -117,13 +117,15 @@ def find_rest(
         everywhere[group] = values
         return everywhere
 
-    def run() -> Rest | None:
+    def run() -> tuple[Rest | None, float]:
         found = run_on(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
             lambda own: not hold.leaves_free(complete(own)),
         )
-        return found and Rest(complete(found.modes), spread(found.normal_traction), spread(found.slip))
+        whole = found and Rest(complete(found.modes), spread(found.normal_traction), spread(found.slip))
+        return whole, subset.effort.taken
 
-    found: Rest | None = problem.decide(run)
+    found, effort = problem.decide(run)
+    search.effort += effort
     running.conclude(group, found is not None)
     return found

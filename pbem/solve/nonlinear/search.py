@@ -19,13 +19,15 @@ tangent comes back at once, as the fixed point itself closes in slowly.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pbem.arrays import Bool, Integer
+from pbem.contact.complementarity import Subset
 from pbem.contact.laws import find_linear, find_pivoting
 from pbem.contact.modes import Frozen, Proposal
+from pbem.contact.pivoting import Effort
 from pbem.contact.subset import Settled
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.preconditioner.subdomains import is_one_group
@@ -79,6 +81,8 @@ FUTILE, FUTILE_IF_SOFTENED = 6, 3
 FEW_IN_ALL, MOST_IN_ALL = 60, 120
 # So often in a search: where it first fails and before it ends.
 MOST_WIDENED = 2
+# Floating-point operations that the pivoting of a search may take for every iteration that it may have.
+EFFORT = 2e9
 # The groups of a crack network settle by themselves until in so many iterations no fewer pairs changed than before.
 SWEPT = 4
 # After so many iterations it is asked where the contact comes to rest against dashpots; where bodies do not, a search
@@ -99,15 +103,16 @@ class Search:
     is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
     groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps). wary: whether changes that
     stall, and a full tangent that leads away, are met with caution where friction changes with slip. most_futile: see
-    FUTILE.
+    FUTILE. most_effort: what pivoting may take in all (see pbem.contact.pivoting.Effort).
     """
 
     def __init__(
         self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
         varying: bool = False, sweeps: bool = False, wary: bool = False, most_futile: int = FUTILE,
+        most_effort: float = np.inf,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
-        self.most_futile = most_futile
+        self.most_futile, self.most_effort = most_futile, most_effort
         self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
         self.sweeps, self.swept = sweeps, False
         self.unsettled = False  # whether it ended as modes came back, or took too long
@@ -118,6 +123,7 @@ class Search:
 
     def restart(self) -> None:
         """Begin anew, as after the failure of a bond."""
+        self.effort = 0.0  # what pivoting took
         self.spent = 0  # iterations that are no longer, or were never, among the counts
         self.counts: list[int] = []
         self.changed: list[Integer] = []
@@ -142,9 +148,9 @@ class Search:
 
         Where that does not settle, another search begins anew, without. The limit of iterations holds for all together.
         """
-        taken = self.taken
+        taken, effort = self.taken, self.effort
         self.restart()
-        self.spent = taken
+        self.spent, self.effort = taken, effort
         self.swept, self.sweeping, self.smoothed = True, False, True
 
     @property
@@ -213,9 +219,20 @@ class Search:
             self.sweeping = False
         return self.sweeping and not self.level
 
+    def is_spent(self) -> bool:
+        """Whether pivoting has taken all that it may: Newton's steps go on alone, as many as are left."""
+        return self.effort >= self.most_effort
+
+    def limit(self, subset: Subset) -> Subset:
+        """The subset, whose problems may take what is left."""
+        return replace(subset, effort=Effort(self.most_effort - self.effort))
+
     def choose_group(self) -> Integer:
         """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
         nothing = np.zeros(0, dtype=np.int64)
+        if self.is_spent():
+            self.widening = False
+            return nothing
         if self.widening:
             self.group = self._list_all()
             return self.group
@@ -252,6 +269,7 @@ class Search:
         That is certain where all choices were tried for the same pairs twice, with what all others make of it between;
         of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
         """
+        self.effort += found.effort
         if found.modes is not None:
             self.widening = False
             self.futile = self.pause = 0
@@ -333,8 +351,9 @@ def list_searches(problem: Problem, tangent: TangentOperator, softened: bool = F
     # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
     varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
     futile = FUTILE_IF_SOFTENED if softened and not varying and not settling.nearby else FUTILE
+    effort = EFFORT * problem.model.solver.newton_max_iterations
     return [
-        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile)
+        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile, effort)
         for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
     ]
 

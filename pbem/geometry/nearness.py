@@ -14,12 +14,13 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
+from pbem.geometry.tolerance import TIE
 
 # Two legs that meet at less than this angle (degrees) enclose a wedge, in which lengths fall with the distance from
 # its corner; wider corners are ordinary ones, towards which legs are graded.
-WEDGE = 50.0
+WEDGE = 50.0 * (1 - TIE)
 # A crack that turns by less between two legs (radians) has no corner there that elements need to follow.
-KINK = math.radians(10.0)
+KINK = math.radians(10.0) * (1 + TIE)
 # An arc is seen in pieces that turn by no more than this, so that a piece does not face itself.
 WIDEST_PIECE = math.radians(60.0)
 

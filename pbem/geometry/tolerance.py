@@ -15,6 +15,9 @@ from pbem.geometry.curve import Curve
 
 # Points nearer to each other than this part of the shorter of their curves are the same point.
 SAME_POINT = 1e-9
+# By this part lengths and angles of a model are compared with thresholds that are not round numbers. Those of models
+# are: on which side of a round one they fall would hang on their rounding, and so on how the model is turned.
+TIE = 1e-6
 # Far from the origin the coordinates themselves are rounded.
 ROUNDINGS = 16
 

@@ -19,6 +19,7 @@ import numpy as np
 from pbem.arrays import Integer, Real
 from pbem.geometry.carrier import measure_distances
 from pbem.geometry.elements import Elements
+from pbem.geometry.tolerance import TIE
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import weigh_nodes
 from pbem.mesh.projection import find_hidden, project_nodes
@@ -28,11 +29,11 @@ from pbem.model.rigid_body_modes import ROUNDINGS
 # Gauss points on every piece of an element that faces one element of the other side.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
 # A node is no pair if less than this part of its weight faces the other curve.
-LEAST_COVER = 0.5
+LEAST_COVER = 0.5 * (1 + TIE)
 # Faces may overlap before any load by this part of the shorter of two elements (rounding, chords of curved sides).
 OVERLAP = 0.01
 # Beyond this part of an element's length it is asked whether something else stands between the faces.
-CLEAR = 0.1
+CLEAR = 0.1 * (1 + TIE)
 # Elements that share less than this part of the shorter one are neighbours of those that face each other.
 SLIVER = 1e-3
 

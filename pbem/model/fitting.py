@@ -13,6 +13,7 @@ from pbem.errors import Fault
 from pbem.geometry.curve import Curve
 from pbem.geometry.intersection import measure_distances, project
 from pbem.geometry.junction import format_point
+from pbem.geometry.tolerance import TIE
 from pbem.model.lengths import count_elements
 from pbem.model.model import Region
 from pbem.model.point_loads import PointLoad
@@ -27,11 +28,11 @@ MOST_NAMED = 8
 # Faces of the body along a part of a crack that is this much longer than they are away leave slender arms: with linear
 # elements K was 0.7 % too large at 2, 6 % at 4, 27 % at 8. They do so along half of the crack at least (a small hole
 # beside it does not); asked at so many points.
-SLENDER, ALONGSIDE, ASKED = 2.5, 0.5, 20
+SLENDER, ALONGSIDE, ASKED = 2.5 * (1 + TIE), 0.5, 20
 # Faces of a body this much longer than it is thick are told where elements are linear: deflections of cantilevers with
 # Poisson's ratio 0 were 5 % too small at a slenderness of 10, 17 % at 50, 30 % at 100, 46 % at 200, with elements half
 # as long a third of that. Of bodies with more faces it is not asked.
-THIN, MOST_FACES = 8.0, 200
+THIN, MOST_FACES = 8.0 * (1 + TIE), 200
 
 
 @dataclass(frozen=True)

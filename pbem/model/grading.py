@@ -14,10 +14,11 @@ from pbem.errors import Fault
 from pbem.geometry.curve import Curve, Leg, turning_angle
 from pbem.geometry.junction import Places
 from pbem.geometry.shape import WIDEST_ARC, share
+from pbem.geometry.tolerance import TIE
 from pbem.wording import list_names
 
 # A curve that turns by less than this goes on smoothly.
-SMOOTH = math.radians(1.0)
+SMOOTH = math.radians(1.0) * (1 + TIE)
 # So many kinds of refinement are told each by itself, if it takes no more than so many characters.
 MOST_KINDS, MOST_TEXT = 8, 150
 

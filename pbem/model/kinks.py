@@ -23,13 +23,14 @@ from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.expression import evaluate_expression, list_switches
 from pbem.geometry.intersection import project
 from pbem.geometry.junction import split_leg
+from pbem.geometry.tolerance import TIE
 from pbem.model.given import read_value
 from pbem.model.touching import place_on_leg
 from pbem.model.varying import Varying
 
 # Kinks this part of an element from the end of a leg, or from each other, stay within it: they change the resultant by
 # its square at most.
-NEAREST = 0.05
+NEAREST = 0.05 * (1 - TIE)
 # Kinks on a leg at most, of its elements: values in a dense table are measured, and have kinks everywhere.
 MOST = 0.5
 # Numbers of elements are whole but for this.

@@ -12,6 +12,7 @@ from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.boxes import Boxes, Meetings
 from pbem.geometry.curve import Curve
 from pbem.geometry.nearness import Distances, Surroundings
+from pbem.geometry.tolerance import TIE
 from pbem.model.sliver import Reach, Wedges
 
 # Longest element, as a multiple of the distance to the next face, by the order of the polynomials. Measured by pairs
@@ -34,10 +35,7 @@ LEAST_TIP = 5e-3
 # of the faces: the boundary layer at the end of a thin body is as long as the body is thick.
 FIRST, GROWTH = 0.01, 1.0
 # A part of a leg is small enough when it is shorter than this part of the length that is allowed there.
-FINENESS = 0.25
-# Lengths that round numbers make equal are taken as equal, however their rounding tells them apart: a model that is
-# turned, or its mirror image, has the same parts.
-TIE = 1e-6
+FINENESS = 0.25 * (1 + TIE)
 
 
 @dataclass(frozen=True)
@@ -162,6 +160,7 @@ class LengthField:
         points = self.place(cells)
         graded = self.refined[legs].any(axis=1)
         sight = np.where(graded, np.maximum(cells.wanted, self._mean[legs]), cells.wanted) / self._least_reach + length
+        sight *= 1 + TIE
         near = self._find_near(cells, points, sight, length, before)
         distances = self.surroundings.find_distances(legs, t, points, sight, near.faces)
         distance, allowed = distances.nearest, self._allow(distances)
@@ -180,7 +179,7 @@ class LengthField:
         beside_tips = self._measure_from_tips(points, near.tips)
         steepest = max(self.reach.usual, GROWTH, SLOPE, LOADED)
         allowed = np.minimum(allowed, beside_tips)
-        final = (length <= FINENESS * (1 + TIE) * allowed) | corner
+        final = (length <= FINENESS * allowed) | corner
         final |= allowed - 0.5 * steepest * length >= (1 - TIE) * cells.wanted
         return Measured(allowed, final, distance, distances.leg, near)
 

@@ -17,25 +17,26 @@ from pbem.geometry.elements import Elements
 from pbem.geometry.intersection import inner_points, measure_distances, project, surround
 from pbem.geometry.junction import format_point, split_leg
 from pbem.geometry.loop import Loops, Side, side_legs
+from pbem.geometry.tolerance import TIE
 from pbem.model.model import Contact, Model, Region
 
 # Points on a leg from which its surroundings are looked at.
 SAMPLES = 9
 # Faces look at each other if their normals are opposite within 60 degrees.
-OPPOSITE = -0.5
+OPPOSITE = -0.5 * (1 - TIE)
 # A strip between two faces is narrow if its width is less than this part of their lengths.
-NARROW = 0.25
+NARROW = 0.25 * (1 - TIE)
 # Faces that touch may lie in one another by this part of the shorter curve (rounding, chords of curved sides).
 OVERLAP = 1e-3
 # Normals of bodies that lie in each other meet the other face farther behind than these are deep, by this factor.
 REACH = 2.0
 # A leg is not split nearer to its ends than this part of its mean element.
-LEAST_PIECE = 0.25
+LEAST_PIECE = 0.25 * (1 - TIE)
 # Faces farther away than this piece have to be opposite within 20 degrees: a disc on a block does not face its top's
 # ends. How far away they are does not matter, as the parts that fall on each other are the same across any gap.
 OPPOSITE_FAR = -0.94
 # A face ends at a corner of its curve, too, that turns away from the other one by more than this (radians).
-CORNER = math.radians(45.0)
+CORNER = math.radians(45.0) * (1 + TIE)
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.geometry.curve import Leg
 from pbem.geometry.nearness import Corner, Surroundings
+from pbem.geometry.tolerance import TIE
 
 # Length of the last bit, as a part of the shortest leg of the wedges at a corner: at 8 degrees, from where it changes
 # with the power of the angle, and its bounds. What it spoils grows in proportion to it, and as slender bodies bend.
@@ -41,11 +42,11 @@ LEAST_BIT, MOST_BIT = 5e-5, 1e-2
 BRANCH_BIT, LEAST_ASKED = 6e-5, 5
 # The least turn (radians) of a crack in a corner towards which lengths fall geometrically, where the grading is chosen
 # (less: powers do); the least number of elements of a leg, in the mean of both, from the corner on.
-SHARP, LEAST_AT_TURN = math.radians(60.0), 4
+SHARP, LEAST_AT_TURN = math.radians(60.0) * (1 - TIE), 4
 # The angle between its legs (radians) below which lengths fall more slowly.
 SHARPER = math.radians(80.0)
 # Degrees: below, the last bit follows its neighbour.
-TIED = 25.0
+TIED = 25.0 * (1 - TIE)
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
 MOST_GROWTH = 1.0
 

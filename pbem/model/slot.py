@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.geometry.curve import Leg
+from pbem.geometry.tolerance import TIE
 
 # A slot is narrow if its faces are nearer than this part of the mean length of their elements.
-NARROW = 0.5
+NARROW = 0.5 * (1 + TIE)
 
 
 @dataclass(frozen=True)

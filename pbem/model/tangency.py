@@ -14,6 +14,7 @@ import numpy as np
 from pbem.arrays import Real
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.intersection import measure_distances
+from pbem.geometry.tolerance import TIE
 from pbem.model.halving import halve_towards
 
 # The approach of two bodies that is to be seen, as a part of the smaller of both curves' lengths and the radius
@@ -24,7 +25,7 @@ GROWTH = 1.5
 # At least so long are elements, by the distance over which a body may come to touch elsewhere.
 PER_WINDOW = 4.0
 # Faces farther apart than this part of the same length are not expected to touch.
-FAR = 0.05
+FAR = 0.05 * (1 + TIE)
 # Parts of half an element over which rounded faces part by their squares, up to so much of what they would at a corner.
 SCALES = np.array([0.125, 0.5, 1.0])
 NOT_ROUND = 0.25

@@ -134,7 +134,7 @@ def test_what_is_no_number_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     def overflow(self: MinimalResidual, given: Real) -> bool:
         added = add(self, given)
         if self._count == 5:
-            self._products[0, 4] = np.nan
+            self._products.last[0] = np.nan
         return added
 
     monkeypatch.setattr(MinimalResidual, "_add", overflow)

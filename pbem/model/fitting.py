@@ -32,7 +32,7 @@ SLENDER, ALONGSIDE, ASKED = 2.5 * (1 + TIE), 0.5, 20
 # Faces of a body this much longer than it is thick are told where elements are linear: deflections of cantilevers with
 # Poisson's ratio 0 were 5 % too small at a slenderness of 10, 17 % at 50, 30 % at 100, 46 % at 200, with elements half
 # as long a third of that. Of bodies with more faces it is not asked.
-THIN, MOST_FACES = 8.0 * (1 + TIE), 200
+THIN, MOST_FACES = 8.0, 200
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def _note_thin(case: Case, curves: Mapping[str, Curve], regions: Sequence[Region
         for number, (side, leg) in enumerate(faces if not region.rigid and len(faces) <= MOST_FACES else ()):
             others = [each for k, (_, each) in enumerate(faces) if k != number]
             points = np.asarray(leg.point(np.array([0.25, 0.5, 0.75])))
-            if others and THIN * measure_distances(others, points).max() < leg.length:
+            if others and THIN * (1 + TIE) * measure_distances(others, points).max() < leg.length:
                 foot = min((complex(each.point(np.array(project(each, complex(points[1]))[0]))) for each in others),
                            key=lambda z: abs(z - points[1]))
                 across = (foot - points[1]) / (points[2] - points[0])

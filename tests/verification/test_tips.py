@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
 
@@ -22,7 +23,7 @@ from pbem.model.material import Material
 from pbem.model.model import Law, Model, Stage
 from pbem.results.tips import collect_tip_rules
 from tests.verification.cuts import draw_arc_cut, draw_straight_cut, measure_cut
-from tests.verification.kinks import draw_kink, measure_kink, solve_tips
+from tests.verification.kinks import Kink, draw_kink, measure_kink, solve_tips
 from tests.verification.planes import FREE, ROCK, make_arc, make_plane, make_straight, solve
 from tests.verification.proofs.cracks import KINK, PLANE_MODULUS, solve_plate
 from tests.verification.proofs.proof import line
@@ -140,6 +141,17 @@ def test_kinked_crack_of_a_file_cut_and_graded_anyhow(seed: int) -> None:
     assert found.K < 5e-3 and found.J < 1e-2, kink.text
     found = measure_kink(kink, given=False)
     assert found.K < 5e-3 and found.J < 1e-2, kink.text
+
+
+@pytest.mark.parametrize(("degrees", "wing"), [(50.0, 0.01), (25.0, 0.03), (-40.0, 0.1)])
+def test_a_crack_of_linear_elements_with_a_short_wing(degrees: float, wing: float) -> None:
+    """K was off by 0.4 to 3.3 % with the elements as they are asked for."""
+    along = cmath.exp(0.7j)
+    end = wing * along * cmath.exp(1j * math.radians(degrees))
+    pieces = ((-along, 0j, 4, "none", 1.0), (0j, end, 4, "none", 1.0))
+    kink = Kink(degrees, wing, (-along, 0j, end), pieces, (0.4, 0.9, -0.3), 1)
+    found = measure_kink(kink, given=False)
+    assert found.K < 3e-3 and found.J < 8e-3
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

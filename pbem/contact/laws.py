@@ -120,6 +120,11 @@ class PairState:
         """With tractions (m, 2) along n and s besides those of the laws."""
         return replace(self, p_n=self.p_n + carried[:, 0], p_s=self.p_s + carried[:, 1])
 
+    def approach(self, other: PairState, part: float) -> PairState:
+        """The state at a part of the way to another one."""
+        ways = zip(vars(self).values(), vars(other).values(), strict=True)
+        return PairState(*(own + part * (end - own) for own, end in ways))
+
 
 @dataclass(frozen=True)
 class Memory:

@@ -60,20 +60,21 @@ def close_all(laws: PairLaws, modes: ModeState) -> ModeState:
 
 def linearise_smoothly(
     laws: PairLaws, smooth: Bool, state: PairState, memory: Memory, pressure: Real, traction_scale: float,
-    width: float | Real, proximal: Real,
+    width: float | Real, proximal: Real, aim: float = 1.0,
 ) -> Linearisation:
     """The tangents of the smoothed laws of pairs (m,) at a state; others are closed, or open for good.
 
-    width: e, a stress, of all or of each. proximal (m,): stiffness against the change of the jumps, stress/length; what
-    it bears is part of the tractions, see `take_off_proximal`. (theory, 122, 123, 127)
+    width: e, a stress, of all or of each; aim: the part of e^2 with which they are aimed at, of the first order in it.
+    proximal (m,): stiffness against the change of the jumps, stress/length; what it bears is part of the tractions, see
+    `take_off_proximal`. (theory, 122, 123, 127, 130)
     """
     r, k, scale = laws.stiffness, proximal, traction_scale
     x, y = _try(laws, state, memory, pressure)
     opening, slip = _find_plastic(laws, state)
-    held, a = _smooth_maximum(x, width)
+    held, a = _smooth_maximum(x, width, aim)
     strength = _find_bound(laws, held, memory, pressure)
-    above, by_above = _smooth_maximum(y - strength.bound, width)
-    below, by_below = _smooth_maximum(-y - strength.bound, width)
+    above, by_above = _smooth_maximum(y - strength.bound, width, aim)
+    below, by_below = _smooth_maximum(-y - strength.bound, width, aim)
     d, c = by_above + by_below, (by_above - by_below) * strength.by_traction * a
     # In units of the traction scale: (a - 1) q_n + a r g_n = P - a x + (1 - a) pressure; with what the other gives,
     # d q_s + (d - 1) r slip = d y - (P1 - P2) + c (x + pressure) + c (q_n + r g_n). Of the tractions of the law,
@@ -154,12 +155,13 @@ def _find_bound(laws: PairLaws, held: Real, memory: Memory, pressure: Real) -> S
     return evaluate_strength(laws, -held - pressure, memory.look_ahead(np.zeros(laws.count)), pressure)
 
 
-def _smooth_maximum(values: Real, width: float | Real) -> tuple[Real, Real]:
-    """Of values and zero, and its slope, which is between 0 and 1 (theory, 122)."""
+def _smooth_maximum(values: Real, width: float | Real, aim: float = 1.0) -> tuple[Real, Real]:
+    """Of values and zero, and its slope, which is between 0 and 1 (theory, 122); the first with a part of e^2 alone, to
+    the first order (theory, 130)."""
     root = np.maximum(np.sqrt(values * values + 4 * width * width), np.finfo(float).tiny)
     # Without cancellation where a value is far below zero.
     result = np.where(values > 0, 0.5 * (values + root), 2 * width * width / (root + np.abs(values)))
-    return result, result / root
+    return result - (1 - aim) * width * width / root, result / root
 
 
 def _solve_row(row: Real, right: Real) -> tuple[Real, Real]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,19 @@ from pbem.contact.smoothed import (
 from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import newton, smooth_search
 from pbem.solve.nonlinear.newton import solve_step
-from pbem.solve.nonlinear.smooth_search import FALL, FEWER, FIRST, LEAST, LEAST_FALL, OFF, SmoothSearch, Width
+from pbem.solve.nonlinear.smooth_search import (
+    AIM,
+    AIM_AGAIN,
+    CENTRED,
+    FARTHEST,
+    FIRST,
+    FIRST_ALONE,
+    LEAST,
+    NEAR,
+    PARTS,
+    SmoothSearch,
+    Width,
+)
 from pbem.solve.problem.step import Iteration, SilentReporter
 from tests.unit.test_laws import make_laws, remember
 from tests.unit.test_sweeps import assemble, grow_branches, many_groups, march_over
@@ -177,6 +188,10 @@ def test_laws_are_smoothed_where_many_pairs_go_on_changing() -> None:
     assert not any(ask(*[LEAST] * (FIRST + 2)))
     assert ask(*[many + k for k in range(FIRST + 2)][::-1]) == [False] * (FIRST - 1) + [True] + [False] * 2
     assert not any(ask(*[many * 3**k for k in range(FIRST + 2)][::-1]))
+    alone = SmoothSearch(problem, memory, load, True, alone=True)
+    asked = [alone.begins([many] * k, state) for k in range(1, FIRST_ALONE + 3)]
+    assert asked == [False] * (FIRST_ALONE - 1) + [True] + [False] * 2
+    assert not SmoothSearch(problem, memory, load, True, alone=True).begins([many, 2 * many + 1], state)
     # At once where the changes soar.
     assert ask(many, 2 * many + 1) == [False, True]
     assert ask(many, 2 * many) == [False, False]
@@ -268,35 +283,77 @@ def record_widths(monkeypatch: pytest.MonkeyPatch) -> list[Real]:
     return widths
 
 
-def test_the_width_falls_where_few_pairs_are_off_their_laws(
-    many_groups: None, at_once: list[int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    widths, parts = record_widths(monkeypatch), [1.0, 2 * OFF, OFF, 0.25 * OFF, 0.0]
+@pytest.mark.parametrize("aim", [0.0, 0.3, 1.0])
+def test_a_step_aims_at_the_laws_of_a_narrower_width_to_the_first_order(aim: float) -> None:
+    laws, memory, pressure = make_case(compliance_n=0.1, compliance_s=0.3)
+    everywhere, (state, _) = np.ones(COUNT, dtype=bool), converge(laws, memory, pressure, 4, WIDTH)
+    values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
+    left = []
+    # A small part of the way is aimed at, and a tenth of that: what it leaves of the laws falls with its square.
+    for small in (1e-2, 1e-3):
+        part = 1 - small * (1 - aim)
+        law = linearise_smoothly(laws, everywhere, state, memory, pressure, SCALE, WIDTH, np.zeros(COUNT), part)
+        off = values - law.offset
+        nearest = np.stack([law.tangent[k] @ np.linalg.lstsq(law.tangent[k], off[k], rcond=None)[0]
+                            for k in range(COUNT)])
+        aimed = PairState(*(nearest + law.offset).T)
+        width = Width(WIDTH, WIDTH, 1e-9, part).fall(1.0)
+        left.append(measure_violation(laws, everywhere, aimed, memory, pressure, width).max())
+        before = measure_violation(laws, everywhere, state, memory, pressure, width).max()
+        assert left[-1] < 0.1 * before or aim == 1
+    assert left[1] < 0.02 * left[0] if aim < 1 else max(left) < 1e-7
 
-    def count(search: SmoothSearch, *arguments: Any) -> float:
-        return (parts.pop(0) if parts else 0.0) * len(search.smooth)
 
-    monkeypatch.setattr(SmoothSearch, "_count_off", count)
-    march_over(grow_branches(0, 6))
-    falls = [float((new / old).mean()) for old, new in pairwise(widths)]
-    np.testing.assert_allclose(falls[:5], [1.0, 1.0, FALL, 0.5 * FALL, LEAST_FALL * FALL], rtol=1e-12)
-    assert min(falls) > 0.99 * LEAST_FALL * FALL and falls[-1] > LEAST_FALL * FALL  # as far as the narrowest
+def test_the_square_of_the_width_falls_by_the_part_of_the_way_that_is_gone() -> None:
+    width = Width(2.0, 4.0, 1e-3, 0.1)
+    np.testing.assert_allclose([width.fall(part) ** 2 for part in (0.0, 0.5, 1.0)], [4.0, 2.2, 0.4], rtol=1e-12)
+    # Aimed at again once pairs are near to their laws, at more after a whole way; else they come nearer first.
+    near, far = 0.9 * CENTRED, 1.1 * CENTRED
+    assert [width.go_on(part, off).aim for part, off in ((1.0, near), (0.9, near), (1.0, far))] == [AIM_AGAIN, AIM, 1]
+    assert Width(2.0, 4.0, 1e-3).go_on(1.0, near) == Width(2.0, 4.0, 1e-3, AIM)
+    assert Width(2.0, 4.0, 1e-3).go_on(0.3, far) == Width(2.0, 4.0, 1e-3, 1.0)
+    # No further than the last one.
+    last = Width(2e-3, 4.0, 1e-3, 0.1).go_on(0.9, near)
+    assert last.aim == pytest.approx((1e-3 / last.value) ** 2, rel=1e-12) and last.fall(1.0) == pytest.approx(1e-3)
+    assert Width(1e-3, 4.0, 1e-3).go_on(1.0, near) == Width(1e-3, 4.0, 1e-3, 1.0)
 
 
-def test_the_width_rises_again_where_no_fewer_pairs_come_to_be_off() -> None:
-    width = Width(1.0, 2.0, 1e-3, 10.0)
-    same = width.choose_next(40).choose_next(40)
-    assert same.value == 1.0 and same.choose_next(39).choose_next(41).value == 1.0
-    risen = same.choose_next(50)
-    np.testing.assert_allclose([risen.value, risen.most], [min(1 / FALL, 2.0), FEWER * 10.0])
-    # As far as the first one; to fall again takes fewer.
-    assert risen.choose_next(9).value == risen.value > risen.choose_next(2).value
-    first = Width(2.0, 2.0, 1e-3, 10.0)
-    assert first.choose_next(40).choose_next(41).choose_next(42).value == 2.0
-    # With the last one it stays until pairs no longer come to be on their laws.
-    last = Width(1e-3, 2.0, 1e-3, 10.0)
-    assert [last.choose_next(k).value for k in (0, 5)] == [1e-3, 1e-3]
-    assert last.choose_next(0).choose_next(0).choose_next(0).value > 1e-3
+def test_of_the_way_so_much_is_gone_that_pairs_stay_near_to_their_laws(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = assemble(grow_branches(0, 6))
+    count = problem.laws.count
+    search = SmoothSearch(problem, remember(0.0, count), problem.evaluate_load(0, 1.0), True)
+    here, there = PairState(*np.zeros((4, count))), PairState(*np.ones((4, count)))
+
+    def choose(off: Any, aim: float) -> tuple[float, float]:
+        monkeypatch.setattr(SmoothSearch, "_measure_off", lambda at, state, width: off(state.p_n[0], width))
+        return search._choose_part(here, there, Width(1.0, 1.0, 1e-3, aim))
+
+    assert choose(lambda part, width: 0.99 * NEAR, AIM) == (1.0, 0.99 * NEAR)
+    assert choose(lambda part, width: NEAR * part / 0.75, AIM)[0] == 0.7
+    # Off by more anywhere: where it is least. The width is that which belongs to the part.
+    assert choose(lambda part, width: 2 * NEAR + abs(part - 0.3), AIM)[0] == 0.3
+    assert choose(lambda part, width: 2 * NEAR + abs(width**2 - 1 + 0.2 * (1 - AIM)), AIM)[0] == 0.2
+    # With the same width: the whole, if it leaves less; else what leaves least.
+    assert choose(lambda part, width: 5 - part, 1.0)[0] == 1.0
+    assert choose(lambda part, width: 5 - 0.1 * part, 1.0)[0] == 1.0
+    assert choose(lambda part, width: 5 + abs(part - 0.4), 1.0)[0] == 0.4
+    assert min(PARTS) > 0 and max(PARTS) == 1
+
+
+def test_pairs_are_off_by_their_widths_along_them() -> None:
+    problem = assemble(grow_branches(0, 6))
+    laws, weight = problem.laws, problem.mesh.pairs.weight
+    memory, load = remember(0.0, laws.count), problem.evaluate_load(0, 1.0)
+    search = SmoothSearch(problem, memory, load, True)
+    width, smooth = 1e-9, search.smooth
+    # At rest but for overlaps of some pairs, which the laws would bear by r times as much: of the normal law alone.
+    at = np.arange(laws.count) % 3 == 0
+    off = np.where(at, 4 * width * search._shape, 0.0)
+    state = PairState(-np.ones(laws.count), np.zeros(laws.count), -off / laws.stiffness, memory.slip)
+    mean = weight[at & smooth].sum() / weight[smooth].sum()
+    assert search._measure_off(state, width) == pytest.approx(4 * mean, rel=1e-3)
+    # None counts for more than so much.
+    assert search._measure_off(state, width / 100) == pytest.approx(FARTHEST * mean, rel=1e-3)
 
 
 def test_short_pairs_have_the_same_product_of_force_and_opening(

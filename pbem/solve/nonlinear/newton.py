@@ -136,7 +136,7 @@ def _search_modes(
     forcing: Forcing, resumed: Plain | None,
 ) -> Solution:
     """See solve_step; by one search, whose iterations join those before. resumed: see Checkpoint."""
-    smoothing = SmoothSearch(problem, memory, load, search.sweeps)
+    smoothing = SmoothSearch(problem, memory, load, search.smooths, not search.sweeps)
     parts = {
         "hold": Hold(problem, memory, load), "search": search, "forcing": forcing, "fixed_point": FixedPoint(),
         "smoothing": smoothing, "running": RunningGroup(problem, tangent),

@@ -101,7 +101,8 @@ class Search:
     it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
     has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
     is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
-    groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps). wary: whether changes that
+    groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps); smooths: whether laws may be
+    smoothed (pbem.solve.nonlinear.smooth_search). wary: whether changes that
     stall, and a full tangent that leads away, are met with caution where friction changes with slip. most_futile: see
     FUTILE. most_effort: what pivoting may take in all (see pbem.contact.pivoting.Effort).
     """
@@ -109,12 +110,12 @@ class Search:
     def __init__(
         self, most_pivoted: int, interface: Integer | None = None, excluded: Bool | None = None,
         varying: bool = False, sweeps: bool = False, wary: bool = False, most_futile: int = FUTILE,
-        most_effort: float = np.inf,
+        most_effort: float = np.inf, smooths: bool = False,
     ) -> None:
         self.most_pivoted, self.interface, self.varying = most_pivoted, interface, varying
         self.most_futile, self.most_effort = most_futile, most_effort
         self.excluded: Bool = np.zeros(1, dtype=bool) if excluded is None else excluded
-        self.sweeps, self.swept = sweeps, False
+        self.sweeps, self.swept, self.smooths = sweeps, False, smooths
         self.unsettled = False  # whether it ended as modes came back, or took too long
         self.wary = wary
         self.smoothed = False  # whether it goes on from the modes of smoothed laws
@@ -352,8 +353,10 @@ def list_searches(problem: Problem, tangent: TangentOperator, softened: bool = F
     varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
     futile = FUTILE_IF_SOFTENED if softened and not varying and not settling.nearby else FUTILE
     effort = EFFORT * problem.model.solver.newton_max_iterations
+    # Where no groups settle by themselves, blocks that cracks enclose are laid by smoothed laws nevertheless.
+    alone = not sweeps and bool(problem.parts.block.any())
     return [
-        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile, effort)
+        Search(settling.most_pairs, interface, excluded, varying, sweeping, wary, futile, effort, sweeping or alone)
         for sweeping, wary in [(True, False)] * sweeps + [(False, False)] + [(False, True)] * varying
     ]
 

@@ -6,8 +6,11 @@ pair holds what is near to it, the more the nearer it comes: blocks stay where t
 change little from one width to the next (X. Chen, Math. Programming 134, 2012, reviews such methods). Short pairs have
 larger widths, which makes the hyperbola a barrier of the same weight for each: Newton's method converges from one width
 to the next only so (Y. Nesterov, A. Nemirovskii, Interior-point polynomial algorithms, 1994: barriers must not be less
-curved than they rise steeply). From the statuses of the last width the search goes on with the true laws; of the
-smoothed ones nothing is left but where it begins.
+curved than they rise steeply). An iteration aims at a narrower width to the first order in its square, and goes no
+further on its way than pairs stay near to the laws of the width that belongs there: a path is followed, as where laws
+fall to a width at once the next iterations lead anywhere (S. J. Wright, Primal-dual interior-point methods, SIAM,
+1997). From the statuses of the last width the search goes on with the true laws; of the smoothed ones nothing is left
+but where it begins.
 """
 
 from __future__ import annotations
@@ -37,23 +40,26 @@ from pbem.solve.nonlinear.recorded import Record
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
 
-# The laws are smoothed where after so many iterations ...
-FIRST = 3
+# The laws are smoothed where after so many iterations, or where groups do not settle by themselves after so many, ...
+FIRST, FIRST_ALONE = 3, 5
 # ... no less than this part of the fewest pairs that changed before change (where blocks are held well it is a third at
 # most), and more than this part of all and so many, as pivoting does for fewer;
 SLOWLY = 0.5
 MANY, LEAST = 0.03, 60
-# or, after any number of iterations, as many times as many as at best before.
+# or, after any number of iterations where groups settle by themselves, as many times as many as at best before.
 SOARED = 2
 # The first width is this part of the mean violation of the true laws; the last one this part of the largest traction:
 # with less, blocks that touch nothing would be held by nothing but rounding.
 WIDTH, NARROWEST = 0.1, 1e-6
-# It falls to this part of itself after an iteration that leaves this part of all pairs off the smoothed laws by more
-# than their width, not if more are; if fewer are, to less by the root of how many fewer, at least so many times that.
-FALL, OFF, LEAST_FALL = 0.3, 0.05, 0.1
-# Where in so many iterations with one width no fewer pairs were off than at best before, the last one was too wide a
-# step: the width rises again as far as it falls at most where OFF are off, and to fall it takes so many times as few.
-STALLED, FEWER = 2, 0.3
+# The square of the width falls to AIM of itself where pairs are off their smoothed laws by no more than CENTRED of it,
+# in the mean along all pairs, in which none counts for more than FARTHEST widths; to AIM_AGAIN after such a fall that
+# leaves them there. Else an iteration with the same width brings them nearer.
+AIM, AIM_AGAIN = 0.1, 0.01
+CENTRED, FARTHEST = 0.15, 10.0
+# Of the way to a solution the largest of these parts is gone that leaves pairs off by no more than NEAR; with the same
+# width, the whole if it leaves BETTER of what they were off, else the part that leaves least.
+PARTS = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05)
+NEAR, BETTER = 0.3, 0.9
 # Pairs that are shorter than the mean have larger widths, by the root of how much shorter they are, up to so much.
 MOST_WIDENED = 1e3
 # The proximal stiffness is this part of that of the surroundings of each pair alone: enough for systems to be regular
@@ -71,29 +77,22 @@ CLOSELIEST = 1e-5
 
 @dataclass(frozen=True)
 class Width:
-    """A width (stress), the first one and the last one, and what it was like with it.
-
-    fewest: pairs that were off their laws after an iteration with it, at best; stalled: iterations since then; most: so
-    many pairs may be off for it to fall.
-    """
+    """A width (stress), the first one and the last one, and the part of its square that the next iteration aims at."""
 
     value: float
     first: float
     last: float
-    most: float
-    fewest: float = np.inf
-    stalled: int = 0
+    aim: float = 1.0
 
-    def choose_next(self, off: int) -> Width:
-        """The width of the next iteration, after one that leaves so many pairs off. (theory, 122)"""
-        if off <= self.most and self.value > self.last:
-            part = FALL * max(float(np.sqrt(off / self.most)), LEAST_FALL)
-            return replace(self, value=max(part * self.value, self.last), fewest=np.inf, stalled=0)
-        stalled = 0 if off < self.fewest else self.stalled + 1
-        if stalled < STALLED or self.value == self.first:
-            return replace(self, fewest=min(off, self.fewest), stalled=stalled)
-        risen = min(self.value / FALL, self.first)
-        return replace(self, value=risen, most=FEWER * self.most, fewest=np.inf, stalled=0)
+    def fall(self, part: float) -> float:
+        """The width after a part of the way to what is aimed at. (theory, 130)"""
+        return max(self.value * float(np.sqrt(1 - part * (1 - self.aim))), self.last)
+
+    def go_on(self, part: float, off: float) -> Width:
+        """The width of the next iteration, after one that went a part of its way and leaves pairs so much off."""
+        value = self.fall(part)
+        aim = 1.0 if off > CENTRED else AIM if self.aim == 1 or part < 1 else AIM_AGAIN
+        return replace(self, value=value, aim=max(aim, (self.last / value) ** 2))
 
 
 @dataclass(frozen=True)
@@ -110,20 +109,24 @@ class SmoothCourse:
 class SmoothSearch:
     """Whether the laws are smoothed in a search, once, and the modes that this leads to.
 
-    Decided by counts, modes and violations that all ranks have from the first one. allowed: whether it may be at all.
+    Decided by counts, modes and violations that all ranks have from the first one. allowed: whether it may be at all;
+    alone: whether no groups of neighbouring elements settle by themselves, so that it may be later only.
     smooth (m,): pairs whose laws can be.
     """
 
-    def __init__(self, problem: Problem, memory: Memory, load: Load, allowed: bool) -> None:
+    def __init__(self, problem: Problem, memory: Memory, load: Load, allowed: bool, alone: bool = False) -> None:
         laws = problem.laws
         self._problem, self._memory, self._load = problem, memory, load
         self.smooth = find_smooth(laws, memory, load.pressure) if allowed else np.zeros(laws.count, dtype=bool)
+        self._alone = alone
         self._allowed = bool((self.smooth | laws.bonded | laws.parted | laws.follows).all() and self.smooth.any())
         self._first: PairState | None = None
         self.taken = 0  # iterations so far
         self.begun = False  # whether `find` is to be asked, or has not ended yet
         self._course: SmoothCourse | None = None
         self._shape = self._shape_widths()
+        along = np.where(self.smooth, problem.mesh.pairs.weight, 0.0)
+        self._along = along / max(float(along.sum()), np.finfo(float).tiny)
 
     def _shape_widths(self) -> Real:
         """By what the width of each pair (m,) is multiplied: short ones have the others' product of force and opening
@@ -142,8 +145,9 @@ class SmoothSearch:
         if self._first is None:
             self._first = state
         many, fewest = counts[-1] > max(MANY * self._problem.laws.count, LEAST), min(counts[:-1], default=np.inf)
-        stalls = len(counts) >= FIRST and counts[-1] >= SLOWLY * fewest
-        if not (self._allowed and many and (stalls or counts[-1] > SOARED * fewest)):
+        stalls = len(counts) >= (FIRST_ALONE if self._alone else FIRST) and counts[-1] >= SLOWLY * fewest
+        soared = not self._alone and counts[-1] > SOARED * fewest
+        if not (self._allowed and many and (stalls or soared)):
             return False
         self._allowed = False
         return True
@@ -172,7 +176,7 @@ class SmoothSearch:
             begin = time.perf_counter()
             law = linearise_smoothly(
                 problem.laws, self.smooth, state, memory, load.pressure, problem.traction_scale,
-                width.value * self._shape, proximal,
+                width.value * self._shape, proximal, width.aim,
             )
             constraints = hold.release(problem.constrain(law, load), holding)
             closely = max(CLOSELY * np.sqrt(width.value / width.first), CLOSELIEST)
@@ -184,15 +188,18 @@ class SmoothSearch:
                 return modes, state
             forcing.used |= solved.loosely
             found = evaluate_pairs(problem.mesh, law, solved.unknowns)
-            before, state = modes, take_off_proximal(problem.laws, self.smooth, found, state, proximal)
-            modes, off = problem.decide(lambda at=state, e=width.value: (  # type: ignore[misc]
-                read_modes(problem.laws, self.smooth, at, memory, load.pressure), self._count_off(at, e)))
+            found = take_off_proximal(problem.laws, self.smooth, found, state, proximal)
+            part, off = problem.decide(lambda now=state, new=found, at=width: self._choose_part(now, new, at))  # type: ignore[misc]
+            before, state = modes, state.approach(found, part)
+            modes = problem.decide(lambda at=state: (  # type: ignore[misc]
+                read_modes(problem.laws, self.smooth, at, memory, load.pressure)))
             changed = (before.mode != modes.mode) | ((modes.mode == SLIP) & (before.sign != modes.sign))
             record.add(solved, modes, changed, begin)
             self.taken += 1
-            if width.value <= width.last and np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST):
+            few = np.count_nonzero(changed) <= max(FEW * len(changed), FEWEST)
+            if part == 1 and width.fall(part) <= width.last and few:
                 break
-            width = width.choose_next(off)
+            width = width.go_on(part, off)
         return modes, state
 
     def _start(self, modes: ModeState) -> SmoothCourse:
@@ -202,17 +209,27 @@ class SmoothSearch:
             float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
         last = NARROWEST * largest
         begin = max(WIDTH * violation, last)
-        width = Width(begin, begin, last, OFF * problem.laws.count)
-        return SmoothCourse(modes, first, close_all(problem.laws, modes), width)
+        return SmoothCourse(modes, first, close_all(problem.laws, modes), Width(begin, begin, last))
+
+    def _choose_part(self, state: PairState, found: PairState, width: Width) -> tuple[float, float]:
+        """The part of the way from a state to a solution that is gone, and by how much pairs are off then."""
+        off = [self._measure_off(state.approach(found, part), width.fall(part)) for part in PARTS]
+        if width.aim < 1:
+            near = [k for k, each in enumerate(off) if each <= NEAR]
+            best = near[0] if near else int(np.argmin(off))
+        else:
+            whole = off[0] <= BETTER * self._measure_off(state, width.value)
+            best = 0 if whole else int(np.argmin(off))
+        return PARTS[best], off[best]
+
+    def _measure_off(self, state: PairState, width: float) -> float:
+        """By how many widths pairs are off their smoothed laws, in the mean along them (see CENTRED)."""
+        off = self._find_violation(state, width) / (width * self._shape)
+        return float(self._along @ np.minimum(off, FARTHEST))
 
     def _measure(self, state: PairState) -> float:
         """The mean violation of the true laws along all pairs (stress)."""
-        weight = np.where(self.smooth, self._problem.mesh.pairs.weight, 0.0)
-        return float(weight @ self._find_violation(state, 0.0) / weight.sum())
-
-    def _count_off(self, state: PairState, width: float) -> int:
-        """The number of pairs that are off their smoothed laws by more than their width."""
-        return int(np.count_nonzero(self._find_violation(state, width) > width * self._shape))
+        return float(self._along @ self._find_violation(state, 0.0))
 
     def _find_violation(self, state: PairState, width: float) -> Real:
         return measure_violation(

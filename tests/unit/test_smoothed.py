@@ -227,6 +227,48 @@ def test_the_search_ends_in_the_same_solution(many_groups: None, at_once: list[i
     np.testing.assert_allclose(found.contact.slip, slip, rtol=0, atol=1e-7 * np.abs(slip).max())
 
 
+def write_grid(count: int) -> str:
+    """A plate that is stretched both ways, with so many cracks across each other, and blocks under their weight."""
+    random, size = np.random.default_rng(1), count + 3.0
+    lines = ["materials.rock = { young = 1e4, poisson = 0.2, density = 1.0 }", "gravity.gy = -0.1",
+             "analysis = { steps = 1, order = 1 }", "boundary.b = { ux = 0.0, uy = 0.0 }",
+             f"boundary.t = {{ ux = 0.0, uy = {1e-3 * size} }}", f"boundary.r = {{ ux = {1e-3 * size} }}"]
+    corners = [(0.0, 0.0), (size, 0.0), (size, size), (0.0, size)]
+    for name, a, b in zip("brtl", corners, corners[1:] + corners[:1], strict=True):
+        lines.append(f"curves.{name} = {{ points = [{list(a)}, {list(b)}], elements = 8 }}")
+    cracks = []
+    for k in range(count):
+        for turned in (False, True):
+            across = 1 + (size - 2) * (k + 0.75) / (count + 0.5) + random.uniform(-0.2, 0.2, 2)
+            a, b = ([[float(v), end] for v, end in zip(across, (1.0, size - 1), strict=True)])
+            if turned:
+                a, b = a[::-1], b[::-1]
+            cracks.append(f"c{len(cracks)}")
+            lines.append(f"curves.{cracks[-1]} = {{ points = [{a}, {b}], elements = 12 }}")
+            lines.append(f"interfaces.{cracks[-1]} = {{ friction = 0.5 }}")
+    names = ", ".join(f'"{name}"' for name in cracks)
+    lines.append(f'regions.p = {{ material = "rock", boundary = ["b", "r", "t", "l"], cracks = [{names}] }}')
+    return "\n".join(lines)
+
+
+def test_blocks_in_models_without_groups_are_laid_by_smoothed_laws(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[int] = []
+    find = SmoothSearch.find
+
+    def count(search: SmoothSearch, *arguments: Any) -> tuple[ModeState, PairState]:
+        found = find(search, *arguments)
+        taken.append(search.taken)
+        return found
+
+    monkeypatch.setattr(SmoothSearch, "find", count)
+    monkeypatch.setattr(smooth_search, "FIRST_ALONE", 2)
+    step = march_over(write_grid(3))
+    assert len(taken) == 1 and len(step.iterations) < 50
+    # The path leads to where hardly a status is another one with the true laws.
+    assert len(step.iterations) - taken[0] <= 10 and {STICK, SLIP, OPEN} <= set(step.contact.mode)
+    assert step.contact.opening.min() > -1e-9 and step.contact.opening.max() > 1e-4
+
+
 class Counter(SilentReporter):
     """Keeps the numbers of the iterations."""
 

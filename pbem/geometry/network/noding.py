@@ -17,6 +17,8 @@ from pbem.geometry.shape import share
 
 # Each round adds nodes, which keep their distance from each other; few are needed.
 MOST_ROUNDS = 60
+# Rounds that ask for so many times as many cuts as there were legs, and cuts in the first round, only bring ever more.
+MOST_TIMES = 10
 
 
 class UnsettledError(ValueError):
@@ -39,6 +41,8 @@ class _Edges:
     fresh: Bool
 
 
+# Legs whose ends come to lie in one place have no direction: nothing is near to them.
+@np.errstate(divide="ignore", invalid="ignore")
 def cut_at_nodes(
     strands: list[Strand], points: Complex, snap: float, rounding: float, log: Log
 ) -> Complex:
@@ -47,7 +51,7 @@ def cut_at_nodes(
     fresh = [[True] * len(strand.legs) for strand in strands]
     for strand in strands:
         strand.barred = [frozenset()] * len(strand.legs)
-    known = 0
+    known, most = 0, 0
     for _ in range(MOST_ROUNDS):
         edges = _collect(strands, fresh)
         used = np.unique(np.concatenate([edges.first, edges.second]))
@@ -55,12 +59,15 @@ def cut_at_nodes(
         known = len(points)
         edge, places = _find_crossings(edges, rounding)
         points, crossed = _number_crossings(points, used, places, snap)
-        points, crossed = _keep_off_barred(strands, edges, edge, points, crossed, places)
+        points, crossed = _keep_off_barred(strands, edges, edge, points, crossed, places, rounding)
         all_edges = np.concatenate([passed[0], edge[:, 0], edge[:, 1]])
         all_nodes = np.concatenate([passed[1], crossed, crossed])
         inner = (edges.first[all_edges] != all_nodes) & (edges.second[all_edges] != all_nodes)
         inner &= ~_find_barred(strands, edges, all_edges, all_nodes)
         cuts = np.unique(np.stack([all_edges[inner], all_nodes[inner]], axis=1), axis=0)
+        most = most or MOST_TIMES * (len(edges.first) + len(cuts))
+        if len(cuts) > most:
+            break
         fresh = [[False] * len(strand.legs) for strand in strands]
         if not _apply(strands, edges, points, cuts, fresh, rounding, log):
             return points
@@ -172,13 +179,19 @@ def _find_barred(strands: list[Strand], edges: _Edges, edge: Integer, node: Inte
 
 
 def _keep_off_barred(
-    strands: list[Strand], edges: _Edges, pairs: Integer, points: Complex, nodes: Integer, places: Complex
+    strands: list[Strand], edges: _Edges, pairs: Integer, points: Complex, nodes: Integer, places: Complex,
+    rounding: float,
 ) -> tuple[Complex, Integer]:
-    """Crossings next to a node that one of the edges must not be bent through get one of their own."""
+    """Crossings next to a node that one of the edges must not be bent through get one of their own, one for all that
+    are in the same place."""
     both = _find_barred(strands, edges, pairs[:, 0], nodes) | _find_barred(strands, edges, pairs[:, 1], nodes)
     alone = np.flatnonzero(both)
-    nodes[alone] = len(points) + np.arange(len(alone))
-    return np.concatenate([points, places[alone]]), nodes
+    if not len(alone):
+        return points, nodes
+    own = places[alone]
+    first, which = np.unique(gather(own, sort_places(own), rounding), return_inverse=True)
+    nodes[alone] = len(points) + which.reshape(-1)
+    return np.concatenate([points, own[first]]), nodes
 
 
 def _apply(

@@ -41,7 +41,7 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
 
 # The laws are smoothed where after so many iterations, or where groups do not settle by themselves after so many, ...
-FIRST, FIRST_ALONE = 3, 5
+FIRST, FIRST_ALONE = 3, 12
 # ... no less than this part of the fewest pairs that changed before change (where blocks are held well it is a third at
 # most), and more than this part of all and so many, as pivoting does for fewer;
 SLOWLY = 0.5

@@ -158,7 +158,7 @@ def test_blocks_in_open_cracks_come_to_the_same_state_by_way_of_smoothed_laws(ma
     text = write_blocks("sxx = 1.0, syy = -0.05, sxy = 0.0")
     found, usual = solve(text, True), solve(text, False)
     # Groups that settle by themselves take 2 here; what is asked is that the stiffness goes away, and nothing with it.
-    assert len(found.iterations) <= 12
+    assert len(found.iterations) <= 20
     assert (usual.contact.mode == OPEN).mean() > 0.6
     np.testing.assert_array_equal(found.contact.mode, usual.contact.mode)
     slip = usual.contact.slip

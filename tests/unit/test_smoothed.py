@@ -266,7 +266,8 @@ def test_blocks_in_models_without_groups_are_laid_by_smoothed_laws(monkeypatch: 
     assert len(taken) == 1 and len(step.iterations) < 50
     # The path leads to where hardly a status is another one with the true laws.
     assert len(step.iterations) - taken[0] <= 10 and {STICK, SLIP, OPEN} <= set(step.contact.mode)
-    assert step.contact.opening.min() > -1e-9 and step.contact.opening.max() > 1e-4
+    opening = step.contact.opening
+    assert opening.max() > 1e-4 and opening.min() > -1e-6 * opening.max()
 
 
 class Counter(SilentReporter):

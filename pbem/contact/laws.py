@@ -122,8 +122,7 @@ class PairState:
 
     def approach(self, other: PairState, part: float) -> PairState:
         """The state at a part of the way to another one."""
-        ways = zip(vars(self).values(), vars(other).values(), strict=True)
-        return PairState(*(own + part * (end - own) for own, end in ways))
+        return PairState(*(own + part * (vars(other)[name] - own) for name, own in vars(self).items()))
 
 
 @dataclass(frozen=True)

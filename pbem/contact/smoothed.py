@@ -66,7 +66,7 @@ def linearise_smoothly(
 
     width: e, a stress, of all or of each; aim: the part of e^2 with which they are aimed at, of the first order in it.
     proximal (m,): stiffness against the change of the jumps, stress/length; what it bears is part of the tractions, see
-    `take_off_proximal`. (theory, 122, 123, 127, 130)
+    `take_off_proximal`. (theory, 122, 123, 127, 132)
     """
     r, k, scale = laws.stiffness, proximal, traction_scale
     x, y = _try(laws, state, memory, pressure)
@@ -157,7 +157,7 @@ def _find_bound(laws: PairLaws, held: Real, memory: Memory, pressure: Real) -> S
 
 def _smooth_maximum(values: Real, width: float | Real, aim: float = 1.0) -> tuple[Real, Real]:
     """Of values and zero, and its slope, which is between 0 and 1 (theory, 122); the first with a part of e^2 alone, to
-    the first order (theory, 130)."""
+    the first order (theory, 132)."""
     root = np.maximum(np.sqrt(values * values + 4 * width * width), np.finfo(float).tiny)
     # Without cancellation where a value is far below zero.
     result = np.where(values > 0, 0.5 * (values + root), 2 * width * width / (root + np.abs(values)))

@@ -85,7 +85,7 @@ class Width:
     aim: float = 1.0
 
     def fall(self, part: float) -> float:
-        """The width after a part of the way to what is aimed at. (theory, 130)"""
+        """The width after a part of the way to what is aimed at. (theory, 132)"""
         return max(self.value * float(np.sqrt(1 - part * (1 - self.aim))), self.last)
 
     def go_on(self, part: float, off: float) -> Width:

@@ -32,7 +32,7 @@ SLENDER, ALONGSIDE, ASKED = 2.5 * (1 + TIE), 0.5, 20
 # Faces of a body this much longer than it is thick are told where elements are linear: deflections of cantilevers with
 # Poisson's ratio 0 were 5 % too small at a slenderness of 10, 17 % at 50, 30 % at 100, 46 % at 200, with elements half
 # as long a third of that. Of bodies with more faces it is not asked.
-THIN, MOST_FACES = 8.0 * (1 + TIE), 200
+THIN, MOST_FACES = 8.0, 200
 
 
 @dataclass(frozen=True)

@@ -224,7 +224,7 @@ def study(seed: int, operators: list[str], folder: Path) -> list[dict[str, Any]]
             row["left"], force = run(sample.elements, False)
             row["finer"] = run(2 * sample.elements, False)[0] if operator == "dense" else math.nan
             row["fourfold"], row["finest"] = (
-                run(times * sample.elements, False, "hierarchical")[0] if leaves_more(row) else math.nan
+                run(times * sample.elements, False)[0] if leaves_more(row) else math.nan
                 for times in (4, 8)
             )
             row["off"] = math.nan

@@ -89,8 +89,8 @@ def abort_if_unexpected(comm: MPI.Intracomm, expected: type[Exception]) -> Itera
             raise
         where = f"pbem: rank {comm.rank} of {comm.size}"
         if lacks_memory(error):
-            # Ranks of a node run out of memory together; whichever speaks first ends the others.
-            time.sleep(0.2 * min(comm.rank, 50))
+            # Ranks of a node run out of memory together; whichever speaks first ends the others, on busy nodes later.
+            time.sleep(0.8 * min(comm.rank, 1) + 0.2 * min(comm.rank, 50))
             text = f"{where}: {describe_lack(error)}; all ranks end\n"
         else:
             text = f"{where} failed, all ranks end\n{traceback.format_exc()}"

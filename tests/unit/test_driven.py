@@ -71,7 +71,8 @@ def test_friction_is_measured_by_all_forces() -> None:
 @pytest.mark.parametrize(("carried", "friction", "driven"), [
     (0.02, 0.0, False), (0.04, 0.0, True),  # of the mesh; of the loads
     (0.02, 0.03, True), (0.005, 0.03, False),  # most of what friction bears; a little of it
-    (0.02, 0.3, False), (0.02, 1e-3, False),
+    (0.02, 0.3, False), (0.02, 1e-3, False), (4e-3, 5e-3, True), (1e-3, 5e-3, False),
+    (6e-3, 5e-3, False),  # more than friction could stop
 ])  # fmt: skip
 def test_what_friction_would_stop_is_driven(carried: float, friction: float, driven: bool) -> None:
     none = np.zeros(0)

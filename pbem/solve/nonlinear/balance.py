@@ -71,7 +71,7 @@ def measure_friction(problem: Problem, v: Real, load: Load, p_s: Real) -> Real:
     friction = np.zeros(count)
     borne = np.where(mesh.pairs.crack, 0.0, np.abs(p_s))
     for side in (mesh.pairs.first, mesh.pairs.second):
-        np.add.at(friction, mesh.node_region[side], mesh.weight[side] * borne)
+        np.add.at(friction, mesh.node_region[side], mesh.pairs.weight * borne)
     return _divide(friction, forces)
 
 

@@ -14,9 +14,9 @@ from pbem.wording import write_percent
 # Left-over parts of the sum of all forces on a region that are noted, that mean that a body does not stay where its
 # anchors hold it, and that make a result wrong, where they are more than WEIGHTY of those on the most loaded region.
 NOTED, DRIVEN, NOT_IN_BALANCE, WEIGHTY = 1e-3, 3e-2, 1e-1, 1e-2
-# Bodies that slip all around are driven, too, by this part of their friction, which would stop them: of no less than so
-# much of all forces, as less than that is as little as what meshes leave over.
-STOPPED, ROUGH = 0.3, 1e-2
+# Bodies that slip all around are driven, too, by this part of their friction, which would stop them. What is more than
+# all of it no friction can stop: meshes leave it over.
+STOPPED = 0.3
 # The same of a net force on an infinite region that prescribed displacements or springs bring about.
 NET_FORCE = 1e-2
 # Parts that cracks cut off are judged if they carry more than this part of what the most loaded region does.
@@ -28,8 +28,8 @@ def are_driven(balance: Balance, friction: Real) -> bool:
 
     friction (regions,): see measure_friction.
     """
-    bound = np.where(friction > ROUGH, np.minimum(STOPPED * friction, DRIVEN), DRIVEN)
-    return bool((balance.carried > bound).any())
+    stopped = (friction > NOTED) & (balance.carried > STOPPED * friction) & (balance.carried <= friction)
+    return bool((stopped | (balance.carried > DRIVEN)).any())
 
 
 def describe_imbalance(problem: Problem, balance: Balance) -> str | None:

@@ -16,7 +16,7 @@ from pbem.geometry.curve import Curve, Leg, turning_angle
 from pbem.geometry.intersection import measure_distances, meeting_points, project
 from pbem.geometry.junction import format_point, split_leg
 from pbem.geometry.loop import Loop, Loops, is_inside, loop_legs
-from pbem.geometry.tolerance import Tolerance
+from pbem.geometry.tolerance import TIE, Tolerance
 from pbem.model.roles import Roles, unknown_name
 from pbem.wording import list_names
 
@@ -24,7 +24,7 @@ from pbem.wording import list_names
 ON_CURVE = 1e-6
 # A load inside has to be further from curves than this part of their elements, and is told of if nearer than an
 # element: the stress that it brings to a curve changes within its distance. Only where the user keeps the elements.
-TOO_NEAR, NEAR = 0.05, 1.0
+TOO_NEAR, NEAR = 0.05 * (1 - TIE), 1.0 - TIE
 # An angle of a corner below this (radians) is no wedge.
 SHARPEST = math.radians(1.0)
 # Points at which the end of a cut is tried.

@@ -34,6 +34,9 @@ class Carriers:
         return Carriers(self.point[numbers], self.direction[numbers], self.radius[numbers])
 
 
+NO_CARRIERS = Carriers(np.zeros(0, dtype=complex), np.zeros(0, dtype=complex), np.zeros(0))
+
+
 def find_carriers(curves: Mapping[str, Curve]) -> dict[str, Carriers]:
     """Those of the legs of all curves."""
     radii: dict[complex, list[float]] = {}
@@ -105,6 +108,8 @@ def _direct(vectors: Complex) -> Complex:
 
 def _find_of_curve(legs: Sequence[Leg], radii: dict[complex, list[float]]) -> Iterable[Carriers]:
     """Those of the legs of a curve, a run of legs at a time. radii: of all circles so far, by their centres."""
+    ends = np.array([leg.start for leg in legs] + [legs[-1].end])
+    arcs = np.flatnonzero([leg.turn != 0 for leg in legs])
     begin = 0
     while begin < len(legs):
         leg = legs[begin]
@@ -113,12 +118,27 @@ def _find_of_curve(legs: Sequence[Leg], radii: dict[complex, list[float]]) -> It
         if radius:
             radius = _find_radius(point, radius, radii)
         else:
-            while end < len(legs) and _lie_on_line(legs[begin : end + 1]):
-                end += 1
+            arc = np.searchsorted(arcs, begin)
+            end += _count_on_line(ends[begin : arcs[arc] + 1 if arc < len(arcs) else None])
             chord = legs[end - 1].end - leg.start
             direction = chord / abs(chord)
         yield _spread(point, direction, radius, end - begin)
         begin = end
+
+
+def _count_on_line(ends: Complex) -> int:
+    """How many straight legs go on along the line of the first. ends: of all until the next arc.
+
+    In steps that double as long as they succeed and are halved after: to ask for each leg would be quadratic.
+    """
+    count, step, growing = 0, 1, True
+    while step:
+        if count + step + 1 < len(ends) and _lie_on_line(ends[: count + step + 2]):
+            count += step
+        else:
+            growing = False
+        step = 2 * step if growing else step // 2
+    return count
 
 
 def _find_radius(center: complex, radius: float, radii: dict[complex, list[float]]) -> float:
@@ -132,11 +152,8 @@ def _find_radius(center: complex, radius: float, radii: dict[complex, list[float
     return radius
 
 
-def _lie_on_line(legs: Sequence[Leg]) -> bool:
-    """Whether legs that follow each other are straight and go on along one line, but for the rounding of their ends."""
-    if legs[-1].turn:
-        return False
-    ends = np.array([leg.start for leg in legs] + [legs[-1].end])
+def _lie_on_line(ends: Complex) -> bool:
+    """Whether straight legs between successive ends go on along one line, but for the rounding of their ends."""
     chord = ends[-1] - ends[0]
     if chord == 0:
         return False

@@ -17,7 +17,8 @@ class Chain:
     """The elements of one curve in a region's order of travel (region on the left).
 
     forward: travelled in the curve's own direction. traction (elements,): the traction equation is collocated there.
-    first_node: number of its first node in the mesh. order: of the shapes on its elements. rigid: of a tool.
+    first_node: number of its first node in the mesh. order: of the shapes on its elements. carriers: of its
+    elements, in order; none of curves in no contact. rigid: of a tool.
     """
 
     region: int

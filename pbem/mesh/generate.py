@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pbem.arrays import Bool
-from pbem.geometry.carrier import find_carriers
+from pbem.geometry.carrier import NO_CARRIERS, find_carriers
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import count_elements, divide_curve, weigh_nodes
 from pbem.mesh.equations import Equations, choose_equations
@@ -65,17 +65,23 @@ def _find_free_elements(model: Model, chains: list[Chain], pairs: Pairs, links: 
 
     They are free surface, and with HST and DBEM keep the displacement equation like any other.
     """
-    faces = {name for contact in model.contacts.values() for name in (contact.first, contact.second)}
+    faces = _list_contact_faces(model)
     free = np.concatenate([np.full(chain.elements.count, chain.curve in faces) for chain in chains])
     for nodes in (pairs.slave, links.displacement_node, links.traction_node):
         free[nodes // (model.analysis.order + 1)] = False
     return free & (model.analysis.scheme != "THST")
 
 
+def _list_contact_faces(model: Model) -> set[str]:
+    """Names of the curves in contacts."""
+    return {name for contact in model.contacts.values() for name in (contact.first, contact.second)}
+
+
 def _list_chains(model: Model, equations: Equations) -> list[Chain]:
     order = model.analysis.order
     chains: list[Chain] = []
-    carriers = find_carriers(model.curves)
+    faces = _list_contact_faces(model)
+    carriers = find_carriers({name: curve for name, curve in model.curves.items() if name in faces})
     first_node = 0
     for number, region in enumerate(model.regions):
         sides = [(side.curve, side.forward, False) for loop in region.loops for side in loop.sides]
@@ -87,7 +93,7 @@ def _list_chains(model: Model, equations: Equations) -> list[Chain]:
             if not forward:
                 elements, traction, leg = elements.reverse(), traction[::-1], leg[::-1]
             chains.append(Chain(number, curve, forward, crack, traction, elements, first_node, order,
-                                carriers[curve].select(leg), region.rigid))
+                                carriers[curve].select(leg) if curve in faces else NO_CARRIERS, region.rigid))
             first_node += elements.count * (order + 1)
     return chains
 

@@ -8,6 +8,7 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 
+from pbem.geometry import carrier
 from pbem.geometry.carrier import Carriers, find_carriers, measure_distances
 from pbem.geometry.curve import Curve, Leg
 
@@ -140,3 +141,35 @@ def test_legs_of_one_line_and_of_one_circle_share_it() -> None:
     assert line.point[3] == ends[-1]
     assert seen["arc"].radius == seen["rest"].radius == pytest.approx(0.61, abs=1e-15)
     assert not seen["arc"].direction.any()
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_many_legs_of_a_line_share_it_at_a_price_that_grows_as_their_number_does(
+    reverse: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same line as of few legs; each leg is looked at some 20 times, not once for every other one."""
+    count, first, to = 4000, 0.1 + 0.3j, cmath.exp(0.7j)
+    rng = np.random.default_rng(3)
+    ends = first + to * np.append(0.0, np.cumsum(rng.uniform(0.1, 1.0, count)))
+    turned = ends[-1] + 1j * to * np.arange(1, 4)
+    looked = []
+    ask = carrier._lie_on_line
+
+    def listen(asked: np.ndarray) -> bool:
+        looked.append(len(asked))
+        return ask(asked)
+
+    monkeypatch.setattr(carrier, "_lie_on_line", listen)
+    seen = []
+    for places in (ends, ends[:: count // 4]):
+        legs = [Leg(complex(a), complex(b), 2) for a, b in itertools.pairwise(np.concatenate([places, turned]))]
+        curve = Curve("line", tuple(legs))
+        seen.append(find_carriers({"line": curve.reverse() if reverse else curve})["line"])
+    many, few = (each if not reverse else each.select(np.arange(len(each.point))[::-1]) for each in seen)
+    assert len(many.point) == count + 3
+    for column in ("point", "direction", "radius"):
+        own, other = getattr(many, column), getattr(few, column)
+        assert len(set(own[:count])) == len(set(own[count:])) == 1
+        assert own[0] == other[0]
+        assert own[-1] == other[-1]
+    assert sum(looked) < 40 * count

@@ -57,6 +57,7 @@ from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
 from pbem.model.steep_loads import shorten_under_loads
 from pbem.model.support_motions import check_independent
+from pbem.model.thin_bodies import list_bonded
 from pbem.model.tools import check_tools, divide_tools, make_tool_regions, orient_tools
 from pbem.model.varying import Varying
 from pbem.wording import list_names
@@ -248,10 +249,11 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
     )
     tools = make_tool_regions(case, curves, loading.rigid.bodies, topology.loops)
     jointed = frozenset(loading.interfaces) | frozenset(roles.in_contact)
+    bonded = list_bonded(loading.interfaces, loading.stages)
     loads = tuple(topology.points.loads.values())
     fitted = shorten_under_loads(case, recall.find(
-        "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts, loads),
-        lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts, loads),
+        "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts, loads, bonded),
+        lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts, loads, bonded),
     ))
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",

@@ -11,7 +11,7 @@ from pbem.arrays import Complex
 from pbem.description.case import Case
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve
-from pbem.geometry.intersection import measure_distances, project
+from pbem.geometry.intersection import measure_distances
 from pbem.geometry.junction import format_point
 from pbem.geometry.tolerance import TIE
 from pbem.model.lengths import count_elements
@@ -21,6 +21,7 @@ from pbem.model.sizing import Excess, LongElement, fit_lengths
 from pbem.model.sliver import Tie
 from pbem.model.slot import SlotSide
 from pbem.model.tangency import Tangency, find_tangencies, grade_tangencies
+from pbem.model.thin_bodies import THIN, find_thin_bodies
 from pbem.wording import list_names
 
 # Curves and corners that are named in one note.
@@ -29,10 +30,6 @@ MOST_NAMED = 8
 # elements K was 0.7 % too large at 2, 6 % at 4, 27 % at 8. They do so along half of the crack at least (a small hole
 # beside it does not); asked at so many points.
 SLENDER, ALONGSIDE, ASKED = 2.5 * (1 + TIE), 0.5, 20
-# Faces of a body this much longer than it is thick are told where elements are linear: deflections of cantilevers with
-# Poisson's ratio 0 were 5 % too small at a slenderness of 10, 17 % at 50, 30 % at 100, 46 % at 200, with elements half
-# as long a third of that. Of bodies with more faces it is not asked.
-THIN, MOST_FACES = 8.0, 200
 
 
 @dataclass(frozen=True)
@@ -49,10 +46,12 @@ class FittedCurves:
 def fit_curves(
     case: Case, curves: Mapping[str, Curve], regions: Sequence[Region], tips: Mapping[str, tuple[bool, bool]],
     jointed: frozenset[str], contacts: Mapping[str, tuple[str, str]], loads: Collection[PointLoad] = (),
+    bonded: Collection[str] = (),
 ) -> FittedCurves:
     """Divide curves anew where their elements are too long for the faces around them, or for loads inside.
 
-    tips: per crack whether its ends are tips; jointed: curves with contact pairs.
+    tips: per crack whether its ends are tips; jointed: curves with contact pairs;
+    bonded: those that always hold two regions together.
     """
     kept = frozenset(name for name, table in case.curves.items() if table.grading != "auto")
     with_elements = tips if case.analysis.tips else {}
@@ -69,7 +68,7 @@ def fit_curves(
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     graded, near = _grade_contacts(case, sizes.curves, contacts)
     notes = [*_note_added(curves, sizes.curves, any(inside)), *near, *_note_ties(ties), *_note_long(sizes.long),
-             *_note_slender(case, sizes.curves, regions), *_note_thin(case, sizes.curves, regions)]
+             *_note_slender(case, sizes.curves, regions), *_note_thin(case, sizes.curves, regions, bonded)]
     return FittedCurves(graded, ties, tuple(notes), ())
 
 
@@ -94,22 +93,13 @@ def _note_slender(case: Case, curves: Mapping[str, Curve], regions: Sequence[Reg
             "analysis.order = 2 is right there."]
 
 
-def _note_thin(case: Case, curves: Mapping[str, Curve], regions: Sequence[Region]) -> list[str]:
-    """Long faces of thin bodies, which constant and linear elements do not bend either."""
-    if case.analysis.order > 1:
-        return []
-    found: dict[str, None] = {}
-    for region in regions:
-        faces = [(side, leg) for loop in region.loops for side in loop.sides for leg in curves[side.curve].legs]
-        for number, (side, leg) in enumerate(faces if not region.rigid and len(faces) <= MOST_FACES else ()):
-            others = [each for k, (_, each) in enumerate(faces) if k != number]
-            points = np.asarray(leg.point(np.array([0.25, 0.5, 0.75])))
-            if others and THIN * (1 + TIE) * measure_distances(others, points).max() < leg.length:
-                foot = min((complex(each.point(np.array(project(each, complex(points[1]))[0]))) for each in others),
-                           key=lambda z: abs(z - points[1]))
-                across = (foot - points[1]) / (points[2] - points[0])
-                if (across.imag > 0) == side.forward:  # through the body, which loops have on their left
-                    found[side.curve] = None
+def _note_thin(
+    case: Case, curves: Mapping[str, Curve], regions: Sequence[Region], bonded: Collection[str]
+) -> list[str]:
+    """Long faces of thin bodies, which constant and linear elements do not bend either: deflections of cantilevers with
+    Poisson's ratio 0 were 5 % too small at a slenderness of 10, 17 % at 50, 30 % at 100, 46 % at 200, with elements
+    half as long a third of that."""
+    found = find_thin_bodies(curves, regions, bonded) if case.analysis.order <= 1 else []
     if not found:
         return []
     return [f"Bodies along {list_names([repr(name) for name in found], MOST_NAMED)} are thin, more than {THIN:g} times "

@@ -19,7 +19,7 @@ from pbem.results.tail import DamageError, find_unapplied
 DAMAGE = (KeyError, ValueError, RuntimeError, TypeError, AttributeError, IndexError, MemoryError, OverflowError)
 
 # What HDF5 says of a file that this process has open already, with other locks than are asked for now.
-OTHER_LOCKS = "file locking flag values don't match"
+OTHER_LOCKS = "flag values don't match"
 
 
 @contextmanager

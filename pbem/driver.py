@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ from pbem.parallel import (
     check_communicator,
     do_on_first,
 )
-from pbem.pass_file import PassFile, expect_writer, write_pass
+from pbem.pass_file import PassFile, expect_writer, keep_waiting, write_pass
 from pbem.passes import Finer, Target, blame_tries, plan_finer, plan_graded, recall_mesh
 from pbem.results.accuracy import Decision, Pass, decide, refine_marked
 from pbem.results.contact_ends import find_contact_ends
@@ -54,7 +55,7 @@ from pbem.solve.steps.march import free_at_last, march, start_from
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
-from pbem.storing import WaitingSteps, make_estimator, store_steps
+from pbem.storing import WaitingSteps, make_estimator, store_steps, store_without_errors
 
 
 def run(
@@ -158,7 +159,7 @@ def _refine_and_solve(
     former: _Done | None = None
     made: Mesh | None = None
     while True:
-        with clock.piece("reading"):
+        with clock.piece("reading"), _keep_if_ended(former):
             mesh, made = made or generate_mesh(model), None
             check_shares(model, mesh, watch.comm.size)
             remarks = check_memory(watch.comm, model, mesh)
@@ -170,12 +171,13 @@ def _refine_and_solve(
             watch.note(note)
         now = replace(one, first_unknowns=one.first_unknowns or 2 * mesh.nodes)
         try:
-            done = _solve(model, mesh, target, options, watch, signals, now, kept, former, graded)
+            with _keep_if_ended(former):
+                done = _solve(model, mesh, target, options, watch, signals, now, kept, former, graded)
         except ConvergenceError as error:
             if one.spare:
                 watch.note(f"The run on that mesh did not converge ({error.reason}): the results are those before.")
                 if former and former.store:
-                    former.store()
+                    former.store(None)
                 return
             # What was gone on with, and what is kept for other runs, stays on its mesh.
             once = target.resume or kept
@@ -206,12 +208,25 @@ def _refine_and_solve(
 @dataclass(frozen=True)
 class _Done:
     """What a pass has come to: what follows, and its modes. planned: the pass that was found to take its place before
-    anything of it was stored; store: does that after all."""
+    anything of it was stored; store: does that after all, as the other one came to nothing or an error has ended it."""
 
     decision: Decision
     modes: FormerPass
     planned: Finer | None = None
-    store: Callable[[], None] | None = None
+    store: Callable[[BaseException | None], None] | None = None
+
+
+@contextmanager
+def _keep_if_ended(former: _Done | None) -> Iterator[None]:
+    """Store the former pass if it is not, where an error other than of convergence leaves the block."""
+    try:
+        yield
+    except ConvergenceError:
+        raise
+    except BaseException as error:
+        if former and former.store:
+            former.store(error)
+        raise
 
 
 def _solve(
@@ -228,8 +243,12 @@ def _solve(
     watch.check()
     signals.at_once = False  # not between the two halves of what the file and the ranks agree upon
 
-    def store(waiting: WaitingSteps) -> None:
-        """What a later pass was to take the place of."""
+    def store(waiting: WaitingSteps, error: BaseException | None) -> None:
+        """What a later pass was to take the place of; error: what has ended that one, None if it came to nothing."""
+        if error is not None:
+            keep_waiting(file, watch.comm, error, lambda writer, comm: store_without_errors(
+                waiting.replay(), model.output_every, interior if comm is watch.comm else None, writer, comm))
+            return
         again = replace(file, target=Target(target.path, False, True), beside=False)
         write_pass(again, watch.comm, lambda writer: _store(
             writer, model, mesh, interior, waiting.replay(), watch, signals, one, None, None))
@@ -246,7 +265,7 @@ def _solve(
 def _fill(
     writer: ResultWriter | None, model: Model, mesh: Mesh, interior: InteriorField | None, watch: Watch,
     signals: StopSignals, one: Pass, kept: KeptProblems | None, former: FormerPass | None, graded: int,
-    store: Callable[[WaitingSteps], None],
+    store: Callable[[WaitingSteps, BaseException | None], None],
 ) -> _Done:
     """Assemble, march, store the steps as they come, and judge their errors. former: with whose modes to begin. store:
     what to do with steps that are not stored if no other pass takes the place of this one after all."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from pbem.arrays import Integer
@@ -12,10 +12,10 @@ from pbem.clock import clock
 from pbem.errors import ConvergenceError, PbemError, StopError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.parallel import Comm, do_on_first, lacks_memory
+from pbem.parallel import Comm, alone, do_on_first, lacks_memory
 from pbem.passes import Target, blame_pass
 from pbem.results.accuracy import Pass
-from pbem.results.passes import KeptPass, PassOutput, open_beside
+from pbem.results.passes import KeptPass, PassOutput, holds_steps, open_beside
 from pbem.results.writer import ResultWriter
 from pbem.solve.petsc.session import petsc_version
 
@@ -75,13 +75,46 @@ def _end_badly(writer: ResultWriter, error: BaseException, former: KeptPass | No
     """Close the file. A pass that was stopped can be gone on with, one that has failed gives way to the former one."""
     reached = isinstance(error, ConvergenceError) and error.reason == "accuracy"
     stopped = isinstance(error, StopError | KeyboardInterrupt) and writer.steps_stored > 0
-    # PETSc and what lies below it have errors of their own for want of memory.
-    reasons = writer.abandon(MemoryError(" ".join(str(error).split())) if lacks_memory(error) else error)
+    reasons = writer.abandon(_name_lack(error))
     if former and (reached or stopped):
         former.drop()
     elif former:
         with suppress(PbemError, OSError):  # what ended the run must be what the user hears of
             former.restore({} if spare and isinstance(error, ConvergenceError) else reasons)
+
+
+def _name_lack(error: BaseException) -> BaseException:
+    """PETSc and what lies below it have errors of their own for want of memory."""
+    return MemoryError(" ".join(str(error).split())) if lacks_memory(error) else error
+
+
+def keep_waiting(
+    file: PassFile, comm: Comm, error: BaseException, store: Callable[[ResultWriter | None, Comm], object]
+) -> None:
+    """Store what a finished pass came to after an exception has ended the next one, and in the file's attributes why.
+
+    store: does that, by all ranks of its communicator together. An error that one rank may have alone is none for
+    calls of all: then the first rank stores by itself. A later pass that was stopped after steps can be gone on with,
+    and stays in the file.
+    """
+    ranks, together = comm.size, comm.size == 1 or isinstance(error, PbemError)
+    if not together and comm.rank > 0:
+        return
+    comm = comm if together else alone
+    target = Target(file.target.path, False, True)
+    # What ended the run must be what the user hears of.
+    with suppress(PbemError if comm.size > 1 else Exception):
+        stopped = isinstance(error, StopError | KeyboardInterrupt)
+        if stopped and do_on_first(comm, PbemError, lambda: holds_steps(target.path)):
+            return
+        again = replace(file, target=target, beside=False)
+        writer = (do_on_first(comm, PbemError, lambda: _open(again, ranks), share=False) or PassOutput()).writer
+        try:
+            store(writer, comm)
+        finally:
+            if writer:
+                writer.abandon(_name_lack(error), "on a mesh graded towards ends of contact; these are the steps of "
+                                                  f"the mesh before, of {2 * file.mesh.nodes} unknowns")
 
 
 def expect_writer(writer: ResultWriter | None) -> ResultWriter:

@@ -24,6 +24,8 @@ from pbem.solve.system.kept import KeptProblems
 
 # So many steps at most wait for what follows their pass.
 MOST_WAITING = 20
+# Why errors are not known of steps that were stored after the run had ended.
+NO_SECOND = "the run was ended before the second solution"
 
 
 def make_estimator(
@@ -112,6 +114,14 @@ def store_steps(
                 writer.complete(field)
         raise
     return last
+
+
+def store_without_errors(
+    steps: Iterator[Step], every: int, interior: InteriorField | None, writer: ResultWriter | None, comm: Comm
+) -> None:
+    """Write steps of a run that something has ended, which leaves no time for a second solution or no memory."""
+    store_steps(steps, every, interior, writer, comm=comm)
+    do_on_first(comm, PbemError, lambda: writer.note_missing(NO_SECOND) if writer else None)
 
 
 def _append(writer: ResultWriter | None, step: Step, rows: Mapping[str, Real] | None, missing: str) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.accuracy import Pass
 from pbem.results.journal import lock
-from pbem.results.layout import MAY_FOLLOW, read_fractions
+from pbem.results.layout import MAY_FOLLOW, count_steps, read_fractions
 from pbem.results.opening import open_quietly, refuse_damage
 from pbem.results.store import Store, name_part
 from pbem.results.trial import check_contents
@@ -73,6 +73,15 @@ def keep_pass(target: Path) -> KeptPass:
         return KeptPass(target)
     except OSError as error:
         raise ResultFileError(str(target), f"cannot be kept beside a finer pass ({error.strerror or error})") from error
+
+
+def holds_steps(path: Path) -> bool:
+    """Whether a step is stored in a result file. Raises ResultFileError if it cannot be read."""
+    try:
+        with open_quietly(path) as file:
+            return count_steps(file) > 0
+    except (OSError, KeyError, ValueError) as error:
+        raise ResultFileError(str(path), f"is not a readable result file ({error})") from error
 
 
 def expect_no_pass(path: Path) -> None:

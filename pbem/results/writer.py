@@ -343,14 +343,18 @@ class ResultWriter:
             return
         self.abandon(error)
 
-    def abandon(self, error: BaseException) -> Mapping[str, str]:
-        """Close the file of a run that an exception has ended; gives the attributes that say so."""
+    def abandon(self, error: BaseException, later: str = "") -> Mapping[str, str]:
+        """Close the file of a run that an exception has ended; gives the attributes that say so.
+
+        later: where it was ended, if in a pass that is not the one in the file."""
         reasons = _describe_end(error)
+        if later:
+            reasons = {**reasons, "failure": f"{reasons['failure']}; that was {later}"}
         # What ended the run must be what the user hears of, not that its last words could not be written.
         with suppress(Exception):
             if self._storage.is_open and self._storage.dirty:
                 self._storage.roll_back()  # it ended within a step
-            if self._storage.is_open and isinstance(error, StopError) and error.unfinished is not None:
+            if self._storage.is_open and isinstance(error, StopError) and error.unfinished is not None and not later:
                 write_unfinished(self._file, error.unfinished, self._pairs)
             self._close(reasons["status"], reasons)
         self._storage.drop()

@@ -202,6 +202,39 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     assert pbem.run(tmp_path / "pin.toml", tmp_path / "pin.h5", resume=True).status == "finished" and len(marches) == 2
     assert not list(tmp_path.glob("pin.h5?*"))
 
+
+@pytest.mark.parametrize("ending", [StopError("SIGTERM", "stopped by SIGTERM", 143), MemoryError("no room")])
+@pytest.mark.parametrize("place", ["march", "assemble_problem", "check_memory"])
+def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
+    ending: Exception, place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever ends it, and with what ended it in the file; resumed, the run goes on from them to the graded mesh."""
+    plain = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
+    case, path = write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5"
+    former, calls = getattr(driver, place), []
+
+    def fail(*given: Any, **named: Any) -> Any:
+        calls.append(given)
+        if len(calls) > 1:
+            raise ending
+        return former(*given, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(driver, place, fail)
+        with pytest.raises(type(ending)):
+            pbem.run(case, path)
+    kept = pbem.open_results(path)
+    assert len(calls) == 2 and kept.status == "stopped" and kept.fractions is None
+    assert str(ending).split(": ")[-1] in kept.failure and "on a mesh graded towards ends" in kept.failure
+    np.testing.assert_array_equal(kept.contact["seat"].traction_n, plain.contact["seat"].traction_n)
+    assert "ended before the second solution" in kept.errors.missing and not list(tmp_path.glob("pin.h5?*"))
+    again = pbem.run(case, path, resume=True)
+    whole = pbem.run(case, tmp_path / "whole.h5")
+    assert again.status == "finished" and again.fractions is not None and not again.errors.missing
+    np.testing.assert_allclose(again.contact["seat"].traction_n, whole.contact["seat"].traction_n, rtol=0,
+                               atol=1e-6 * np.abs(whole.contact["seat"].traction_n).max())
+
+
 def test_only_the_last_pass_is_stored_with_its_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What another pass follows is neither written nor followed by a second solution; its errors are those of a run
     on that mesh alone."""

@@ -22,7 +22,7 @@ from pbem.solve.steps.march import note_place
 from pbem.solve.system.interior import InteriorField
 from pbem.solve.system.kept import KeptProblems
 
-# So many steps at most wait for what follows their pass.
+# A pass of no more steps than these waits for what follows it.
 MOST_WAITING = 20
 # Why errors are not known of steps that were stored after the run had ended.
 NO_SECOND = "the run was ended before the second solution"
@@ -52,8 +52,8 @@ class WaitingSteps:
     """The first steps of a march, which wait until it is known whether another pass takes the place of this one: then
     neither their errors are estimated nor are they stored, which takes a third of a small run.
 
-    At most MOST_WAITING, so that little is lost where a process is killed. error: what has ended the march; made by all
-    ranks together, as the steps are.
+    MOST_WAITING, and the one that shows that there are more; of models small enough that little is lost where a process
+    is killed. error: what has ended the march; made by all ranks together, as the steps are.
     """
 
     def __init__(self, steps: Iterator[Step]) -> None:

@@ -246,7 +246,7 @@ def _evaluate_columns(
 ) -> Real:
     """Values at nodes (displacement, or traction on the node's normal) in the given columns of v.
 
-    free: translations of the region leave nothing, see _free_translations.
+    free: translations of the region leave nothing, see _restore_translations.
     """
     own = _region_nodes(mesh, region)
     first = own[0]
@@ -258,14 +258,14 @@ def _evaluate_columns(
         mesh.node_local[nodes], scratch,
     )
     if free:
-        _free_translations(displacement, ~mesh.node_crack[own], nodes - first, 0.0 if traction else 0.5)
+        _restore_translations(displacement, ~mesh.node_crack[own], nodes - first, 0.0 if traction else 0.5)
     parts = [displacement[:, columns[of_displacement] - 2 * first]]
     if tractions is not None:
         parts.append(tractions[:, columns[~of_displacement] - 2 * (mesh.nodes + first)])
     return np.concatenate(parts, axis=1)
 
 
-def _free_translations(rows: Real, bounding: Bool, own: Integer, half: float) -> None:
+def _restore_translations(rows: Real, bounding: Bool, own: Integer, half: float) -> None:
     """Let rows (2 k, 2 n) of a region's displacements give half of its translations, which the free terms take off.
 
     What rounding leaves is taken off the points' own columns, in place. bounding (n,): nodes that are on no crack.

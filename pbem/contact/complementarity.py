@@ -35,7 +35,7 @@ from pbem.contact.laws import (
     resists_slip,
     tensile_limit,
 )
-from pbem.contact.pivoting import Effort, solve_by_pivoting
+from pbem.contact.pivoting import OperationCount, solve_by_pivoting
 from pbem.contact.seat import evaluate_dilation, read_dilation
 
 # Cohesion this small, relative to the largest normal traction, is none; and what keeps bounds of zero apart.
@@ -81,7 +81,7 @@ class Subset:
     memory: Memory
     pressure: Real
     modes: ModeState
-    effort: Effort = field(default_factory=Effort)
+    effort: OperationCount = field(default_factory=OperationCount)
 
 
 def take_subset(laws: PairLaws, memory: Memory, pressure: Real, modes: ModeState, pairs: Integer) -> Subset:
@@ -133,7 +133,7 @@ class PairProblem:
     rough: Bool
     sign: Real
     climb: Real
-    effort: Effort
+    effort: OperationCount
 
 
 def pose(subset: Subset, response: Response) -> PairProblem:

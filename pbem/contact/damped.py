@@ -19,7 +19,7 @@ from pbem.arrays import Real
 from pbem.contact.complementarity import Response, Subset, find_compliance, pose, solve_in_modes
 from pbem.contact.laws import OPEN, ModeState, PairState, plastic_slip
 from pbem.contact.modes import Proposal, measure_law_error
-from pbem.contact.pivoting import Effort
+from pbem.contact.pivoting import OperationCount
 from pbem.contact.running import NEAR, Rest
 from pbem.contact.subset import settle_subset
 
@@ -63,7 +63,7 @@ def come_to_rest(
     single pairs give way in the wrong sense. (theory, 129)
     """
     own, instants = _measure_stiffness(response), 0
-    subset = replace(subset, effort=Effort(MOST_EFFORT))
+    subset = replace(subset, effort=OperationCount(MOST_EFFORT))
     if not _is_sound(subset, _damp(response, SOFTEST * own, response.values[:, 2:])):
         return Damped(None, None, 0)
     runs: ModeState | None = None

@@ -27,7 +27,7 @@ ALWAYS = 1e6
 
 
 @dataclass
-class Effort:
+class OperationCount:
     """What problems of contact may take yet, floating-point operations: a count, which is the same on every machine.
 
     Once it is used up nothing is found any more.

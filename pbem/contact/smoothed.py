@@ -49,7 +49,7 @@ def find_smooth(laws: PairLaws, memory: Memory, pressure: Real) -> Bool:
     return np.asarray(plain & ~laws.bonded & ~laws.parted & ~laws.follows)
 
 
-def close_all(laws: PairLaws, modes: ModeState) -> ModeState:
+def close_smoothed(laws: PairLaws, modes: ModeState) -> ModeState:
     """Modes in which all pairs are closed that can touch: a smoothed contact holds what they hold.
 
     Without friction it holds nothing along the faces.
@@ -93,7 +93,7 @@ def linearise_smoothly(
     for compliance, traction, jump in ((laws.compliance_n, P_N, G_N), (laws.compliance_s, P_S, G_S)):
         tangent[:, jump] += compliance[:, None] * tangent[:, traction]
         offset[:, jump] += compliance * offset[:, traction]
-    sticking = close_all(laws, ModeState(np.zeros(laws.count, dtype=np.int8), np.ones(laws.count)))
+    sticking = close_smoothed(laws, ModeState(np.zeros(laws.count, dtype=np.int8), np.ones(laws.count)))
     other = linearise(laws, sticking, state.p_n, memory.slip, memory, pressure, scale)
     return Linearisation(
         np.where(smooth[:, None, None], tangent, other.tangent), np.where(smooth[:, None], offset, other.offset),

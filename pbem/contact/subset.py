@@ -51,7 +51,7 @@ class Settled:
 
     modes: None if none were found. exhaustive: whether then every choice was tried and there are none at all (while the
     other pairs keep their modes). tried: number of complementarity problems that were solved. wrong (s,): pairs whose
-    own compliance has the wrong sign, on meshes that cannot carry contact. effort: what that took (see Effort).
+    own compliance has the wrong sign, on meshes that cannot carry contact. effort: what that took (see OperationCount).
     """
 
     modes: ModeState | None

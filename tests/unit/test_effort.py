@@ -10,7 +10,7 @@ import pytest
 from pbem.contact import damped
 from pbem.contact.complementarity import Subset
 from pbem.contact.damped import come_to_rest
-from pbem.contact.pivoting import ALWAYS, MOST_PIVOTS, Effort
+from pbem.contact.pivoting import ALWAYS, MOST_PIVOTS, OperationCount
 from pbem.contact.subset import Settled, settle_subset
 from pbem.solve.nonlinear.search import Search
 from tests.unit.test_search import follow
@@ -23,7 +23,7 @@ def settle(most: float, seed: int) -> tuple[Settled, Subset]:
     """Pairs with cohesion, for many of which no modes are admissible, and the subset with what they took."""
     random = np.random.default_rng(seed)
     subset = pose(np.full(COUNT, 0.3), random.uniform(0.3, 0.6, COUNT))
-    subset = replace(subset, effort=Effort(most))
+    subset = replace(subset, effort=OperationCount(most))
     return settle_subset(subset, make_response(random, COUNT), judge_by(subset)), subset  # type: ignore[arg-type]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, ModeState, PairLaws, PairState, plastic_slip, start_memory
 from pbem.contact.modes import Linearisation, linearise
 from pbem.contact.smoothed import (
-    close_all,
+    close_smoothed,
     find_smooth,
     linearise_smoothly,
     measure_violation,
@@ -102,7 +102,7 @@ def test_pairs_without_friction_bear_no_shear() -> None:
 def test_closed_pairs_hold_the_faces_along_each_other_by_friction_alone(friction: float, mode: int) -> None:
     laws, memory, pressure = make_case(friction)
     modes = ModeState(np.full(COUNT, OPEN, dtype=np.int8), np.ones(COUNT))
-    assert (close_all(laws, modes).mode == mode).all()
+    assert (close_smoothed(laws, modes).mode == mode).all()
     # At rest, where nothing acts along the faces.
     at_rest = PairState(-pressure - 1.0, np.zeros(COUNT), np.zeros(COUNT), memory.slip)
     found = read_modes(laws, np.ones(COUNT, dtype=bool), at_rest, memory, pressure)

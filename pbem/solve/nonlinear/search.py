@@ -27,7 +27,7 @@ from pbem.arrays import Bool, Integer
 from pbem.contact.complementarity import Subset
 from pbem.contact.laws import find_linear, find_pivoting
 from pbem.contact.modes import Frozen, Proposal
-from pbem.contact.pivoting import Effort
+from pbem.contact.pivoting import OperationCount
 from pbem.contact.subset import Settled
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.preconditioner.subdomains import is_one_group
@@ -104,7 +104,7 @@ class Search:
     groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps); smooths: whether laws may be
     smoothed (pbem.solve.nonlinear.smooth_search). wary: whether changes that
     stall, and a full tangent that leads away, are met with caution where friction changes with slip. most_futile: see
-    FUTILE. most_effort: what pivoting may take in all (see pbem.contact.pivoting.Effort).
+    FUTILE. most_effort: what pivoting may take in all (see pbem.contact.pivoting.OperationCount).
     """
 
     def __init__(
@@ -226,7 +226,7 @@ class Search:
 
     def limit(self, subset: Subset) -> Subset:
         """The subset, whose problems may take what is left."""
-        return replace(subset, effort=Effort(self.most_effort - self.effort))
+        return replace(subset, effort=OperationCount(self.most_effort - self.effort))
 
     def choose_group(self) -> Integer:
         """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""

@@ -26,7 +26,7 @@ from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.laws import SLIP, Memory, ModeState, PairState
 from pbem.contact.loads import Load
 from pbem.contact.smoothed import (
-    close_all,
+    close_smoothed,
     find_smooth,
     linearise_smoothly,
     measure_violation,
@@ -209,7 +209,7 @@ class SmoothSearch:
             float(max(np.abs(first.p_n + load.pressure).max(), np.abs(first.p_s).max())), self._measure(first)))
         last = NARROWEST * largest
         begin = max(WIDTH * violation, last)
-        return SmoothCourse(modes, first, close_all(problem.laws, modes), Width(begin, begin, last))
+        return SmoothCourse(modes, first, close_smoothed(problem.laws, modes), Width(begin, begin, last))
 
     def _choose_part(self, state: PairState, found: PairState, width: Width) -> tuple[float, float]:
         """The part of the way from a state to a solution that is gone, and by how much pairs are off then."""

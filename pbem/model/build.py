@@ -251,7 +251,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
     jointed = frozenset(loading.interfaces) | frozenset(roles.in_contact)
     bonded = list_bonded(loading.interfaces, loading.stages)
     loads = tuple(topology.points.loads.values())
-    fitted = shorten_under_loads(case, recall.find(
+    fitted = shorten_under_loads(case, loading.stages, recall.find(
         "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts, loads, bonded),
         lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts, loads, bonded),
     ))

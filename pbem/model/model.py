@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -181,6 +181,12 @@ class Stage:
     walls: Mapping[str, Wall] = field(default_factory=dict)
 
 
+def find_time(stages: Sequence[Stage], number: int, factor: float) -> float:
+    """The time at a fraction of a stage; stages without durations take 1 each."""
+    durations = [each.duration or 1.0 for each in stages[: number + 1]]
+    return sum(durations[:-1]) + factor * durations[-1]
+
+
 def list_timed(stage: Stage) -> list[Varying]:
     """The loads of a stage that depend on time by themselves."""
     values = [*(each for pairs in (stage.boundary, stage.ends) for pair in pairs.values() for each in pair),
@@ -287,8 +293,7 @@ class Model:
 
     def find_time(self, stage: int, factor: float) -> float:
         """The time at a fraction of a stage; stages without durations take 1 each."""
-        durations = [each.duration or 1.0 for each in self.stages[: stage + 1]]
-        return sum(durations[:-1]) + factor * durations[-1]
+        return find_time(self.stages, stage, factor)
 
     @cached_property
     def middle(self) -> complex:

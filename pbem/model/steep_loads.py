@@ -1,24 +1,26 @@
 """Shorter elements where a load varies within them by more than the values at their nodes can tell.
 
 A load acts as the polynomial through its values at the nodes of an element (theory, 18). A smooth one that is narrower
-than an element has another resultant: a Gauss load of width 0.1 on elements of 0.5 was 34 % off.
+than an element has another resultant: a Gauss load of width 0.1 on elements of 0.5 was 90 % off.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from pbem.arrays import Bool, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.description.case import Case
 from pbem.geometry.curve import Curve, Leg
+from pbem.geometry.intersection import project
 from pbem.model.fitting import FittedCurves
 from pbem.model.given import read_value
 from pbem.model.lengths import count_elements
 from pbem.model.loads_along import ENDS, list_given
+from pbem.model.model import Stage, find_time
 from pbem.model.touching import place_on_leg
 from pbem.model.varying import Varying
 from pbem.wording import list_names
@@ -26,37 +28,38 @@ from pbem.wording import list_names
 # Parts of the largest value of a load on its curve by which it may differ from its polynomial on an element. Errors of
 # what is far away are far smaller, as they depend on the mean of the difference.
 TOLERANCE = 0.05
+# What moves along a curve is small where it has passed: nothing is asked of less than this part of its largest value.
+SMALL = 0.01
 # Parts in which an element is looked at.
 PARTS = 64
 # Elements are halved so often at most, and a curve gets so many times its elements, and so many more, at most.
 MOST_HALVED, MOST_GROWTH, MOST_MORE = 8, 5, 40
+# Elements that leave more than this part of the differences are not worth what they cost.
+LESS = 0.8
 MOST_NAMED = 8
-# A load that depends on time is looked at in so many stages at most.
-MOST_STAGES = 10
+# A load that depends on time is looked at after so many load steps at most.
+MOST_TIMES = 100
+# Elements of the second curve of a contact may be so much longer, in parts, than those opposite.
+FOLLOWED = 0.25
 
 
-def shorten_under_loads(case: Case, fitted: FittedCurves) -> FittedCurves:
+def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurves) -> FittedCurves:
     """Halve elements until no load by an expression or a table differs by more than TOLERANCE from
-    the polynomial through its values at the nodes. A grading of the user's is kept, and so is a curve that would get
-    too many elements: the user is told of both. Constant elements are left alone: nothing follows a slope there."""
+    the polynomial through its values at the nodes, at the ends of load steps. Of a contact under a fluid pressure the
+    second curve gets as short elements opposite. A grading of the user's is kept, and a curve gets some elements at
+    most, those that differ most first: the user is told of both. Constant elements are left alone: nothing follows a
+    slope there."""
     curves = fitted.curves
-    given: dict[str, list[_Shape]] = {}
-    for loc, name, table, stages in list_given(case) if case.analysis.order else ():
-        value = read_value(loc, table, timed=True)[0] if loc[-1] not in ENDS else None
-        if isinstance(value, Varying) and name in curves:
-            times = _list_times(case, stages) if value.timed else [0.0]
-            given.setdefault(name, []).extend(_Shape(value, time) for time in times)
+    given, fluids, hurried = _list_shapes(case, stages, curves)
     found, left, notes = dict(curves), {}, []
     for name, values in given.items():
-        curve = curves[name]
-        finer, worst = _halve(curve, values, case.analysis.order)
-        if name not in case.curves or case.curves[name].grading == "auto":
-            before = sum(leg.elements for leg in curve.legs)
-            if sum(leg.elements for leg in finer.legs) <= MOST_GROWTH * before + MOST_MORE:
-                found[name] = finer
-                continue
+        finer, worst = _halve(curves[name], values, case.analysis.order, _count_spare(case, curves[name]))
+        found[name] = finer
         if worst > TOLERANCE:
             left[name] = worst
+    for first, second in fluids:
+        if second in curves and found[first] != curves[first]:
+            found[second] = _follow(found[second], curves[first], found[first], _count_spare(case, curves[second]))
     old, new = count_elements(curves), count_elements(found)
     named = [f"'{name}' {old[name]} to {new[name]}" for name in found if new[name] != old[name]]
     if named:
@@ -65,74 +68,194 @@ def shorten_under_loads(case: Case, fitted: FittedCurves) -> FittedCurves:
         named = [f"'{name}' by {worst:.0%} of its largest value" for name, worst in left.items()]
         notes.append("Loads vary within elements by more than these can follow, and act as the polynomials through "
                      f"their values at the nodes: {list_names(named, MOST_NAMED)}. More elements there are right.")
+    named = [f"'{name}'" for name in hurried if name in left or new[name] != old[name]]
+    if named:
+        notes.append(f"Loads that depend on time were looked at after {MOST_TIMES} of their load steps, to see how "
+                     f"they vary within elements; between these some may be too long: {list_names(named, MOST_NAMED)}.")
     return replace(fitted, curves=found, notes=(*fitted.notes, *notes))
 
 
 @dataclass(frozen=True)
 class _Shape:
-    """A load at a time."""
+    """A load at its times."""
 
     value: Varying
-    time: float
+    times: tuple[float, ...]
 
-    def evaluate(self, leg: Leg, passed: float, fractions: Real) -> Real:
-        """At fractions (e, k) of a leg that begins after so much of its curve's length."""
-        found = self.value.evaluate(place_on_leg(leg, passed, fractions.ravel()), self.time)
-        return np.broadcast_to(found, fractions.size).reshape(fractions.shape)
-
-
-def _list_times(case: Case, stages: Sequence[int]) -> list[float]:
-    """Times in the middle and at the end of stages, of many some; stages without durations take 1 each."""
-    durations = [stage.duration or 1.0 for stage in case.stages] or [1.0]
-    ends = np.cumsum(durations)
-    chosen = stages[:: max(1, len(stages) // MOST_STAGES)]
-    return [float(ends[k] - part * durations[k]) for k in chosen for part in (0.0, 0.5)]
+    def evaluate(self, leg: Leg, passed: float, fractions: Real) -> Iterator[Real]:
+        """At each time, at fractions (e, k) of a leg that begins after so much of its curve's length."""
+        places = place_on_leg(leg, passed, fractions.ravel())
+        for time in self.times:
+            yield np.broadcast_to(self.value.evaluate(places, time), fractions.size).reshape(fractions.shape)
 
 
-def _halve(curve: Curve, values: list[_Shape], order: int) -> tuple[Curve, float]:
-    """The curve with shorter elements, and the largest difference on those that it has, of the largest value."""
-    legs, passed = [], 0.0
-    sizes = [_find_largest(curve, value) for value in values]
-    worst = 0.0
+def _list_shapes(
+    case: Case, stages: Sequence[Stage], curves: Mapping[str, Curve]
+) -> tuple[dict[str, list[_Shape]], list[tuple[str, str]], list[str]]:
+    """The loads of each curve, the curves of contacts under fluid pressures, and the curves whose loads are looked at
+    after some of their steps alone."""
+    given: dict[str, list[_Shape]] = {}
+    fluids, hurried = [], []
+    for loc, name, table, acts in list_given(case) if case.analysis.order else ():
+        value = read_value(loc, table, timed=True)[0] if loc[-1] not in ENDS else None
+        if not isinstance(value, Varying) or name not in curves:
+            continue
+        ends = [(k, step / stages[k].steps) for k in acts for step in range(1, stages[k].steps + 1)]
+        if value.timed and len(ends) > MOST_TIMES:
+            ends = [ends[k] for k in np.linspace(0, len(ends) - 1, MOST_TIMES).round().astype(int)]
+            hurried.append(name)
+        times = tuple(find_time(stages, *each) for each in ends) if value.timed else (0.0,)
+        given.setdefault(name, []).append(_Shape(value, times))
+        if loc[-2] == "contacts":
+            fluids.append(case.contacts[str(loc[-2])].between)
+    return given, list(dict.fromkeys(fluids)), list(dict.fromkeys(hurried))
+
+
+def _count_spare(case: Case, curve: Curve) -> int:
+    """How many elements a curve may get: none if its grading is the user's."""
+    if curve.name in case.curves and case.curves[curve.name].grading != "auto":
+        return 0
+    return (MOST_GROWTH - 1) * sum(leg.elements for leg in curve.legs) + MOST_MORE
+
+
+@dataclass(frozen=True)
+class _Elements:
+    """Elements of a curve: the numbers of their legs, and the fractions of these at which they begin and end."""
+
+    legs: Integer
+    starts: Real
+    ends: Real
+
+    @classmethod
+    def of(cls, curve: Curve) -> _Elements:
+        fractions = [leg.element_fractions() for leg in curve.legs]
+        return cls(np.repeat(np.arange(len(fractions)), [len(each) - 1 for each in fractions]),
+                   np.concatenate([each[:-1] for each in fractions]), np.concatenate([each[1:] for each in fractions]))
+
+    def measure(self, curve: Curve) -> Real:
+        """Their lengths."""
+        return np.array([leg.length for leg in curve.legs])[self.legs] * (self.ends - self.starts)
+
+    def take(self, which: Bool) -> _Elements:
+        return _Elements(self.legs[which], self.starts[which], self.ends[which])
+
+    def halve(self) -> _Elements:
+        middles = 0.5 * (self.starts + self.ends)
+        return _Elements(np.tile(self.legs, 2), np.concatenate([self.starts, middles]),
+                         np.concatenate([middles, self.ends]))
+
+    def join(self, other: _Elements) -> _Elements:
+        return _Elements(np.concatenate([self.legs, other.legs]), np.concatenate([self.starts, other.starts]),
+                         np.concatenate([self.ends, other.ends]))
+
+    def divide(self, curve: Curve) -> Curve:
+        """The curve with these elements; legs that have as many as before are left as they are."""
+        legs = []
+        for number, leg in enumerate(curve.legs):
+            starts = np.sort(self.starts[self.legs == number])
+            if len(starts) > leg.elements:
+                leg = replace(leg, elements=len(starts), fractions=(*(float(t) for t in starts), 1.0))
+            legs.append(leg)
+        return Curve(curve.name, tuple(legs))
+
+
+def _halve(curve: Curve, values: Sequence[_Shape], order: int, spare: int) -> tuple[Curve, float]:
+    """The curve with so many more elements at most, and the largest difference that they leave, of the largest value;
+    values that are not finite are told elsewhere."""
+    elements = _Elements.of(curve)
+    sizes = [_find_sizes(curve, value) for value in values]
+
+    def compare(some: _Elements) -> Real:
+        return _compare(curve, some, values, sizes, order)
+
+    differs = compare(elements)
+    before = differs @ elements.measure(curve)
+    for _ in range(MOST_HALVED):
+        long: Bool = differs > TOLERANCE
+        if long.sum() > spare:
+            long = np.zeros(len(differs), dtype=bool)
+            long[np.argsort(-differs, kind="stable")[:spare]] = True
+        if not long.any():
+            break
+        spare -= int(long.sum())
+        halves = elements.take(long).halve()
+        elements = elements.take(~long).join(halves)
+        differs = np.concatenate([differs[~long], compare(halves)])
+    if differs.max() > TOLERANCE and differs @ elements.measure(curve) > LESS * before:
+        return curve, float(compare(_Elements.of(curve)).max())
+    return elements.divide(curve), float(differs.max())
+
+
+def _compare(
+    curve: Curve, elements: _Elements, values: Sequence[_Shape], sizes: Sequence[Real], order: int
+) -> Real:
+    """By how much loads differ from their polynomials on each element at most, of their sizes at each time."""
+    differs = np.zeros(len(elements.legs))
+    passed = 0.0
+    for number, leg in enumerate(curve.legs):
+        here = elements.legs == number
+        ends = elements.starts[here, None], elements.ends[here, None]
+        shown, known = _spread(*ends, _SAMPLES), _spread(*ends, _place_nodes(order))
+        for value, size in zip(values, sizes, strict=True):
+            pairs = zip(value.evaluate(leg, passed, shown), value.evaluate(leg, passed, known), size, strict=True)
+            for seen, nodal, largest in pairs if here.any() else ():
+                apart = np.abs(seen - nodal @ _interpolate(order)).max(axis=1)
+                differs[here] = np.fmax(differs[here], apart / largest if largest > 0 else 0.0)
+        passed += leg.length
+    return differs
+
+
+def _follow(second: Curve, old: Curve, first: Curve, spare: int) -> Curve:
+    """The second curve with elements no longer than those of the first opposite them that were halved."""
+    elements = _Elements.of(first)
+    kept = {number: set(leg.element_fractions().tolist()) for number, leg in enumerate(old.legs)}
+    new = np.array([not (start in kept[leg] and end in kept[leg])
+                    for leg, start, end in zip(elements.legs, elements.starts, elements.ends, strict=True)])
+    halved = elements.take(new)
+    lengths = halved.measure(first)
+    feet = []
+    for leg, start, end in zip(halved.legs, halved.starts, halved.ends, strict=True):
+        point = complex(first.legs[leg].point(np.array(0.5 * (start + end))))
+        nearest = min(range(len(second.legs)), key=lambda at: project(second.legs[at], point)[1])
+        feet.append((nearest, project(second.legs[nearest], point)[0]))
+    legs, places = np.array([foot[0] for foot in feet]), np.array([foot[1] for foot in feet])
+    elements = _Elements.of(second)
+    for _ in range(MOST_HALVED):
+        faces = ((elements.legs[:, None] == legs) & (elements.starts[:, None] <= places)
+                 & (places <= elements.ends[:, None]))
+        wanted = np.where(faces, lengths, np.inf).min(axis=1, initial=np.inf)
+        ratio = elements.measure(second) / wanted
+        long: Bool = ratio > 1 + FOLLOWED
+        if long.sum() > spare:
+            long = np.zeros(len(ratio), dtype=bool)
+            long[np.argsort(-ratio, kind="stable")[:spare]] = True
+        if not long.any():
+            break
+        spare -= int(long.sum())
+        elements = elements.take(~long).join(elements.take(long).halve())
+    return elements.divide(second)
+
+
+def _find_sizes(curve: Curve, value: _Shape) -> Real:
+    """Of the sizes of a value the largest at each time, where the elements of a curve are looked at, or a part of the
+    largest of all."""
+    largest, passed = np.zeros(len(value.times)), 0.0
     for leg in curve.legs:
         fractions = leg.element_fractions()
-        for depth in range(MOST_HALVED + 1):
-            differs = np.zeros(len(fractions) - 1)
-            for value, size in zip(values, sizes, strict=True):
-                shown = value.evaluate(leg, passed, _spread(fractions, _SAMPLES))
-                known = value.evaluate(leg, passed, _spread(fractions, _place_nodes(order)))
-                apart = np.abs(shown - known @ _interpolate(order)).max(axis=1)
-                differs = np.fmax(differs, apart / size) if size > 0 else differs
-            worst = max(worst, float(differs.max())) if not depth else worst
-            long: Bool = differs > TOLERANCE
-            if not long.any() or depth == MOST_HALVED:
-                break
-            middle = 0.5 * (fractions[:-1] + fractions[1:])[long]
-            fractions = np.sort(np.concatenate([fractions, middle]))
-        if len(fractions) > leg.elements + 1:
-            leg = replace(leg, elements=len(fractions) - 1, fractions=tuple(float(t) for t in fractions))
-        legs.append(leg)
+        shown = _spread(fractions[:-1, None], fractions[1:, None], _SAMPLES)
+        sizes = [np.abs(found[np.isfinite(found)]).max(initial=0.0) for found in value.evaluate(leg, passed, shown)]
+        largest = np.maximum(largest, sizes)
         passed += leg.length
-    return Curve(curve.name, tuple(legs)), worst
+    return np.maximum(largest, SMALL * largest.max())
 
 
-def _find_largest(curve: Curve, value: _Shape) -> float:
-    """Of the sizes of a value, where the elements of a curve are looked at; values that are not finite are told
-    elsewhere."""
-    largest, passed = 0.0, 0.0
-    for leg in curve.legs:
-        found = np.abs(value.evaluate(leg, passed, _spread(leg.element_fractions(), _SAMPLES)))
-        largest = max(largest, float(found[np.isfinite(found)].max(initial=0.0)))
-        passed += leg.length
-    return largest
-
-
-def _spread(fractions: Real, local: Real) -> Real:
+def _spread(starts: Real, ends: Real, local: Real) -> Real:
     """Fractions (e, k) of a leg at places in (-1, 1) of its elements."""
-    return np.asarray(fractions[:-1, None] + np.diff(fractions)[:, None] * 0.5 * (1 + local))
+    return np.asarray(starts + (ends - starts) * 0.5 * (1 + local))
 
 
-_SAMPLES = np.linspace(-1.0, 1.0, PARTS + 1)
+# The middles of the parts: jumps are ends of elements but for a small part of one.
+_SAMPLES = (2 * np.arange(PARTS) + 1) / PARTS - 1
 
 
 def _place_nodes(order: int) -> Real:

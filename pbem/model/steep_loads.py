@@ -15,14 +15,13 @@ from numpy.polynomial import legendre
 from pbem.arrays import Bool, Integer, Real
 from pbem.description.case import Case
 from pbem.geometry.curve import Curve, Leg
-from pbem.geometry.intersection import project
 from pbem.model.fitting import FittedCurves
 from pbem.model.given import read_value
 from pbem.model.lengths import count_elements
 from pbem.model.loads_along import ENDS, list_given
 from pbem.model.model import Stage, find_time
-from pbem.model.touching import place_on_leg
-from pbem.model.varying import Varying
+from pbem.model.touching import find_foot, place_on_leg
+from pbem.model.varying import Places, Varying
 from pbem.wording import list_names
 
 # Parts of the largest value of a load on its curve by which it may differ from its polynomial on an element. Errors of
@@ -39,27 +38,22 @@ LESS = 0.8
 MOST_NAMED = 8
 # A load that depends on time is looked at after so many load steps at most.
 MOST_TIMES = 100
-# Elements of the second curve of a contact may be so much longer, in parts, than those opposite.
-FOLLOWED = 0.25
 
 
 def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurves) -> FittedCurves:
-    """Halve elements until no load by an expression or a table differs by more than TOLERANCE from
-    the polynomial through its values at the nodes, at the ends of load steps. Of a contact under a fluid pressure the
-    second curve gets as short elements opposite. A grading of the user's is kept, and a curve gets some elements at
-    most, those that differ most first: the user is told of both. Constant elements are left alone: nothing follows a
-    slope there."""
+    """Halve elements until no load by an expression or a table differs by more than TOLERANCE from the polynomial
+    through its values at the nodes, at the ends of load steps. A fluid in a contact presses on both its curves.
+
+    A grading of the user's is kept, and a curve gets some elements at most, those that differ most first: the user is
+    told of both. Constant elements are left alone: nothing follows a slope there."""
     curves = fitted.curves
-    given, fluids, hurried = _list_shapes(case, stages, curves)
+    given, hurried = _list_shapes(case, stages, curves)
     found, left, notes = dict(curves), {}, []
     for name, values in given.items():
         finer, worst = _halve(curves[name], values, case.analysis.order, _count_spare(case, curves[name]))
         found[name] = finer
         if worst > TOLERANCE:
             left[name] = worst
-    for first, second in fluids:
-        if second in curves and found[first] != curves[first]:
-            found[second] = _follow(found[second], curves[first], found[first], _count_spare(case, curves[second]))
     old, new = count_elements(curves), count_elements(found)
     named = [f"'{name}' {old[name]} to {new[name]}" for name in found if new[name] != old[name]]
     if named:
@@ -77,25 +71,28 @@ def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurve
 
 @dataclass(frozen=True)
 class _Shape:
-    """A load at its times."""
+    """A load at its times; of a fluid on the second curve of a contact its places are those on the first (opposite)."""
 
     value: Varying
     times: tuple[float, ...]
+    opposite: Curve | None = None
 
     def evaluate(self, leg: Leg, passed: float, fractions: Real) -> Iterator[Real]:
         """At each time, at fractions (e, k) of a leg that begins after so much of its curve's length."""
         places = place_on_leg(leg, passed, fractions.ravel())
+        if self.opposite:
+            feet = [find_foot(self.opposite, complex(point)) for point in places.point]
+            places = Places(np.array([point for point, _ in feet]), np.array([along for _, along in feet]))
         for time in self.times:
             yield np.broadcast_to(self.value.evaluate(places, time), fractions.size).reshape(fractions.shape)
 
 
 def _list_shapes(
     case: Case, stages: Sequence[Stage], curves: Mapping[str, Curve]
-) -> tuple[dict[str, list[_Shape]], list[tuple[str, str]], list[str]]:
-    """The loads of each curve, the curves of contacts under fluid pressures, and the curves whose loads are looked at
-    after some of their steps alone."""
+) -> tuple[dict[str, list[_Shape]], list[str]]:
+    """The loads of each curve, and the curves whose loads are looked at after some of their steps alone."""
     given: dict[str, list[_Shape]] = {}
-    fluids, hurried = [], []
+    hurried: list[str] = []
     for loc, name, table, acts in list_given(case) if case.analysis.order else ():
         value = read_value(loc, table, timed=True)[0] if loc[-1] not in ENDS else None
         if not isinstance(value, Varying) or name not in curves:
@@ -106,9 +103,10 @@ def _list_shapes(
             hurried.append(name)
         times = tuple(find_time(stages, *each) for each in ends) if value.timed else (0.0,)
         given.setdefault(name, []).append(_Shape(value, times))
-        if loc[-2] == "contacts":
-            fluids.append(case.contacts[str(loc[-2])].between)
-    return given, list(dict.fromkeys(fluids)), list(dict.fromkeys(hurried))
+        second = case.contacts[str(loc[-2])].between[1] if loc[-3] == "contacts" else ""
+        if second in curves:
+            given.setdefault(second, []).append(_Shape(value, times, curves[name]))
+    return given, list(dict.fromkeys(hurried))
 
 
 def _count_spare(case: Case, curve: Curve) -> int:
@@ -160,8 +158,7 @@ class _Elements:
 
 
 def _halve(curve: Curve, values: Sequence[_Shape], order: int, spare: int) -> tuple[Curve, float]:
-    """The curve with so many more elements at most, and the largest difference that they leave, of the largest value;
-    values that are not finite are told elsewhere."""
+    """The curve with so many more elements at most, and the largest difference that they leave, of the largest."""
     elements = _Elements.of(curve)
     sizes = [_find_sizes(curve, value) for value in values]
 
@@ -182,8 +179,12 @@ def _halve(curve: Curve, values: Sequence[_Shape], order: int, spare: int) -> tu
         elements = elements.take(~long).join(halves)
         differs = np.concatenate([differs[~long], compare(halves)])
     if differs.max() > TOLERANCE and differs @ elements.measure(curve) > LESS * before:
-        return curve, float(compare(_Elements.of(curve)).max())
-    return elements.divide(curve), float(differs.max())
+        elements = _Elements.of(curve)
+    finer = elements.divide(curve)
+    if differs.max() > TOLERANCE:  # of a peak that is narrower than a part shorter elements show more
+        sizes = [_find_sizes(finer, value) for value in values]
+        differs = compare(elements)
+    return finer, float(differs.max())
 
 
 def _compare(
@@ -199,41 +200,11 @@ def _compare(
         for value, size in zip(values, sizes, strict=True):
             pairs = zip(value.evaluate(leg, passed, shown), value.evaluate(leg, passed, known), size, strict=True)
             for seen, nodal, largest in pairs if here.any() else ():
-                apart = np.abs(seen - nodal @ _interpolate(order)).max(axis=1)
-                differs[here] = np.fmax(differs[here], apart / largest if largest > 0 else 0.0)
+                with np.errstate(invalid="ignore", over="ignore"):  # values that are not finite are told elsewhere
+                    apart = np.abs(seen - nodal @ _interpolate(order)).max(axis=1)
+                    differs[here] = np.fmax(differs[here], apart / largest if largest > 0 else 0.0)
         passed += leg.length
     return differs
-
-
-def _follow(second: Curve, old: Curve, first: Curve, spare: int) -> Curve:
-    """The second curve with elements no longer than those of the first opposite them that were halved."""
-    elements = _Elements.of(first)
-    kept = {number: set(leg.element_fractions().tolist()) for number, leg in enumerate(old.legs)}
-    new = np.array([not (start in kept[leg] and end in kept[leg])
-                    for leg, start, end in zip(elements.legs, elements.starts, elements.ends, strict=True)])
-    halved = elements.take(new)
-    lengths = halved.measure(first)
-    feet = []
-    for leg, start, end in zip(halved.legs, halved.starts, halved.ends, strict=True):
-        point = complex(first.legs[leg].point(np.array(0.5 * (start + end))))
-        nearest = min(range(len(second.legs)), key=lambda at: project(second.legs[at], point)[1])
-        feet.append((nearest, project(second.legs[nearest], point)[0]))
-    legs, places = np.array([foot[0] for foot in feet]), np.array([foot[1] for foot in feet])
-    elements = _Elements.of(second)
-    for _ in range(MOST_HALVED):
-        faces = ((elements.legs[:, None] == legs) & (elements.starts[:, None] <= places)
-                 & (places <= elements.ends[:, None]))
-        wanted = np.where(faces, lengths, np.inf).min(axis=1, initial=np.inf)
-        ratio = elements.measure(second) / wanted
-        long: Bool = ratio > 1 + FOLLOWED
-        if long.sum() > spare:
-            long = np.zeros(len(ratio), dtype=bool)
-            long[np.argsort(-ratio, kind="stable")[:spare]] = True
-        if not long.any():
-            break
-        spare -= int(long.sum())
-        elements = elements.take(~long).join(elements.take(long).halve())
-    return elements.divide(second)
 
 
 def _find_sizes(curve: Curve, value: _Shape) -> Real:

@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import quad
 
 import pbem
+from pbem.model.build import build_model
 from pbem.solve.problem.step import SilentReporter
 
 Tables = dict[str, Any]
@@ -68,6 +69,43 @@ def test_a_load_that_grows_and_moves_with_time(tmp_path: Path) -> None:
         [0.5 * integrate(2.0, 0.1), integrate(3.0, 0.1)], rel=0.01)
 
 
+def test_a_load_that_moves_by_more_than_an_element_in_a_step(tmp_path: Path) -> None:
+    """In the middle and at the end of the stage alone its resultants were 7 to 124 % of the exact ones."""
+    load = {"expression": "exp(-((x - 4 * t) / 0.05)**2)"}
+    results = pbem.run(pbem.Case(**press_block(load, 2, 8) | {"analysis": {"steps": 8}}), tmp_path / "block.h5")
+    exact = [integrate(0.5 * step, 0.05) for step in range(1, 9)]
+    assert results.reactions["b"][:, 1] == pytest.approx(exact, rel=0.01)
+
+
+def part_blocks(load: Tables, between: list[str], lower: int, upper: int, unit: float, **curve: Any) -> Tables:
+    """Two blocks, 4 by 2, held on their far sides, a tenth apart, with a fluid between."""
+    case: Tables = press_block(load, 2, lower, unit)
+    high = 2.1 * unit
+    above = press_block(load, 2, upper, unit)["curves"]
+    for side, table in above.items():
+        case["curves"]["u" + side] = {**table, "points": [[x, y + high] for x, y in table["points"]]}
+    case["curves"]["ub"] |= curve
+    case["regions"]["u"] = {"material": "m", "boundary": list("u" + side for side in "brtl")}
+    case["boundary"] = {"b": {"ux": 0.0, "uy": 0.0}, "ut": {"ux": 0.0, "uy": 0.0}}
+    case["contacts"] = {"c": {"between": between, "law": "coulomb", "friction": 0.0, "pressure": load}}
+    return case
+
+
+@pytest.mark.parametrize(("turned", "lower", "upper", "unit", "along"), [
+    (False, 8, 8, 1.0, False), (True, 8, 8, 1e3, False), (False, 30, 6, 1.0, False), (True, 30, 6, 1e-3, False),
+    (False, 5, 30, 1.0, True), (True, 5, 30, 1.0, True),
+])  # fmt: skip
+def test_the_resultants_of_a_fluid_on_a_short_part_of_a_contact(
+    turned: bool, lower: int, upper: int, unit: float, along: bool, tmp_path: Path
+) -> None:
+    """With elements halved on the first curve alone they were a tenth."""
+    load = {"expression": f"exp(-((s - {1.7 * unit}) / {0.1 * unit})**2)"} if along else write_gauss(1.7, 0.1, unit)
+    between = ["ub", "t"] if turned else ["t", "ub"]
+    results = pbem.run(pbem.Case(**part_blocks(load, between, lower, upper, unit)), tmp_path / "blocks.h5")
+    found = [results.reactions[side][-1, 1] / unit for side in ("b", "ut")]
+    assert found == pytest.approx([integrate(1.7, 0.1), -integrate(1.7, 0.1)], rel=0.01)
+
+
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_factors_under_a_fluid_on_a_short_part_of_a_crack(order: int, tmp_path: Path) -> None:
     """By the weight function of Griffith's crack."""
@@ -93,9 +131,30 @@ def test_what_is_left_as_it_is_is_told(tmp_path: Path) -> None:
         pbem.run(pbem.Case(**press_block(load, 2, 8, **curve)), tmp_path / "b.h5", force=True, reporter=notes)
         return [text for text in notes.texts if "oad varies" in text or "oads vary" in text]
 
+    case = part_blocks(write_gauss(1.7, 0.1, 1.0), ["t", "ub"], 30, 6, 1.0, grading="none")
+    notes = Notes()
+    pbem.run(pbem.Case(**case), tmp_path / "b.h5", force=True, reporter=notes)
+    assert any("oads vary within" in text and "'ub' by " in text and "'t'" not in text for text in notes.texts)
     narrow, wild = write_gauss(1.7, 0.2, 1.0), {"expression": "1 + sin(400 * x)"}
     assert [text[:50] for text in list_notes(narrow)] == ["Elements added where a load varies within one: 't'"]
     for load, curve in ((narrow, {"grading": "none"}), (wild, {})):
         told, = list_notes(load, **curve)
         assert told.startswith("Loads vary within elements by more than these can follow") and "'t' by " in told
+    jump = list_notes({"expression": "tanh((x - 1.7) / 1e-5)"})
+    assert len(jump) == 2 and "'t' by " in jump[1]
     assert not list_notes({"expression": "x**2 + 3 * x + sin(x)"}) and not list_notes(write_gauss(2.0, 2.0, 1.0))
+
+
+def test_a_load_at_another_place_in_each_of_many_steps(tmp_path: Path) -> None:
+    """More than a curve has elements for: what it gets serves all the same, and what is left is told. Of 150 steps
+    100 are looked at."""
+    notes = Notes()
+    case = press_block({"expression": "exp(-((x - 4 * t) / 0.02)**2)"}, 2, 4) | {"analysis": {"steps": 20}}
+    results = pbem.run(pbem.Case(**case), tmp_path / "block.h5", reporter=notes)
+    exact = [integrate(0.2 * step, 0.02) for step in range(1, 21)]
+    assert results.reactions["b"][:, 1] == pytest.approx(exact, rel=0.25)
+    assert any("Elements added" in text for text in notes.texts)
+    assert any(text.startswith("Loads vary within elements") for text in notes.texts)
+    for steps, told in ((100, False), (150, True)):
+        model = build_model(pbem.Case(**case | {"analysis": {"steps": steps}}))
+        assert any("after 100 of their load steps" in text for text in model.notes) == told

@@ -304,6 +304,20 @@ def test_loads_in_the_span_of_others_are_not_solved_for() -> None:
     assert len(solved) == 3
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-170])
+def test_loads_that_move_in_small_steps_are_solved_for_as_well_as_others(size: float) -> None:
+    """Each is nearly a sum of those before, which tells the little that it differs by with ever fewer digits."""
+    random = np.random.default_rng(4)
+    matrix, operator = random.normal(size=(30, 60)), random.normal(size=(30, 30))
+    basis, places = LoadBasis(30, 30), np.linspace(0.0, 1.0, 60)
+    for middle in np.linspace(0.0, 1.0, 200):
+        vector = size * np.exp(-(((places - middle) / 0.2) ** 2))
+        basis, parts = basis.extend(
+            vector, lambda v=vector: matrix @ v, lambda f: -np.linalg.solve(operator, f))  # type: ignore[misc]
+        _, forces = basis.combine(parts)
+        np.testing.assert_allclose(forces, matrix @ vector, rtol=0, atol=1e-10 * size)
+
+
 def test_the_reference_operator_has_the_modes_of_the_first_law() -> None:
     problem = make_blocks("lu")
     modes = ModeState(np.full(problem.mesh.pairs.count, STICK), np.ones(problem.mesh.pairs.count))

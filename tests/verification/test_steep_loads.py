@@ -158,3 +158,22 @@ def test_a_load_at_another_place_in_each_of_many_steps(tmp_path: Path) -> None:
     for steps, told in ((100, False), (150, True)):
         model = build_model(pbem.Case(**case | {"analysis": {"steps": steps}}))
         assert any("after 100 of their load steps" in text for text in model.notes) == told
+
+
+@pytest.mark.parametrize(("width", "elements"), [(0.02, 8), (0.02, 16), (0.3, 6)])
+def test_a_load_that_moves_in_many_small_steps_is_borne_in_each(width: float, elements: int, tmp_path: Path) -> None:
+    """Of what acts at the nodes, however little it differs from what acted before. It ended as "singular tangent"."""
+    sides = {"below": (0, 4), "right": (4, 4 + 2j), "above": (4 + 2j, 2j), "left": (2j, 0)}
+    case = {
+        "materials": {"m": {"young": 1000.0, "poisson": 0.25}},
+        "curves": {name: {"points": [[z.real, z.imag] for z in map(complex, ends)], "elements": elements,
+                          "grading": "none"} for name, ends in sides.items()},
+        "regions": {"block": {"material": "m", "boundary": list(sides)}},
+        "boundary": {"below": {"ux": 0.0, "uy": 0.0},
+                     "above": {"pressure": {"expression": f"exp(-((x - 4*t)/{width})**2)"}}},
+        "analysis": {"steps": 150},
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "moving.h5")
+    borne, acting = results.reactions["below"], results.reactions["above"]
+    assert np.abs(acting[:, 1]).max() > 0.3 * width
+    np.testing.assert_allclose(borne, -acting, rtol=0, atol=2e-3 * np.abs(acting).max())

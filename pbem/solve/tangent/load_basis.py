@@ -12,13 +12,18 @@ from pbem.arrays import Real
 # Part of a load vector by which rounding can leave the span of the others.
 IN_SPAN = 1e-14
 MOST_VECTORS = 24
+# Parts of a load by which the forces of a sum of others may be wrong, and those of a vector that is one of few terms of
+# such sums. A load that is nearly a sum of others tells what it differs by with few digits; of a load that moves in
+# small steps each vector had fewer than the one before, until nothing was left of the forces.
+EXACT, KNOWN = 1e-12, 1e-6
 
 
 @dataclass(frozen=True)
 class LoadBasis:
     """Orthonormal load vectors with the forces B m that belong to them and the solutions -K0^-1 B m.
 
-    Load vectors are equal on all ranks; forces are this rank's rows; solutions are whole.
+    Load vectors are equal on all ranks; forces are this rank's rows; solutions are whole. noise: by which part of a
+    vector its forces are wrong at most.
     """
 
     unknowns: int
@@ -26,6 +31,7 @@ class LoadBasis:
     vectors: tuple[Real, ...] = ()
     forces: tuple[Real, ...] = ()
     solutions: tuple[Real, ...] = ()
+    noise: tuple[float, ...] = ()
 
     def renew(self, solve: Callable[[Real], Real]) -> LoadBasis:
         """The same loads solved for anew, for another K0; solve: from forces to the whole solution."""
@@ -34,22 +40,25 @@ class LoadBasis:
     def extend(
         self, vector: Real, evaluate: Callable[[], Real], solve: Callable[[Real], Real]
     ) -> tuple[LoadBasis, Real]:
-        """With a load vector in its span, and the vector's components; of too many vectors those before are forgotten.
+        """With a load vector in its span, and the vector's components; those before are forgotten where they are too
+        many or too noisy.
 
         evaluate, which gives the forces, and solve are called only if the vector is no sum of the others.
         """
         parts, rest = self._project(vector)
-        length = float(np.linalg.norm(rest))
-        if length <= IN_SPAN * float(np.linalg.norm(vector)):
+        length, size = _measure(rest), _measure(vector)
+        noise = float(np.abs(parts) @ np.array(self.noise)) if len(parts) else 0.0
+        if length <= IN_SPAN * size and noise <= EXACT * size:
             return self, parts
-        if len(self.vectors) == MOST_VECTORS:
+        noise += float(np.finfo(float).eps) * size
+        if self.vectors and (len(self.vectors) == MOST_VECTORS or noise > KNOWN * length):
             return LoadBasis(self.unknowns, self.rows).extend(vector, evaluate, solve)
         force = evaluate()
         for part, other in zip(parts, self.forces, strict=True):
             force = force - part * other
         basis = replace(
             self, vectors=(*self.vectors, rest / length), forces=(*self.forces, force / length),
-            solutions=(*self.solutions, solve(force / length)),
+            solutions=(*self.solutions, solve(force / length)), noise=(*self.noise, noise / length),
         )
         return basis, np.append(parts, length)
 
@@ -70,3 +79,9 @@ class LoadBasis:
                 parts[k] += part
                 rest = rest - part * each
         return parts, rest
+
+
+def _measure(vector: Real) -> float:
+    """Its length; squares of small numbers would be zero."""
+    largest = float(np.abs(vector).max(initial=0.0))
+    return largest * float(np.linalg.norm(vector / largest)) if largest > 0 else 0.0

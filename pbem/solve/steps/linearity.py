@@ -8,6 +8,7 @@ import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
 from pbem.bem.hoop import evaluate_stretch
+from pbem.geometry.tolerance import TIE
 from pbem.mesh.mesh import Mesh, list_faces
 from pbem.solve.problem.step import Linearity
 
@@ -60,16 +61,22 @@ def describe_nonlinearity(regions: Sequence[str], interfaces: Sequence[str], lin
     worst = [(linearity.strain, "strains", ""), (linearity.rotation, "rotations", " radians")]
     notes = []
     for values, what, unit in worst:
-        largest = int(np.argmax(values))
+        largest = _find_worst(values)
         if values[largest] > LARGEST_STRAIN:
             notes.append(
                 f"{what} of {values[largest]:.2g}{unit} on region '{regions[largest]}' are beyond linear "
                 f"theory, which is for less than {LARGEST_STRAIN:g}"
             )
     if len(linearity.slip) and linearity.slip.max() > 1:
-        largest = int(np.argmax(linearity.slip))
+        largest = _find_worst(linearity.slip)
         notes.append(
             f"faces of '{interfaces[largest]}' slip by {linearity.slip[largest]:.2g} times the mean length of "
             "their elements, but the equations still use the initial pairs"
         )
     return notes
+
+
+def _find_worst(values: Real) -> int:
+    """The number of the largest, of those that symmetry makes equal the first: their rounding must not choose."""
+    known = np.nan_to_num(values)
+    return int(np.flatnonzero(known >= (1 - TIE) * known.max())[0])

@@ -249,9 +249,12 @@ def _solve(
             keep_waiting(file, watch.comm, error, lambda writer, comm: store_without_errors(
                 waiting.replay(), model.output_every, interior if comm is watch.comm else None, writer, comm))
             return
-        again = replace(file, target=Target(target.path, False, True), beside=False)
-        write_pass(again, watch.comm, lambda writer: _store(
-            writer, model, mesh, interior, waiting.replay(), watch, signals, one, None, None))
+
+        def fill(writer: ResultWriter | None) -> None:
+            with waiting.rescue(model.output_every, interior, writer, watch.comm):
+                _store(writer, model, mesh, interior, waiting.replay(), watch, signals, one, None, None)
+
+        write_pass(replace(file, target=Target(target.path, False, True), beside=False), watch.comm, fill)
         do_on_first(watch.comm, PbemError, partial(expect_no_pass, target.path))
 
     # What is not stored has no file to be kept.
@@ -295,18 +298,20 @@ def _fill(
     steps = passed.listen(steps) if gradable or model.analysis.accuracy is not None else steps
     if gradable and kept is None and last is None and 2 * mesh.nodes <= MOST_UNKNOWNS:
         waiting = WaitingSteps(steps)
-        ends = passed.find_last() if waiting.whole else ()
-        planned = plan_graded(model, ends, graded, 2 * mesh.nodes, watch.iterations)
-        if planned and planned.model is not model:
-            if writer:
-                writer.fail("accuracy", "a mesh graded towards ends of contact was to follow", "stopped")
-            return _Done(Decision(ends=tuple(ends)), passed, planned, partial(store, waiting))
-        if one.spare and isinstance(waiting.error, ConvergenceError):
-            watch.check()
-            raise waiting.error
-        # Who stops a run gets what is known by then, the errors of these steps with it.
-        signals = StopSignals() if isinstance(waiting.error, StopError | KeyboardInterrupt) else signals
-        steps = waiting.replay()
+        with waiting.rescue(model.output_every, interior, writer, comm):
+            ends = passed.find_last() if waiting.whole else ()
+            planned = plan_graded(model, ends, graded, 2 * mesh.nodes, watch.iterations)
+            if planned and planned.model is not model:
+                if writer:
+                    writer.fail("accuracy", "a mesh graded towards ends of contact was to follow", "stopped")
+                return _Done(Decision(ends=tuple(ends)), passed, planned, partial(store, waiting))
+            if one.spare and isinstance(waiting.error, ConvergenceError):
+                watch.check()
+                raise waiting.error
+            # Who stops a run gets what is known by then, the errors of these steps with it.
+            signals = StopSignals() if isinstance(waiting.error, StopError | KeyboardInterrupt) else signals
+            steps = waiting.replay()
+            return _Done(_store(writer, model, mesh, interior, steps, watch, signals, one, None, None), passed)
     return _Done(_store(writer, model, mesh, interior, steps, watch, signals, one, kept, last), passed)
 
 

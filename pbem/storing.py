@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 from pbem.arrays import Real
@@ -10,7 +12,7 @@ from pbem.clock import clock
 from pbem.errors import ConvergenceError, LawError, PbemError, StopError
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
-from pbem.parallel import Comm, StopSignals, do_on_first, world
+from pbem.parallel import Comm, StopSignals, alone, do_on_first, world
 from pbem.results.estimator import Estimator
 from pbem.results.tips import TipRules
 from pbem.results.writer import ResultWriter
@@ -53,13 +55,16 @@ class WaitingSteps:
     neither their errors are estimated nor are they stored, which takes a third of a small run.
 
     MOST_WAITING, and the one that shows that there are more; of models small enough that little is lost where a process
-    is killed. error: what has ended the march; made by all ranks together, as the steps are.
+    is killed. error: what has ended the march on all ranks alike; failure: what else has, perhaps on this rank alone.
+    Made by all ranks together, as the steps are.
     """
 
     def __init__(self, steps: Iterator[Step]) -> None:
         self._held: list[Step] = []
+        self._done = 0
         self._rest = steps
         self.error: PbemError | KeyboardInterrupt | None = None
+        self.failure: BaseException | None = None
         self.whole = False
         try:
             for step in steps:
@@ -69,14 +74,45 @@ class WaitingSteps:
             self.whole = True
         except (ConvergenceError, LawError, StopError, KeyboardInterrupt) as error:
             self.error = error
+        except BaseException as error:
+            self.failure = error
 
     def replay(self) -> Iterator[Step]:
         """These steps and those that follow, or what has ended the march."""
-        yield from self._held
+        yield from self._take()
         if self.error is not None:
             raise self.error
         if not self.whole:
             yield from self._rest
+
+    def _take(self) -> Iterator[Step]:
+        """Those held that are not done with: a step is when the next one is asked for."""
+        for step in self._held[self._done :]:
+            yield step
+            self._done += 1
+
+    @contextmanager
+    def rescue(
+        self, every: int, interior: InteriorField | None, writer: ResultWriter | None, comm: Comm
+    ) -> Iterator[None]:
+        """Store those held though an error has ended the march, or ends the block, that one rank may have alone.
+
+        The first rank does that by itself, without errors, and without fields at interior points if it is one of
+        several or there is no memory for them.
+        """
+        try:
+            if self.failure is not None:
+                raise self.failure
+            yield
+        except (PbemError, KeyboardInterrupt):
+            raise
+        except BaseException as error:
+            traceback.clear_frames(error.__traceback__)  # which hold what memory there was
+            for field in (interior, None) if comm.size == 1 else (None,):
+                with suppress(Exception):  # what ended the run must be what the user hears of
+                    if writer and not writer.is_within_step:
+                        store_without_errors(self._take(), every, field, writer, alone)
+            raise
 
 
 def store_steps(

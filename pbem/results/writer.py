@@ -273,6 +273,11 @@ class ResultWriter:
         return count_steps(self._file) if self._storage.is_open else 0
 
     @property
+    def is_within_step(self) -> bool:
+        """Whether the last step could not be stored: no other one can follow it."""
+        return not self._storage.is_open or self._storage.dirty
+
+    @property
     def relative_errors(self) -> dict[str, Real]:
         """The estimated relative errors (k,) of the steps stored so far, by kind."""
         if self._pending is not None:

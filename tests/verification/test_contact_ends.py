@@ -19,8 +19,10 @@ from pbem.errors import CaseError, ConvergenceError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.end_grading import ContactEnd, grade_ends
 from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
+from pbem.results.estimator import Estimator
 from pbem.results.writer import ResultWriter
 from pbem.solve.problem.step import SilentReporter
+from pbem.solve.steps import march as march_module
 from tests.verification.rigid_sample import UNMOVED, Place, compare_pressures, find_persson_force, write_pin
 
 
@@ -230,6 +232,47 @@ def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
     assert "ended before the second solution" in kept.errors.missing and not list(tmp_path.glob("pin.h5?*"))
     again = pbem.run(case, path, resume=True)
     whole = pbem.run(case, tmp_path / "whole.h5")
+    assert again.status == "finished" and again.fractions is not None and not again.errors.missing
+    np.testing.assert_allclose(again.contact["seat"].traction_n, whole.contact["seat"].traction_n, rtol=0,
+                               atol=1e-6 * np.abs(whole.contact["seat"].traction_n).max())
+
+
+@pytest.mark.parametrize(
+    ("place", "due", "stored"),
+    [("solve_step", 2, 1), ("solve_step", 1, 0), ("find_ends", 2, 1), ("plan_graded", 1, 2), ("make_estimator", 1, 2),
+     ("estimate", 1, 2), ("estimate", 2, 2)],
+)
+def test_steps_that_wait_are_stored_when_memory_runs_out(
+    place: str, due: int, stored: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In that very pass, wherever it is; of those that are known no step has to be computed again."""
+    plain = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
+    case, path = write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5"
+    whole = pbem.run(case, tmp_path / "whole.h5")
+    owner = {"solve_step": march_module, "find_ends": driver, "estimate": Estimator}.get(place, driver)
+    name = {"find_ends": "_find_ends"}.get(place, place)
+    former, calls = getattr(owner, name), []
+
+    def lack(*given: Any, **named: Any) -> Any:
+        calls.append(given)
+        if len(calls) >= due:
+            raise MemoryError("no room")
+        return former(*given, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, name, lack)
+        if place in ("make_estimator", "estimate"):  # no other pass is to follow, so that this one is stored
+            patch.setattr(driver, "plan_graded", lambda *_: None)
+        with pytest.raises(MemoryError):
+            pbem.run(case, path)
+    kept = pbem.open_results(path)
+    assert (kept.status, len(kept.steps), kept.fractions) == ("stopped", stored, None) and "no room" in kept.failure
+    if stored:
+        np.testing.assert_array_equal(kept.contact["seat"].traction_n,
+                                      plain.contact["seat"].traction_n[:stored])
+        np.testing.assert_array_equal(kept.energy.external, plain.energy.external[:stored])
+        assert "ended before the second solution" in kept.errors.missing
+    again = pbem.run(case, path, resume=True)
     assert again.status == "finished" and again.fractions is not None and not again.errors.missing
     np.testing.assert_allclose(again.contact["seat"].traction_n, whole.contact["seat"].traction_n, rtol=0,
                                atol=1e-6 * np.abs(whole.contact["seat"].traction_n).max())

@@ -107,7 +107,8 @@ class WaitingSteps:
         except (PbemError, KeyboardInterrupt):
             raise
         except BaseException as error:
-            traceback.clear_frames(error.__traceback__)  # which hold what memory there was
+            if comm.size == 1:  # systems of several ranks are not freed by one
+                traceback.clear_frames(error.__traceback__)
             for field in (interior, None) if comm.size == 1 else (None,):
                 with suppress(Exception):  # what ended the run must be what the user hears of
                     if writer and not writer.is_within_step:

@@ -414,3 +414,16 @@ def test_elements_grow_with_the_distance_from_an_end() -> None:
 def test_grading_is_refused_beside_accuracy() -> None:
     with pytest.raises(CaseError, match=r"grade_contact_ends.*true beside accuracy"):
         parse_model(write_pin(1e-3, FORCE, 20.0, 32, grade_contact_ends=True, accuracy=1e-2))
+
+
+@pytest.mark.parametrize(("half_width", "again"), [(60.0, False), (60.8, True), (61.2, False), (62.0, True)])
+def test_pressures_that_lie_on_the_root_as_they_are_are_not_solved_for_again(
+    tmp_path: Path, half_width: float, again: bool
+) -> None:
+    """Contact ends at another place within elements of 3.75 degrees: what the nodes see of the root depends on it."""
+    width = math.radians(half_width)
+    force = find_persson_force(width, 1e-4)
+    case = write(tmp_path / "pin.toml", 1e-4, force, 0.0, 96, UNMOVED)
+    results = pbem.run(case, tmp_path / "pin.h5")
+    assert (results.fractions is not None) is again
+    assert np.abs(compare_pressures(results, force, width, 0.0)).max() < 1e-2

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 # Of `pbem run --operator`; defined in pbem.model.model.
 OPERATORS = ("auto", "dense", "hierarchical")
+# What the loader says where a process may not have the memory that a library takes.
+NO_ROOM_TO_LOAD = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")
 
 RUN_NOTES = """\
 PETSc: any PETSc option is accepted with the prefix pbem_ and overrides the [petsc] table of the case, e.g.
@@ -128,20 +130,26 @@ def _describe_rest(target: Path) -> str:
 
 def load_driver() -> Callable[..., Results]:
     """Import what computes; raises LaunchError on all ranks alike if MPI, PETSc or another library cannot be loaded."""
-    advice = "; `pbem help install` says how mpi4py, petsc4py and PETSc have to be built"
     try:
         from pbem.parallel import refuse_together, wait_for_all, world
     except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py has not found the library of MPI
-        raise LaunchError(f"MPI cannot be loaded: {error}{advice}") from error
+        raise LaunchError(f"MPI cannot be loaded: {error}; {_advise_to_load(error)}") from error
     fault = None
     try:
         from pbem.driver import run
     except ImportError as error:
-        fault = f"a library cannot be loaded: {error}{advice}"
+        fault = f"a library cannot be loaded: {error}; {_advise_to_load(error)}"
     # Loading PETSc is collective: where it fails on some ranks only, the others wait in it.
     wait_for_all(world, fault, patience=5.0)
     refuse_together(world, fault)
     return run
+
+
+def _advise_to_load(error: BaseException) -> str:
+    """What helps where a library cannot be loaded."""
+    if any(said in str(error) for said in NO_ROOM_TO_LOAD):
+        return "out of memory: it takes more than a process may have here (`ulimit -v`, or the memory of the job)"
+    return "`pbem help install` says how mpi4py, petsc4py and PETSc have to be built"
 
 
 def say_wrong_launch(error: LaunchError, rank: int, ranks: int) -> int:

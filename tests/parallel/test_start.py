@@ -137,6 +137,29 @@ def test_a_library_that_cannot_be_loaded_is_refused_on_all_ranks(
     expect_refusal(done, "a library cannot be loaded: ", folder)
 
 
+NO_ROOM = """
+import sys
+from pbem.cli import main
+
+class NoRoom:
+    def find_spec(self, name, path=None, target=None):
+        if name == "petsc4py":
+            raise ImportError("libtrilinos_ml.so.13: failed to map segment from shared object")
+
+sys.meta_path.insert(0, NoRoom())
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_library_for_which_there_is_no_memory_is_not_said_to_be_built_wrongly(
+    folder: Path, mpirun_snippet: Launch
+) -> None:
+    # As under `ulimit -v 400000`.
+    done = mpirun_snippet(1, NO_ROOM, "run", "blocks.toml", cwd=folder)
+    said = "a library cannot be loaded: libtrilinos_ml.so.13: failed to map segment from shared object; out of memory: "
+    expect_refusal(done, said, folder)
+
+
 def test_python_gets_the_refusal_as_an_error(folder: Path, mpirun_snippet: Launch) -> None:
     code = """
 import pbem

@@ -17,7 +17,7 @@ import numpy as np
 from pbem.arrays import Bool, Real
 from pbem.contact.barton_bandis import BartonBandis, DilatingJoint
 from pbem.contact.cohesive import COHESIVE
-from pbem.contact.custom import EXPECTED, CustomLaw, read_law_texts
+from pbem.contact.custom import EXPECTED, PARTS, CustomLaw, read_law_texts
 from pbem.contact.declaration import FrictionLaw, InternalVariable, Parameters, Slide, list_variables
 from pbem.contact.dilating import ConstantDilation
 from pbem.contact.friction_bound import Strength
@@ -164,12 +164,18 @@ def check_custom_laws(model: Model) -> tuple[Fault, ...]:
 
 
 def _try(law: Law) -> str:
-    """What goes wrong when the law is asked for its strength at two pairs; "" if nothing does."""
+    """What goes wrong when the law is asked for its strength at two pairs, twice; "" if nothing does.
+
+    Of a law that is not a function of its arguments no state is a solution: its statuses would change for ever."""
     try:
         function, parameters = choose_strength(law)
     except (OSError, ValueError) as error:
         return f"a file that cannot be read ({type(error).__name__}: {error})"
     assert isinstance(function, CustomLaw)
-    if not function.fault:
-        function(-np.ones(2), np.zeros(2), **{name: np.full(2, value) for name, value in parameters.items()})
+    given = {name: np.full(2, value) for name, value in parameters.items()}
+    once, again = (function(-np.ones(2), np.zeros(2), **given) for _ in range(2))
+    for name in () if function.fault else PARTS:
+        values = getattr(once, name)[0], getattr(again, name)[0]
+        if values[0] != values[1]:
+            return f"the law {law.file} answers differently when it is asked again: {name} = %.6g, then %.6g" % values
     return function.fault.removesuffix(f"; expected {EXPECTED}")

@@ -125,3 +125,14 @@ def test_bonds_of_a_custom_law_fail_alike_on_two_ranks(tmp_path: Path) -> None:
     two = open_results(tmp_path / "two.h5")
     np.testing.assert_array_equal(read_broken(tmp_path / "two.h5"), broken)
     np.testing.assert_allclose(two.traction, one.traction, rtol=0, atol=1e-9 * np.abs(one.traction).max())
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_law_that_is_no_function_of_its_arguments_is_a_fault(ranks: int, folder: Path) -> None:
+    # Its search ended as "mode cycle", with the advice to take shorter elements.
+    (folder / "law.py").write_text(LAW.replace("CHANGE", "friction = friction * (1 + 0.1 * calls)"))
+    done = launch(ranks, "run", "case.toml", "--quiet", cwd=folder)
+    assert done.returncode == 2, done.stderr
+    said = "the law law.py answers differently when it is asked again: bound = 0.22, then 0.24"
+    assert done.stderr.count(said) == 1 and "interfaces.joint.file" in done.stderr, done.stderr
+    assert not (folder / "case.h5").exists()

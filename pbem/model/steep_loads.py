@@ -1,7 +1,8 @@
 """Shorter elements where a load varies within them by more than the values at their nodes can tell.
 
 A load acts as the polynomial through its values at the nodes of an element (theory, 18). A smooth one that is narrower
-than an element has another resultant: a Gauss load of width 0.1 on elements of 0.5 was 90 % off.
+than an element has another resultant: a Gauss load of width 0.1 on elements of 0.5 was 90 % off. So have the tractions
+of springs, and those that follow from a strength or a gap: these hold at the nodes, too.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ from numpy.polynomial import legendre
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.description.case import Case
+from pbem.errors import KeyPath
 from pbem.geometry.curve import Curve, Leg
 from pbem.model.fitting import FittedCurves
 from pbem.model.given import read_value
+from pbem.model.kinks import list_varying
 from pbem.model.lengths import count_elements
-from pbem.model.loads_along import ENDS, list_given
+from pbem.model.loads_along import list_given
 from pbem.model.model import Stage, find_time
 from pbem.model.touching import find_foot, place_on_leg
 from pbem.model.varying import Places, Varying
@@ -38,11 +41,14 @@ LESS = 0.8
 MOST_NAMED = 8
 # A load that depends on time is looked at after so many load steps at most.
 MOST_TIMES = 100
+# What resists along a curve, at its nodes. None of them depends on time.
+RESISTANCES = ("kn", "ks", "friction", "friction_dynamic", "cohesion", "tensile_strength", "dilation_angle", "gap")
 
 
 def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurves) -> FittedCurves:
     """Halve elements until no load by an expression or a table differs by more than TOLERANCE from the polynomial
-    through its values at the nodes, at the ends of load steps. A fluid in a contact presses on both its curves.
+    through its values at the nodes, at the ends of load steps; nor any strength, gap or stiffness of springs. A fluid
+    in a contact presses on both its curves, which its strengths and its gap are laws of as well.
 
     A grading of the user's is kept, and a curve gets some elements at most, those that differ most first: the user is
     told of both. Constant elements are left alone: nothing follows a slope there."""
@@ -55,13 +61,15 @@ def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurve
         if worst > TOLERANCE:
             left[name] = worst
     old, new = count_elements(curves), count_elements(found)
-    named = [f"'{name}' {old[name]} to {new[name]}" for name in found if new[name] != old[name]]
-    if named:
-        notes.append(f"Elements added where a load varies within one: {list_names(named, MOST_NAMED)}.")
-    if left:
-        named = [f"'{name}' by {worst:.0%} of its largest value" for name, worst in left.items()]
-        notes.append("Loads vary within elements by more than these can follow, and act as the polynomials through "
-                     f"their values at the nodes: {list_names(named, MOST_NAMED)}. More elements there are right.")
+    for what, several, names in _sort_out(given):
+        named = [f"'{name}' {old[name]} to {new[name]}" for name in found if new[name] != old[name] and name in names]
+        if named:
+            notes.append(f"Elements added where {what} varies within one: {list_names(named, MOST_NAMED)}.")
+        named = [f"'{name}' by {worst:.0%} of its largest value" for name, worst in left.items() if name in names]
+        if named:
+            notes.append(f"{several} vary within elements by more than these can follow, and act as the polynomials "
+                         f"through their values at the nodes: {list_names(named, MOST_NAMED)}. More elements there are "
+                         "right.")
     named = [f"'{name}'" for name in hurried if name in left or new[name] != old[name]]
     if named:
         notes.append(f"Loads that depend on time were looked at after {MOST_TIMES} of their load steps, to see how "
@@ -71,11 +79,13 @@ def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurve
 
 @dataclass(frozen=True)
 class _Shape:
-    """A load at its times; of a fluid on the second curve of a contact its places are those on the first (opposite)."""
+    """A load at its times, or what resists; on the second curve of a contact its places are those on the first
+    (opposite)."""
 
     value: Varying
     times: tuple[float, ...]
     opposite: Curve | None = None
+    resists: bool = False
 
     def evaluate(self, leg: Leg, passed: float, fractions: Real) -> Iterator[Real]:
         """At each time, at fractions (e, k) of a leg that begins after so much of its curve's length."""
@@ -93,20 +103,34 @@ def _list_shapes(
     """The loads of each curve, and the curves whose loads are looked at after some of their steps alone."""
     given: dict[str, list[_Shape]] = {}
     hurried: list[str] = []
+
+    def add(loc: KeyPath, name: str, shape: _Shape) -> None:
+        given.setdefault(name, []).append(shape)
+        second = case.contacts[str(loc[-2])].between[1] if loc[-3] == "contacts" else ""
+        if second in curves:
+            given.setdefault(second, []).append(replace(shape, opposite=curves[name]))
+
     for loc, name, table, acts in list_given(case) if case.analysis.order else ():
-        value = read_value(loc, table, timed=True)[0] if loc[-1] not in ENDS else None
+        value = read_value(loc, table, timed=True)[0]
         if not isinstance(value, Varying) or name not in curves:
             continue
         ends = [(k, step / stages[k].steps) for k in acts for step in range(1, stages[k].steps + 1)]
         if value.timed and len(ends) > MOST_TIMES:
             ends = [ends[k] for k in np.linspace(0, len(ends) - 1, MOST_TIMES).round().astype(int)]
             hurried.append(name)
-        times = tuple(find_time(stages, *each) for each in ends) if value.timed else (0.0,)
-        given.setdefault(name, []).append(_Shape(value, times))
-        second = case.contacts[str(loc[-2])].between[1] if loc[-3] == "contacts" else ""
-        if second in curves:
-            given.setdefault(second, []).append(_Shape(value, times, curves[name]))
+        add(loc, name, _Shape(value, tuple(find_time(stages, *each) for each in ends) if value.timed else (0.0,)))
+    for loc, name, table in list_varying(case) if case.analysis.order else ():
+        value = read_value(loc, table, timed=False)[0] if loc[-1] in RESISTANCES else None
+        if isinstance(value, Varying) and name in curves:
+            add(loc, name, _Shape(value, (0.0,), resists=True))
     return given, list(dict.fromkeys(hurried))
+
+
+def _sort_out(given: Mapping[str, Sequence[_Shape]]) -> Iterator[tuple[str, str, set[str]]]:
+    """Words for one and for several, and the curves: those on which only loads vary, and the others."""
+    mixed = {name for name, shapes in given.items() if any(shape.resists for shape in shapes)}
+    yield "a load", "Loads", set(given) - mixed
+    yield "a load, a strength, a gap or a spring", "Loads, strengths, gaps or springs", mixed
 
 
 def _count_spare(case: Case, curve: Curve) -> int:

@@ -1,4 +1,5 @@
-"""Smooth loads that are narrower than the elements that were asked for: their resultants, and what the user is told."""
+"""Smooth loads, strengths, gaps and springs that are narrower than the elements that were asked for: their resultants,
+and what the user is told."""
 
 from __future__ import annotations
 
@@ -143,6 +144,70 @@ def test_what_is_left_as_it_is_is_told(tmp_path: Path) -> None:
     jump = list_notes({"expression": "tanh((x - 1.7) / 1e-5)"})
     assert len(jump) == 2 and "'t' by " in jump[1]
     assert not list_notes({"expression": "x**2 + 3 * x + sin(x)"}) and not list_notes(write_gauss(2.0, 2.0, 1.0))
+
+
+@pytest.mark.parametrize(("middle", "width", "order", "elements"), [
+    (1.7, 0.1, 2, 8), (1.234, 0.02, 1, 6), (2.9, 0.05, 3, 3),
+])  # fmt: skip
+@pytest.mark.parametrize("moved", [False, True])
+def test_the_resultant_of_soft_springs_on_a_short_part(
+    middle: float, width: float, order: int, elements: int, moved: bool, tmp_path: Path
+) -> None:
+    """Whose ends are moved there alone, or that are stiff there alone; the block yields by 1e-5 of that. They were 90
+    to 100 % off."""
+    narrow = {"expression": f"0.01 * exp(-((x - {middle}) / {width})**2)"}
+    springs = {"spring": {"kn": 0.01}, "end_n": narrow} if moved else {"spring": {"kn": narrow}, "end_n": 0.01}
+    case = press_block({}, order, elements)
+    case["boundary"]["t"] = springs
+    results = pbem.run(pbem.Case(**case), tmp_path / "block.h5")
+    assert results.reactions["b"][-1, 1] == pytest.approx(-1e-4 * integrate(middle, width), rel=0.01)
+
+
+def lay_blocks(law: Tables, matching: bool, lower: int, upper: int, unit: float, push: float) -> Tables:
+    """Two blocks without Poisson's ratio, 4 by 2 each, one on the other, pressed together by a strain of 1e-3."""
+    case = part_blocks({}, ["t", "ub"], lower, upper, unit)
+    for table in case["curves"].values():
+        table["points"] = [[x, y - 0.1 * unit if y > 2.05 * unit else y] for x, y in table["points"]]
+    case["materials"]["m"]["poisson"] = 0.0
+    case["boundary"]["ut"] = {"ux": push * unit, "uy": -4e-3 * unit}
+    case["contacts"] = {"c": {"between": ["t", "ub"], "law": "coulomb", **law}}
+    if matching:
+        del case["curves"]["ub"], case["contacts"]
+        case["regions"]["u"]["boundary"].remove("ub")
+        case["regions"]["u"]["boundary"].append("t")
+        case["interfaces"] = {"t": {"law": "coulomb", **law}}
+    return case
+
+
+@pytest.mark.parametrize(("key", "matching", "lower", "upper", "unit"), [
+    ("friction", True, 8, 8, 1.0), ("friction", False, 6, 14, 1e3), ("cohesion", False, 14, 6, 1e-3),
+    ("gap", True, 8, 8, 1e-3), ("gap", False, 6, 14, 1.0),
+])  # fmt: skip
+def test_the_resultants_of_a_strength_or_a_gap_on_a_short_part(
+    key: str, matching: bool, lower: int, upper: int, unit: float, tmp_path: Path
+) -> None:
+    """They were none, or twice as large. By Betti's theorem a gap between faces that stay closed takes its volume times
+    the pressure under which the blocks would yield by one length."""
+    size = {"friction": 1e-3, "cohesion": 1e-3, "gap": -4e-5 * unit}[key]
+    law = {"friction": 0.0, key: write_gauss(1.234, 0.06, unit, repr(size))}
+    case = lay_blocks(law, matching, lower, upper, unit, 0.1 if key != "gap" else 0.0)
+    found = pbem.run(pbem.Case(**case), tmp_path / "blocks.h5").reactions["ut"][-1] / unit
+    narrow = integrate(1.234, 0.06)
+    if key == "gap":
+        assert found[1] + 4.0 == pytest.approx(-1e-2 * narrow, rel=0.02)
+    else:
+        assert found[0] == pytest.approx(1e-3 * narrow, rel=0.02)
+
+
+def test_strengths_and_gaps_that_the_elements_follow_add_none(tmp_path: Path) -> None:
+    notes = Notes()
+    law = {"friction": {"expression": "0.3 + 0.005 * sin(50 * x)"}, "gap": {"expression": "-1e-3 * x * (4 - x)"}}
+    pbem.run(pbem.Case(**lay_blocks(law, False, 8, 8, 1.0, 0.0)), tmp_path / "b.h5", reporter=notes)
+    assert not [text for text in notes.texts if "varies" in text or "vary" in text]
+    wild = {"friction": {"expression": "0.3 + 0.2 * sin(400 * x)"}}
+    pbem.run(pbem.Case(**lay_blocks(wild, False, 8, 8, 1.0, 0.0)), tmp_path / "c.h5", reporter=notes)
+    told, = [text for text in notes.texts if "varies" in text or "vary" in text]
+    assert told.startswith("Loads, strengths, gaps or springs vary within elements") and "'t' by " in told
 
 
 def test_a_load_at_another_place_in_each_of_many_steps(tmp_path: Path) -> None:

@@ -48,3 +48,23 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
     assert describe_unsettled(problem, "iteration limit", proposal, group[:0], None).reason == "iteration limit"
     settled = replace(proposal, violation=np.zeros(count))
     assert describe_unsettled(problem, "mode cycle", settled, group, wrong).reason == "mode cycle"
+
+
+def test_of_many_pairs_those_are_named_that_change() -> None:
+    """Where all pairs were tried at last, one of which has no status, the others are not to be looked at."""
+    problem = assemble(write_network(teeth=2, law="friction = 0.4, cohesion = 0.1"))
+    count = problem.mesh.pairs.count
+    violation = np.zeros(count)
+    violation[5] = 1.0
+    proposal = Proposal(draw_modes(count), violation)
+    none = Settled(None, False, 4, np.zeros(count, dtype=bool))
+    all_pairs, alone = (
+        str(describe_unsettled(problem, "no admissible modes", proposal, group, each))
+        for group, each in ((np.arange(count), none), (np.array([5]), Settled(None, True, 4, WRONG[1:])))
+    )
+    place = alone.split("laws of these 1: ")[1].split(";")[0]
+    assert f"laws of these {count}, 1 of which changes: {place};" in all_pairs
+    violation[[5, 7, 8]] = 1.0
+    several = str(describe_unsettled(problem, "no admissible modes", Proposal(draw_modes(count), violation),
+                                     np.arange(count), none))
+    assert f"laws of these {count}, 3 of which change: {place}, " in several

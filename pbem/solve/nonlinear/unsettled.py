@@ -58,10 +58,15 @@ def describe_unsettled(
         )
     if reason == "no admissible modes" and failed is not None:
         certainty = "fulfils" if failed.exhaustive else "was found that fulfils"
+        changing = group[proposal.changed[group]]
+        if 0 < len(changing) < len(group):  # at last all pairs are tried, most of which have their modes
+            those = f"{len(group)}, {len(changing)} of which {'changes' if len(changing) == 1 else 'change'}"
+        else:
+            those, changing = f"{len(group)}", group
         return ConvergenceError(
             reason,
-            f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these "
-            f"{len(group)}: {_name(problem, group)}; {_advise(problem.laws, group)}",
+            f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these {those}: "
+            f"{_name(problem, changing)}; {_advise(problem.laws, changing)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
                             _list_places(problem, np.flatnonzero(proposal.changed)))

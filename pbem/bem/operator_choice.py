@@ -23,8 +23,6 @@ class DenseChoice:
     """Every entry of the matrix is stored."""
 
     name: ClassVar[Operator] = "dense"
-    # Whether a second solution, which begins with the statuses of the first, searches once only.
-    searches_once: ClassVar[bool] = False
 
     @staticmethod
     def ease(solver: SolverOptions) -> SolverOptions:
@@ -37,7 +35,6 @@ class HierarchicalChoice:
     """Far elements by their expansions."""
 
     name: ClassVar[Operator] = "hierarchical"
-    searches_once: ClassVar[bool] = True
 
     @staticmethod
     def ease(solver: SolverOptions) -> SolverOptions:

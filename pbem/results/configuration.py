@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from pbem.geometry.curve import Curve, Leg
+from pbem.model.lengths import count_elements
 from pbem.model.model import Model
-from pbem.wording import show
+from pbem.wording import list_names, show
 
 
 def dump_configuration(model: Model) -> str:
@@ -36,6 +38,8 @@ def to_plain(value: Any) -> Any:
     return str(value)
 
 
+# So many curves are named.
+MOST_NAMED = 8
 # What a run can go on with though it is told otherwise: the past is the same.
 MAY_CHANGE = ("title", "units_length", "units_stress")
 
@@ -62,6 +66,29 @@ def find_change(stored: str, model: Model) -> str:
         return f"stages: {len(had) if isinstance(had, list) else 'none'} before, {len(has)} now"
     now["stages"] = has[: len(had)]
     return _find_difference(before, now, "")
+
+
+def find_other_elements(stored: str, model: Model) -> str:
+    """Curves to which loads of added stages give other elements than they have in a file, with both numbers; "" if
+    none are, or more than that and the stages differs from the configuration that it keeps."""
+    try:
+        before = json.loads(stored)
+        curves = {name: Curve(name, tuple(_read_leg(leg) for leg in curve["legs"]))
+                  for name, curve in before["curves"].items()}
+        added = len(model.stages) > len(before["stages"])
+    except (KeyError, TypeError, ValueError):
+        return ""
+    if not added or find_change(stored, dataclasses.replace(model, curves=curves)):
+        return ""
+    counts = {name: (count_elements({name: curve})[name], count_elements({name: curves[name]})[name])
+              for name, curve in model.curves.items() if curve != curves[name]}
+    return list_names([f"'{name}' {now} in place of {had}" for name, (now, had) in counts.items()], MOST_NAMED)
+
+
+def _read_leg(plain: Mapping[str, Any]) -> Leg:
+    points = {key: None if plain[key] is None else complex(*plain[key]) for key in ("start", "end", "center")}
+    fractions = plain["fractions"]
+    return Leg(**{**plain, **points, "fractions": None if fractions is None else tuple(fractions)})
 
 
 def _drop_fractions(configuration: dict[str, Any]) -> None:

@@ -13,7 +13,7 @@ from pbem.errors import ResultFileError
 from pbem.mesh.mesh import Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
 from pbem.results.absent import fill
-from pbem.results.configuration import find_change
+from pbem.results.configuration import find_change, find_other_elements
 from pbem.results.energy import Energy
 from pbem.results.former import read_ahead
 from pbem.results.layout import (
@@ -41,7 +41,13 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
     if "case" not in file.attrs:
         raise ResultFileError(path, "is not a result file of pbem")
     if (file.attrs["case"], file.attrs.get("overrides", "")) != (model.source, model.overrides):
-        change = find_change(str(file.attrs.get("configuration", "")), model)
+        stored = str(file.attrs.get("configuration", ""))
+        change = find_change(stored, model)
+        others = find_other_elements(stored, model) if change else ""
+        if others:
+            raise ResultFileError(path, "has a mesh that the loads of the added stages do not fit, as they vary or "
+                                        f"jump within its elements: these would be {others}; run without resuming, or "
+                                        "name another output file")
         if change:
             raise ResultFileError(path, f"holds the results of another case, or the case file was changed since: "
                                         f"{change}; only stages can be added to a run that is resumed; run "
@@ -58,9 +64,9 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
     if mesh.pairs.count and not set(list_pair_datasets(model)) <= set(file["all/contact"]):
         raise ResultFileError(path, "was written by another version of pbem; run without resuming")
     position = to_columns(list_faces(mesh).position + model.origin)
-    stored = file["nodes/position"][...]
+    nodes = file["nodes/position"][...]
     same = SAME_PLACE * (model.size + abs(model.origin))
-    if stored.shape != position.shape or np.abs(stored - position).max() > same:
+    if nodes.shape != position.shape or np.abs(nodes - position).max() > same:
         raise ResultFileError(path, "holds another mesh of this case (it was written by another version of pbem); "
                                     "run without resuming")
 

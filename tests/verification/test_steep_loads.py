@@ -242,3 +242,23 @@ def test_a_load_that_moves_in_many_small_steps_is_borne_in_each(width: float, el
     borne, acting = results.reactions["below"], results.reactions["above"]
     assert np.abs(acting[:, 1]).max() > 0.3 * width
     np.testing.assert_allclose(borne, -acting, rtol=0, atol=2e-3 * np.abs(acting).max())
+
+
+@pytest.mark.parametrize("load", [
+    write_gauss(1.7, 0.2, 1.0), {"table": [[0, 1], [1.7, 1], [1.700001, 2], [4, 2]]}, write_gauss(1.7, 5.0, 1.0),
+])  # fmt: skip
+def test_stages_whose_loads_the_mesh_of_a_file_does_not_follow_are_not_added(load: Tables, tmp_path: Path) -> None:
+    """With that reason: they were taken for another case. Others are."""
+    case = press_block({"expression": "1"}, 2, 8) | {"analysis": {}}
+    stages: list[Tables] = [{"steps": 1}, {"steps": 1, "boundary": {"t": {"pressure": load}}}]
+    path = tmp_path / "block.h5"
+    pbem.run(pbem.Case(**case, stages=stages[:1]), path)
+    if "5.0" in str(load):
+        results = pbem.run(pbem.Case(**case, stages=stages), path, resume=True)
+        assert results.reactions["b"][-1, 1] == pytest.approx(integrate(1.7, 5.0), rel=0.01)
+        return
+    with pytest.raises(pbem.ResultFileError, match=r"loads of the added stages .*'t' \d+ in place of 8; run without"):
+        pbem.run(pbem.Case(**case, stages=stages), path, resume=True)
+    case["boundary"]["t"]["pressure"] = {"expression": "2"}
+    with pytest.raises(pbem.ResultFileError, match="another case"):
+        pbem.run(pbem.Case(**case, stages=stages), path, resume=True)

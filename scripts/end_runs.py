@@ -188,6 +188,8 @@ def main() -> int:
     parser.add_argument("--phases", nargs="+", choices=PHASES, default=list(PHASES))
     parser.add_argument("--apart", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    for name in SIGNALS:  # runs would ignore what is ignored here, as under nohup
+        signal.signal(getattr(signal, name), signal.SIG_DFL)
     if "disk" in options.ends and not options.apart:
         if os.getuid() == 0:  # with mounts of its own, which end with it
             os.execvp("unshare", ["unshare", "-m", sys.executable, *sys.argv, "--apart"])

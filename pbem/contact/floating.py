@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Integer, Real
+from pbem.linear_programme import SOLVED, minimise
 
 # The space around a block is wide if it is more than this part of the largest opening around it.
 WIDE = 1e-2
@@ -42,18 +43,16 @@ def measure_space(position: Complex, normal: Complex, opening: Real) -> Space:
     A linear programme in the motion's three numbers, bounded by the largest opening: beyond it motions are no longer
     small, and a block that may turn in its place would turn without end.
     """
-    from scipy.optimize import linprog  # here, as few runs need it
-
     size = float(np.abs(opening).max(initial=0.0)) or 1.0
     middle = position.mean()
     lever = (position - middle) / np.abs(position - middle).max()
     motions = np.stack([np.ones_like(lever), np.full_like(lever, 1j), 1j * lever], axis=1)
     rows = (motions * np.conj(normal)[:, None]).real
-    found = linprog(
+    found = minimise(
         [0.0, 0.0, 0.0, -1.0], A_ub=np.column_stack([-rows, np.ones(len(rows))]), b_ub=opening / size,
-        bounds=[(-2.0, 2.0)] * 3 + [(None, None)], method="highs",
+        bounds=[(-2.0, 2.0)] * 3 + [(None, None)],
     )
-    if found.status != 0:
+    if found.status != SOLVED:
         return Space(0.0, size, np.zeros(0, dtype=np.int64))
     left = opening / size + rows @ found.x[:3]
     nearest = np.flatnonzero(left <= found.x[3] + NEAREST)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.linear_programme import SOLVED, minimise
 
 # Two pairs hold a body if the normal of one passes the other by this part of their distance; pairs without friction if
 # the least singular value of what they feel of motions of unit size is no less than this.
@@ -79,8 +80,6 @@ def _find_range(left: Real, rate: Real, span: float, rounded: float) -> list[tup
 def _rest_on_three(position: Complex, normal: Complex, opening: Real, slip: Real) -> Place | None:
     """Without friction: where the nearest pair closes, or comes as near as it can, and others stop what is left; two
     pairs hold a round body, whose turning opens nothing."""
-    from scipy.optimize import linprog  # here, as few runs need it
-
     size = float(np.abs(opening).max(initial=0.0))
     lever = (position - position.mean()) / np.abs(position - position.mean()).max()
     motions = np.stack([np.ones_like(lever), np.full_like(lever, 1j), 1j * lever], axis=1)
@@ -90,9 +89,9 @@ def _rest_on_three(position: Complex, normal: Complex, opening: Real, slip: Real
     rows, motions = rows[:, seen], motions[:, seen]
     if not size > 0:
         return None
-    found = linprog(rows[np.argmin(opening)] + ASKEW[seen], A_ub=-rows, b_ub=opening / size,
-                    bounds=[(-FARTHEST, FARTHEST)] * rows.shape[1], method="highs")
-    if found.status != 0:
+    found = minimise(rows[np.argmin(opening)] + ASKEW[seen], A_ub=-rows, b_ub=opening / size,
+                     bounds=[(-FARTHEST, FARTHEST)] * rows.shape[1])
+    if found.status != SOLVED:
         return None
     touching = np.flatnonzero(found.ineqlin.marginals < -ROUNDED)
     if len(touching) != rows.shape[1] or np.linalg.svd(rows[touching], compute_uv=False)[-1] < FELT:

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linprog
 
 from pbem.arrays import Bool, Complex, Real
 from pbem.geometry.loop import side_legs
 from pbem.geometry.sampling import sample_side
+from pbem.linear_programme import SOLVED, minimise
 from pbem.model.model import Contact, Law, Model
 from pbem.model.resultants import measure_power
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded, find_rigid_body_modes
@@ -125,7 +125,7 @@ def _move(opening: Real, rates: Real, power: Real, most: float, stopped: bool = 
     # The programme's tolerances are absolute: lengths are counted in the largest opening, whatever their units.
     unit = float(opening.max(initial=0.0)) or most or 1.0
     bounds = [(-most / unit, most / unit)] * len(power)
-    found = linprog(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening / unit, bounds=bounds)
-    if found.status != 0 or (stopped and -found.fun > 0.1 * most / unit):
+    found = minimise(-power / np.abs(power).max(), A_ub=-rates, b_ub=opening / unit, bounds=bounds)
+    if found.status != SOLVED or (stopped and -found.fun > 0.1 * most / unit):
         return None
     return np.asarray(opening + rates @ (unit * found.x))

@@ -15,14 +15,13 @@ from scipy import sparse
 from pbem.arrays import Integer, Real
 from pbem.contact.laws import Memory, PairLaws, tensile_limit
 from pbem.contact.loads import Load
+from pbem.linear_programme import INFEASIBLE, SOLVED, minimise
 from pbem.solve.problem.given import BALANCED, collect_given, find_push
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import Former
 
 # A share that is less than the whole by no more than this is the whole.
 ROUNDING = 1e-6
-# How a linear programme can end.
-SOLVED, INFEASIBLE = 0, 2
 # Models with more pairs are not asked.
 MOST_PAIRS = 20_000
 
@@ -213,21 +212,19 @@ def _maximise(
                                         len(change))), shape=balance.shape)
     cost = np.zeros(columns + 1)
     cost[-1] = -1.0
-    from scipy.optimize import linprog  # here, as few runs need it and it is a tenth of what a start imports
-
     # In forces of the nodes, as entries below 1e-9 are taken for none: elements may be as much shorter than the model.
     length = np.where(mesh.weight > 0, mesh.weight, problem.model.size) / problem.model.size
     by_column = sparse.diags(1 / np.append(np.repeat(length, 2), 1.0))
     by_pair = length[mesh.pairs.slave]
     by_row = np.tile(by_pair[own], len(bounds))
     bounded = sparse.vstack([sparse.diags(by_row) @ above, balance - left, -balance - left])
-    found = linprog(
+    found = minimise(
         cost[used],
         A_ub=(bounded @ by_column).tocsr()[:, used],
         b_ub=np.concatenate([by_row * most, spare - constant, spare + constant]),
         A_eq=(sparse.diags(by_pair[parted]) @ fixed @ by_column).tocsr()[:, used] if len(parted) else None,
         b_eq=-by_pair[parted] * pressure[parted] if len(parted) else None,
-        bounds=np.stack([low, high], axis=1)[used], method="highs",
+        bounds=np.stack([low, high], axis=1)[used],
     )  # fmt: skip
     if found.status != SOLVED:
         return _Solved(None, found.status == INFEASIBLE)

@@ -53,8 +53,8 @@ class _Side:
 
 def find_contact_ends(model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:
     """The ends of contacts between rounded bodies over whose element the pressure falls by more than COARSE of the
-    contact's largest (theory, 124), those that cannot be located among them; of the contacts of `list_gradable`. Ends
-    are left out where the pressures of the pairs lie on the root as it is.
+    contact's largest (theory, 124), those that cannot be located among them; of the contacts of `list_gradable`. With
+    "auto" ends are left out where the pressures of the pairs lie on the root as it is.
 
     Elements are looked at on the curve that the pairs belong to.
     """
@@ -62,15 +62,17 @@ def find_contact_ends(model: Model, mesh: Mesh, contact: ContactState) -> tuple[
     found: list[ContactEnd] = []
     for name, pairs in sort_pairs(mesh).items():
         if name in gradable:
-            found += _Pressed(mesh, contact, pairs).find(name, gradable[name])
+            pressed = _Pressed(mesh, contact, pairs, spare=model.analysis.grade_contact_ends == "auto")
+            found += pressed.find(name, gradable[name])
     return tuple(found)
 
 
 class _Pressed:
     """The elements of one contact with their pairs, and how they are pressed."""
 
-    def __init__(self, mesh: Mesh, contact: ContactState, pairs: Integer) -> None:
-        """pairs (m,): of the contact."""
+    def __init__(self, mesh: Mesh, contact: ContactState, pairs: Integer, spare: bool) -> None:
+        """pairs (m,): of the contact; spare: leave out ends where the pressures lie on the root as it is."""
+        self._spare = spare
         self._mesh = mesh
         self._pressure = -contact.traction_n
         self._opening = contact.opening
@@ -127,7 +129,7 @@ class _Pressed:
             between = complex((mesh.end if forward else mesh.start)[element])
             return ContactEnd(name, between, curves, np.inf, 0.0, pressed, False) if pressed > COARSE else None
         over = self._measure_fall(last, at, forward) * np.sqrt(last.length)
-        if over <= COARSE * self._largest or self._is_followed(last, free, at, forward):
+        if over <= COARSE * self._largest or (self._spare and self._is_followed(last, free, at, forward)):
             return None
         # Rounded, so that the mesh of the next pass does not change with the rounding of this one's solution.
         window = UNCERTAIN * max(last.length, free.length)

@@ -232,12 +232,14 @@ class StoredEnergy:
         return traction
 
     def _sample_swelling(self, particulars: Sequence[ParticularSolution]) -> Complex:
-        """Displacement of the strain without stress on all faces (f,)."""
+        """Displacement of the strain without stress on all faces (f,), each region turned and moved back to where it
+        was in the mean: what forces are out of balance would work on the way to it from the corner of the model."""
         moved = repeat_value(0.0, len(self.weight), complex)
         for number, balanced in enumerate(particulars):
             if not balanced.swelling.is_zero:
                 own, moved = self._find_faces(number), np.require(moved, requirements="W")
-                moved[own] = balanced.swelling.displacement(self._faces.position[own])
+                place, weight = self._faces.position[own], self._all_weight[own]
+                moved[own] = _take_back(place, balanced.swelling.displacement(place), weight)
         return moved
 
     def _find_faces(self, region: int) -> Integer:
@@ -268,3 +270,11 @@ def sum_work(weight: Real, traction: Complex, displacement: Complex) -> float:
 
 def _split(force: complex) -> Real:
     return np.array([force.real, force.imag])
+
+
+def _take_back(place: Complex, moved: Complex, weight: Real) -> Complex:
+    """The displacements without the translation and the rotation that they have in the mean over weights."""
+    away = place - np.average(place, weights=weight)
+    moved = moved - np.average(moved, weights=weight)
+    turn = float(weight @ (np.conj(away) * moved).imag) / float(weight @ np.abs(away) ** 2)
+    return np.asarray(moved - 1j * turn * away)

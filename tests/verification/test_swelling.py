@@ -210,3 +210,40 @@ def test_parallel_stress_of_a_crack_under_a_graded_temperature(tmp_path: Path) -
         case["regions"]["ring"]["cracks"] = ["crack"]
         found.append(pbem.run(case, tmp_path / "graded.h5", force=True).tips["crack"].T[-1])
     np.testing.assert_allclose(found[0], found[1], rtol=2e-3)
+
+
+def heat_block(far: float, mirrored: bool) -> dict[str, Any]:
+    """A hot block on a cold one, which is held below; so far from them a third one that nothing acts on."""
+    def outline(name: str, x: float, y: float, width: float, height: float) -> dict[str, Any]:
+        corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
+        return {f"{name}{k}": {"points": [corners[k], corners[(k + 1) % 4]], "elements": 4} for k in range(4)}
+
+    curves = outline("a", 0.0, 0.0, 2.0, 1.0) | outline("u", 0.3, 1.0, 1.0, 0.7)
+    del curves["a2"], curves["u0"]
+    for name, start, end in (("left", 0.0, 0.3), ("seat", 0.3, 1.3), ("right", 1.3, 2.0)):
+        curves[name] = {"points": [[start, 1.0], [end, 1.0]], "elements": 4}
+    regions = {"base": {"material": "m", "boundary": ["a0", "a1", "a3", "left", "seat", "right"]},
+               "hot": {"material": "m", "boundary": ["seat", "u1", "u2", "u3"]}}
+    boundary = {"a0": {"ux": 0.0, "uy": 0.0}}
+    if far:
+        curves |= outline("f", -far, -far, 1.0, 1.0)
+        regions["far"] = {"material": "m", "boundary": [f"f{k}" for k in range(4)]}
+        boundary["f0"] = {"ux": 0.0, "uy": 0.0}
+    for table in curves.values():
+        table["points"] = [[-x if mirrored else x, y] for x, y in table["points"]]
+    return {"materials": {"m": {"young": 1e3, "poisson": 0.3, "expansion": 1e-5}}, "curves": curves,
+            "regions": regions, "boundary": boundary, "temperature": {"hot": 100.0},
+            "analysis": {"steps": 1, "order": 1, "scheme": "THST"}}  # fmt: skip
+
+
+@pytest.mark.parametrize(("far", "mirrored"), [(100.0, False), (1e4, False), (0.0, True)])
+def test_energies_of_swelling_do_not_depend_on_where_the_model_ends(
+    far: float, mirrored: bool, tmp_path: Path
+) -> None:
+    """The elastic energy was 9 and 800 times as much with a block far away, and 0.5 % off in the mirror: what swelling
+    moves a body by was counted from the corner of the model, and worked on the forces that are out of balance."""
+    energies = [pbem.run(heat_block(*each), tmp_path / "blocks.h5", force=True).energy
+                for each in ((0.0, False), (far, mirrored))]
+    for kind in ("elastic", "external"):
+        one, other = (getattr(each, kind)[-1] for each in energies)
+        assert other == pytest.approx(one, rel=1e-6)

@@ -167,7 +167,22 @@ def add_anchor(
         if block.region == region:
             at = np.searchsorted(block.columns, columns)
             stored = (at < len(block.columns)) & (block.columns[np.minimum(at, len(block.columns) - 1)] == columns)
-            block.matrix[np.ix_(np.searchsorted(block.rows, rows), at[stored])] += np.outer(added, values[stored])
+            _add_outer(block.matrix, np.searchsorted(block.rows, rows), at[stored], added, values[stored])
+
+
+def _add_outer(matrix: Real, rows: Integer, columns: Integer, added: Real, values: Real) -> None:
+    """Add the product of a column (r,) and a row (c,) to these rows and columns of a matrix, in place.
+
+    What lies side by side is not copied: a body's matrix is large, and this took longer than its kernels.
+    """
+    beside = all(len(each) > 0 and each[-1] - each[0] == len(each) - 1 and (np.diff(each) == 1).all()
+                 for each in (rows, columns))
+    if not beside:
+        matrix[np.ix_(rows, columns)] += np.outer(added, values)
+        return
+    target = matrix[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    for row, factor in zip(target, added, strict=True):
+        row += factor * values
 
 
 def scale_equations(mesh: Mesh, materials: Sequence[Material], length: float) -> Real:

@@ -155,6 +155,25 @@ def test_leaves_shared_by_ranks_add_up() -> None:
     np.testing.assert_allclose(together, whole, rtol=0, atol=1e-13 * np.abs(whole).max())
 
 
+@pytest.mark.parametrize("every", [1, 2])
+def test_anchors_of_nodes_side_by_side_or_not(every: int) -> None:
+    """What they add to the rows of a body is the product of pattern and functional, and nothing else changes."""
+    model, sample = read_sample("floating"), make_sample("floating")
+    mesh = sample.mesh
+    anchor = anchor_motions(mesh, find_rigid_body_modes(model))[0]
+    chosen = slice(1, -1, every)
+    nodes, pattern, functional = anchor.nodes[chosen], anchor.pattern[chosen], anchor.functional[chosen]
+    given, added = (assemble_rows(mesh, sample.materials, 0, mesh.nodes, sample.needed, model.size) for _ in range(2))
+    add_anchor(added, mesh, anchor.region, nodes, pattern, functional)
+    at = (2 * nodes[:, None] + np.arange(2)).ravel()
+    expected = np.zeros((2 * mesh.nodes, 4 * mesh.nodes))
+    parts = [np.stack([each.real, each.imag], axis=1).ravel() for each in (pattern, functional)]
+    expected[np.ix_(at, at)] = np.outer(*parts)
+    for one, other in zip(given.blocks, added.blocks, strict=True):
+        change = expected[np.ix_(one.rows, one.columns)] if one.region == anchor.region else 0.0
+        np.testing.assert_array_equal(one.matrix + change, other.matrix)
+
+
 def test_anchors_are_those_of_the_dense_rows() -> None:
     model, sample = read_sample("floating"), make_sample("floating")
     mesh = sample.mesh

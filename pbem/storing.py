@@ -61,7 +61,6 @@ class WaitingSteps:
 
     def __init__(self, steps: Iterator[Step]) -> None:
         self._held: list[Step] = []
-        self._done = 0
         self._rest = steps
         self.error: PbemError | KeyboardInterrupt | None = None
         self.failure: BaseException | None = None
@@ -79,17 +78,11 @@ class WaitingSteps:
 
     def replay(self) -> Iterator[Step]:
         """These steps and those that follow, or what has ended the march."""
-        yield from self._take()
+        yield from self._held
         if self.error is not None:
             raise self.error
         if not self.whole:
             yield from self._rest
-
-    def _take(self) -> Iterator[Step]:
-        """Those held that are not done with: a step is when the next one is asked for."""
-        for step in self._held[self._done :]:
-            yield step
-            self._done += 1
 
     @contextmanager
     def rescue(
@@ -97,8 +90,8 @@ class WaitingSteps:
     ) -> Iterator[None]:
         """Store those held though an error has ended the march, or ends the block, that one rank may have alone.
 
-        The first rank does that by itself, without errors, and without fields at interior points if it is one of
-        several or there is no memory for them.
+        The first rank does that by itself, of what its file does not hold yet, without errors, and without fields at
+        interior points if it is one of several or there is no memory for them.
         """
         try:
             if self.failure is not None:
@@ -111,8 +104,9 @@ class WaitingSteps:
                 traceback.clear_frames(error.__traceback__)
             for field in (interior, None) if comm.size == 1 else (None,):
                 with suppress(Exception):  # what ended the run must be what the user hears of
-                    if writer and not writer.is_within_step:
-                        store_without_errors(self._take(), every, field, writer, alone)
+                    left = self._held[writer.appended :] if writer and not writer.is_within_step else []
+                    if left:
+                        store_without_errors(iter(left), every, field, writer, alone)
             raise
 
 

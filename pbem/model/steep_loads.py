@@ -106,7 +106,8 @@ def _list_shapes(
 
     def add(loc: KeyPath, name: str, shape: _Shape) -> None:
         given.setdefault(name, []).append(shape)
-        second = case.contacts[str(loc[-2])].between[1] if loc[-3] == "contacts" else ""
+        key, owner = loc[2:4] if loc[0] == "stages" else loc[:2]
+        second = case.contacts[str(owner)].between[1] if key == "contacts" else ""
         if second in curves:
             given.setdefault(second, []).append(replace(shape, opposite=curves[name]))
 

@@ -162,6 +162,7 @@ class ResultWriter:
         points = self._file["interior/region"][...] if "interior" in self._file else np.zeros(0, dtype=np.int64)
         self._absence = Absence(model, mesh, points)
         self._pending: Step | None = None
+        self.appended = 0  # steps that are in the file for good
 
     @property
     def _file(self) -> h5py.File:
@@ -194,6 +195,7 @@ class ResultWriter:
         else:
             self._pending = step
         self._commit(f"step {step.number}")
+        self.appended += 1
         # What has to move before it touches is noted with the model.
         runaway = None if self._model.closing and step.number == 1 else self._balance.runaway
         notes = [] if runaway is None else [describe_runaway(step, runaway)]

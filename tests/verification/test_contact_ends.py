@@ -19,6 +19,7 @@ from pbem.errors import CaseError, ConvergenceError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.end_grading import ContactEnd, grade_ends
 from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
+from pbem.results import writer as writer_module
 from pbem.results.estimator import Estimator
 from pbem.results.writer import ResultWriter
 from pbem.solve.problem.step import SilentReporter
@@ -427,3 +428,23 @@ def test_pressures_that_lie_on_the_root_as_they_are_are_not_solved_for_again(
     results = pbem.run(case, tmp_path / "pin.h5")
     assert (results.fractions is not None) is again
     assert np.abs(compare_pressures(results, force, width, 0.0)).max() < 1e-2
+
+
+def test_a_listener_that_fails_after_a_step_was_stored_does_not_have_it_stored_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Failing(SilentReporter):
+        def note(self, text: str) -> None:
+            if text == "sparse":
+                raise RuntimeError("no room to tell it")
+
+    case = write_small(tmp_path / "pin.toml")
+    plain = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
+    monkeypatch.setattr(driver, "plan_graded", lambda *_: None)
+    monkeypatch.setattr(writer_module, "describe_sparse_contacts", lambda *_: ["sparse"])
+    with pytest.raises(RuntimeError, match="no room to tell it"):
+        pbem.run(case, tmp_path / "pin.h5", reporter=Failing())
+    kept = pbem.open_results(tmp_path / "pin.h5")
+    np.testing.assert_array_equal(kept.steps.factor, plain.steps.factor)
+    np.testing.assert_array_equal(kept.energy.external, plain.energy.external)
+    assert not kept.errors.missing

@@ -179,6 +179,17 @@ def lay_blocks(law: Tables, matching: bool, lower: int, upper: int, unit: float,
     return case
 
 
+def test_springs_on_a_curve_named_as_a_table(tmp_path: Path) -> None:
+    case = press_block({"expression": "1 + 0 * x"}, 2, 4)
+    case["curves"] = {("contacts" if name == "t" else name): curve for name, curve in case["curves"].items()}
+    case["regions"]["r"]["boundary"] = list(case["curves"])
+    case["boundary"] = {"b": {"ux": 0.0, "uy": 0.0},
+                        "contacts": {"spring": {"kn": {"expression": "1e3 * (1 + x)"}}, "end_n": 1e-3}}
+    results = pbem.run(pbem.Case(**case), tmp_path / "block.h5")
+    assert results.status == "finished"
+    np.testing.assert_allclose(results.reactions["b"][-1] + results.reactions["contacts"][-1], 0.0, atol=1e-4)
+
+
 @pytest.mark.parametrize(("key", "matching", "lower", "upper", "unit"), [
     ("friction", True, 8, 8, 1.0), ("friction", False, 6, 14, 1e3), ("cohesion", False, 14, 6, 1e-3),
     ("gap", True, 8, 8, 1e-3), ("gap", False, 6, 14, 1.0),

@@ -19,6 +19,7 @@ from pbem.errors import CaseError, ConvergenceError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.model.end_grading import ContactEnd, grade_ends
 from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
+from pbem.results import contact_ends
 from pbem.results import writer as writer_module
 from pbem.results.estimator import Estimator
 from pbem.results.writer import ResultWriter
@@ -448,3 +449,17 @@ def test_a_listener_that_fails_after_a_step_was_stored_does_not_have_it_stored_a
     np.testing.assert_array_equal(kept.steps.factor, plain.steps.factor)
     np.testing.assert_array_equal(kept.energy.external, plain.energy.external)
     assert not kept.errors.missing
+
+
+@pytest.mark.parametrize(("followed", "graded", "count"), [
+    ([True, True], "auto", 0), ([True, False], "auto", 2), ([False, False], "auto", 2), ([True, True], True, 2),
+])  # fmt: skip
+def test_ends_are_left_as_they_are_only_if_the_pressures_lie_on_the_root_at_all_of_them(
+    followed: list[bool], graded: bool | str, count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = write_small(tmp_path / "pin.toml", graded=graded)
+    judged, found = iter(100 * followed), []
+    monkeypatch.setattr(contact_ends._Pressed, "_is_followed", lambda *_: next(judged))
+    monkeypatch.setattr(driver, "plan_graded", lambda _, ends, *__: found.append(ends))
+    pbem.run(case, tmp_path / "pin.h5")
+    assert {len(ends) for ends in found} == {count}

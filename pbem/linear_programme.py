@@ -9,7 +9,8 @@ import numpy as np
 SOLVED, INFEASIBLE, UNBOUNDED = 0, 2, 3
 # Presolving can go round without end, whatever number of iterations is allowed (HiGHS 1.2; masonry of three blocks
 # whose joints bear next to nothing). Small programmes are solved without, and what has not come back within SECONDS,
-# and as many more for every MANY rows, is tried in another way: the value at the optimum is the same.
+# and as many more for every MANY rows, is tried in another way: the value at the optimum is the same, though not always
+# the point that has it.
 WITHOUT: tuple[str, bool] = ("highs-ds", False)
 PRESOLVED: tuple[str, bool] = ("highs-ds", True)
 INTERIOR: tuple[str, bool] = ("highs-ipm", True)

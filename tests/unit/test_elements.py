@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -273,3 +274,8 @@ def test_carriers_meet_on_both(seed: int) -> None:
                     s = e.locate(np.array([point]))
                     if abs(s[0, 0]) < 20:
                         expect_equal(e.place(s)[0, 0], point, 1e-9)
+
+
+def test_a_point_that_rounds_to_the_centre_of_a_tiny_arc_has_no_normal() -> None:
+    arc = Leg(-8j + 5e-9, -8j + 5e-9j, 1, center=-8j, sweep=math.pi / 2)
+    assert Elements.collect([arc]).normals_at(np.array([[-8j]])) == 0

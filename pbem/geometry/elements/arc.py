@@ -53,8 +53,10 @@ class Arc(Kind):
         return np.sign(e.sweep) * radius / abs(radius)
 
     def normal_at(self, e: Shape, z: Any) -> Any:
+        """Zero at the centre, on which points of tiny arcs far away can round."""
         radius = z - e.center
-        return np.sign(e.sweep) * radius / abs(radius)
+        size = abs(radius)
+        return np.sign(e.sweep) * radius / np.where(size > 0, size, 1.0)
 
     def directions(self, e: Shape) -> tuple[Any, Any]:
         chord = e.end - e.start

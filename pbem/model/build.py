@@ -254,7 +254,7 @@ def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, re
     fitted = shorten_under_loads(case, loading.stages, recall.find(
         "lengths", (case.curves, case.analysis, curves, regions, topology.tips, jointed, roles.contacts, loads, bonded),
         lambda: fit_curves(case, curves, regions, topology.tips, jointed, roles.contacts, loads, bonded),
-    ))
+    ), topology.tips)
     model = Model(
         title=case.title, units_length=case.units.length, units_stress=case.units.stress, source="",
         regions=(*regions, *tools), curves=fitted.curves, interfaces=loading.interfaces, conditions=loading.conditions,

@@ -45,15 +45,18 @@ MOST_TIMES = 100
 RESISTANCES = ("kn", "ks", "friction", "friction_dynamic", "cohesion", "tensile_strength", "dilation_angle", "gap")
 
 
-def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurves) -> FittedCurves:
+def shorten_under_loads(
+    case: Case, stages: Sequence[Stage], fitted: FittedCurves, tips: Mapping[str, tuple[bool, bool]]
+) -> FittedCurves:
     """Halve elements until no load by an expression or a table differs by more than TOLERANCE from the polynomial
     through its values at the nodes, at the ends of load steps; nor any strength, gap or stiffness of springs. A fluid
     in a contact presses on both its curves, which its strengths and its gap are laws of as well.
 
     A grading of the user's is kept, and a curve gets some elements at most, those that differ most first: the user is
-    told of both. Constant elements are left alone: nothing follows a slope there."""
+    told of both. Constant elements are left alone: nothing follows a slope there. tips: per crack whether its ends are
+    tips, whose elements follow the root of the distance: gaps may be alike there."""
     curves = fitted.curves
-    given, hurried = _list_shapes(case, stages, curves)
+    given, hurried = _list_shapes(case, stages, curves, tips)
     found, left, notes = dict(curves), {}, []
     for name, values in given.items():
         finer, worst = _halve(curves[name], values, case.analysis.order, _count_spare(case, curves[name]))
@@ -80,12 +83,13 @@ def shorten_under_loads(case: Case, stages: Sequence[Stage], fitted: FittedCurve
 @dataclass(frozen=True)
 class _Shape:
     """A load at its times, or what resists; on the second curve of a contact its places are those on the first
-    (opposite)."""
+    (opposite). tips: whether the first and the last element are at a tip and follow it there."""
 
     value: Varying
     times: tuple[float, ...]
     opposite: Curve | None = None
     resists: bool = False
+    tips: tuple[bool, bool] = (False, False)
 
     def evaluate(self, leg: Leg, passed: float, fractions: Real) -> Iterator[Real]:
         """At each time, at fractions (e, k) of a leg that begins after so much of its curve's length."""
@@ -98,7 +102,7 @@ class _Shape:
 
 
 def _list_shapes(
-    case: Case, stages: Sequence[Stage], curves: Mapping[str, Curve]
+    case: Case, stages: Sequence[Stage], curves: Mapping[str, Curve], tips: Mapping[str, tuple[bool, bool]]
 ) -> tuple[dict[str, list[_Shape]], list[str]]:
     """The loads of each curve, and the curves whose loads are looked at after some of their steps alone."""
     given: dict[str, list[_Shape]] = {}
@@ -123,7 +127,8 @@ def _list_shapes(
     for loc, name, table in list_varying(case) if case.analysis.order else ():
         value = read_value(loc, table, timed=False)[0] if loc[-1] in RESISTANCES else None
         if isinstance(value, Varying) and name in curves:
-            add(loc, name, _Shape(value, (0.0,), resists=True))
+            followed = tips.get(name, (False, False)) if loc[-1] == "gap" else (False, False)
+            add(loc, name, _Shape(value, (0.0,), resists=True, tips=followed))
     return given, list(dict.fromkeys(hurried))
 
 
@@ -158,6 +163,11 @@ class _Elements:
     def measure(self, curve: Curve) -> Real:
         """Their lengths."""
         return np.array([leg.length for leg in curve.legs])[self.legs] * (self.ends - self.starts)
+
+    def find_ends(self, leg: int, legs: int, asked: tuple[bool, bool]) -> Bool:
+        """Those at the ends of the curve that are asked for (its start, its end), on one of its legs."""
+        first = (self.starts == 0.0) & (leg == 0) & asked[0]
+        return np.asarray((first | ((self.ends == 1.0) & (leg == legs - 1) & asked[1])) & (self.legs == leg))
 
     def take(self, which: Bool) -> _Elements:
         return _Elements(self.legs[which], self.starts[which], self.ends[which])
@@ -223,11 +233,13 @@ def _compare(
         ends = elements.starts[here, None], elements.ends[here, None]
         shown, known = _spread(*ends, _SAMPLES), _spread(*ends, _place_nodes(order))
         for value, size in zip(values, sizes, strict=True):
+            at_tip = elements.find_ends(number, len(curve.legs), value.tips)[here]
             pairs = zip(value.evaluate(leg, passed, shown), value.evaluate(leg, passed, known), size, strict=True)
             for seen, nodal, largest in pairs if here.any() else ():
                 with np.errstate(invalid="ignore", over="ignore"):  # values that are not finite are told elsewhere
                     apart = np.abs(seen - nodal @ _interpolate(order)).max(axis=1)
-                    differs[here] = np.fmax(differs[here], apart / largest if largest > 0 else 0.0)
+                    part = np.where(at_tip, 0.0, apart / largest if largest > 0 else 0.0)
+                    differs[here] = np.fmax(differs[here], part)
         passed += leg.length
     return differs
 

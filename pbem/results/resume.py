@@ -45,9 +45,10 @@ def check_same_case(path: str, file: h5py.File, model: Model, mesh: Mesh) -> Non
         change = find_change(stored, model)
         others = find_other_elements(stored, model) if change else ""
         if others:
-            raise ResultFileError(path, "has a mesh that the loads of the added stages do not fit, as they vary or "
-                                        f"jump within its elements: these would be {others}; run without resuming, or "
-                                        "name another output file")
+            raise ResultFileError(path, "has other elements than this case: either the case file was changed "
+                                        f"({change}), or the loads of the added stages vary or jump within those of "
+                                        f"the file, which would be {others}; run without resuming, or name another "
+                                        "output file")
         if change:
             raise ResultFileError(path, f"holds the results of another case, or the case file was changed since: "
                                         f"{change}; only stages can be added to a run that is resumed; run "

@@ -127,7 +127,7 @@ def _list_shapes(
     for loc, name, table in list_varying(case) if case.analysis.order else ():
         value = read_value(loc, table, timed=False)[0] if loc[-1] in RESISTANCES else None
         if isinstance(value, Varying) and name in curves:
-            followed = tips.get(name, (False, False)) if loc[-1] == "gap" else (False, False)
+            followed = tips.get(name, (False, False)) if loc[-1] == "gap" and case.analysis.tips else (False, False)
             add(loc, name, _Shape(value, (0.0,), resists=True, tips=followed))
     return given, list(dict.fromkeys(hurried))
 

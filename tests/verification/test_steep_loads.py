@@ -190,17 +190,17 @@ def test_springs_on_a_curve_named_as_a_table(tmp_path: Path) -> None:
     np.testing.assert_allclose(results.reactions["b"][-1] + results.reactions["contacts"][-1], 0.0, atol=1e-4)
 
 
-@pytest.mark.parametrize(("elements", "order"), [(20, 2), (12, 1), (8, 3)])
-def test_a_gap_like_the_root_of_the_distance_adds_no_elements_at_tips(elements: int, order: int) -> None:
-    """Whose jumps are that root there."""
+@pytest.mark.parametrize(("elements", "order", "tips"), [(20, 2, True), (12, 1, True), (8, 3, True), (20, 2, False)])
+def test_a_gap_like_the_root_of_the_distance_adds_no_elements_at_tips(elements: int, order: int, tips: bool) -> None:
+    """Whose jumps are that root there, if they have elements of their own."""
     built = build_model(pbem.Case(**{
         "materials": {"m": {"young": 1e3, "poisson": 0.2}},
         "curves": {"crack": {"points": [[-1, 0], [1, 0]], "elements": elements}},
         "regions": {"plane": {"material": "m", "cracks": ["crack"], "infinite": True}},
         "interfaces": {"crack": {"friction": 0.1, "gap": {"expression": "-1e-3*sqrt(1 - x**2)"}}},
-        "analysis": {"steps": 1, "order": order},
+        "analysis": {"steps": 1, "order": order, "tips": tips},
     }))  # fmt: skip
-    assert sum(leg.elements for leg in built.curves["crack"].legs) == elements
+    assert (sum(leg.elements for leg in built.curves["crack"].legs) == elements) is tips
 
 
 @pytest.mark.parametrize(("key", "matching", "lower", "upper", "unit"), [

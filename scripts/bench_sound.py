@@ -121,7 +121,7 @@ def multiply(tables: Mapping[str, Any], factor: int) -> dict[str, Any]:
     return {**tables, "curves": {name: multiply_curve(curve) for name, curve in tables["curves"].items()}}
 
 
-def list_models(folder: Path) -> Iterator[tuple[str, Callable[[], Any]]]:
+def list_models() -> Iterator[tuple[str, Callable[[], Any]]]:
     """Names of models, and what makes their case: a path or tables."""
     paths = [*sorted((ROOT / "cases").glob("*.toml")), *sorted((ROOT / "cases/gallery").glob("*.toml"))]
     for path in paths:
@@ -136,6 +136,13 @@ def list_models(folder: Path) -> Iterator[tuple[str, Callable[[], Any]]]:
             return multiply(tomllib.loads(made) if isinstance(made, str) else made, factor)
         for times in (2, 4) if factor == 4 else (2,):
             yield f"{name} x{times}", lambda name=name, times=times: make(name, times)  # type: ignore[misc]
+
+
+def make_asked(only: list[str]) -> Iterator[tuple[str, Any]]:
+    """Names and cases of the models whose names hold one of these parts; of all if there are none."""
+    for name, make in list_models():
+        if not only or any(part in name for part in only):
+            yield name, make()
 
 
 def run(case: Any, graded: str | bool, folder: Path) -> tuple[float, Watched, Results]:
@@ -196,10 +203,7 @@ def print_passes(options: argparse.Namespace, folder: Path) -> int:
     """A line a model with ends of contact that may be graded; the number of ratios beyond MOST."""
     print(f"{'model':28s} {'auto':>7s} {'false':>7s} {'ratio':>6s}  elements of the passes; changes over estimates")
     ratios = []
-    for name, make in list_models(folder):
-        if options.only and not any(part in name for part in options.only):
-            continue
-        case = make()
+    for name, case in make_asked(options.only):
         try:
             if not _may_be(case, folder):
                 continue
@@ -236,10 +240,7 @@ def print_before(options: argparse.Namespace, folder: Path) -> int:
     """A line a model that both checkouts can run; the number of ratios beyond MOST."""
     print(f"{'model':28s} {'now':>7s} {'before':>7s} {'ratio':>6s}  iterations; differences over estimates")
     ratios = []
-    for name, make in list_models(folder):
-        if options.only and not any(part in name for part in options.only):
-            continue
-        case = make()
+    for name, case in make_asked(options.only):
         path = folder / "case.toml"
         path.write_text(case.read_text() if isinstance(case, Path) else write_case(case))
         found = [[_run_apart(root, path, folder, options.repeat) for root in (ROOT, options.before)] for _ in range(2)]

@@ -43,6 +43,12 @@ class LinearStress:
         """Its divergence (complex): minus the body force that it balances."""
         return complex(self.by_x[0] + self.by_y[2], self.by_x[2] + self.by_y[1])
 
+    @property
+    def steepest(self) -> float:
+        """The largest magnitude among the slopes that its divergence adds up: they may balance each other, without
+        any weight, and then leave their rounding."""
+        return max(map(abs, (self.by_x[0], self.by_y[2], self.by_x[2], self.by_y[1])))
+
     def evaluate(self, point: Complex) -> Real:
         """The components (n, 3) at points (n,)."""
         away = point - self.center
@@ -102,7 +108,7 @@ def read_in_situ(loc: KeyPath, table: InSituTable, corners: Complex) -> tuple[Li
 def check_rest(loc: KeyPath, stress: LinearStress, density: float, gravity: complex) -> Iterator[Fault]:
     """A fault if the stress of a material is not in balance with the weight that it carries at rest."""
     left = stress.divergence + density * gravity
-    scale = max(abs(stress.divergence), abs(density * gravity))
+    scale = max(stress.steepest, abs(density * gravity))
     if not stress.is_uniform and abs(left) > BALANCED * scale:
         found = (f"a stress that grows by ({stress.divergence.real:.6g}, {stress.divergence.imag:.6g}) per length "
                  f"against a weight of ({density * gravity.real:.6g}, {density * gravity.imag:.6g}) per volume")

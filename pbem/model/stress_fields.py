@@ -78,7 +78,7 @@ def _check_infinite(
     rest = initial.get(case.regions[name].material, AT_REST)
     for number, (stress, (x, y)) in enumerate(zip(remote, gravity, strict=True)):
         weight, held = density * complex(x, y), stress.divergence + rest.divergence
-        if abs(weight + held) <= BALANCED * max(abs(weight), abs(held)):
+        if abs(weight + held) <= BALANCED * max(abs(weight), stress.steepest, rest.steepest):
             continue
         stage = case.stages[number] if case.stages else None
         if stage is not None and (stage.remote or stage.gravity):

@@ -132,3 +132,25 @@ def test_stress_far_away_out_of_balance(gravity: float, remote: dict[str, Any], 
     with pytest.raises(pbem.CaseError) as caught:
         pbem.run(case, "none.h5")
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("at_rest", [False, True])
+def test_slopes_that_balance_each_other_but_for_rounding(tmp_path: Path, at_rest: bool) -> None:
+    """Stress far away that bends a plane without weight; a bonded core of the same ground does not disturb it.
+
+    With factors like 0.3 the slopes cancel but for the last digit, which was measured against a weight of zero.
+    """
+    stress = {"sxx": "-5 + 0.3*x + 0.2*y", "sxy": "0.4 - 0.1*x - 0.3*y", "syy": "0.25*x + 0.1*y - 6"}
+    case = {
+        "materials": {"ground": {"young": YOUNG, "poisson": POISSON}},
+        "curves": {"rim": {"center": [0.5, 0.3], "radius": 1.0, "elements": 12}},
+        "regions": {"ground": {"material": "ground", "infinite": True, "boundary": ["rim"]},
+                    "core": {"material": "ground", "boundary": ["rim"]}},
+        "analysis": {"steps": 1}, "output": {"points": [[0.5, 0.3], [2, 2], [6, -3]]},
+    }  # fmt: skip
+    given = {key: {"expression": text} for key, text in stress.items()}
+    case |= {"initial_stress": {"ground": given}} if at_rest else {"remote": given}
+    results = pbem.run(case, tmp_path / "bent.h5")
+    x, y = results.interior.position.T
+    exact = np.stack([-5 + 0.3 * x + 0.2 * y, 0.25 * x + 0.1 * y - 6, 0.4 - 0.1 * x - 0.3 * y], -1)
+    np.testing.assert_allclose(results.interior.stress[-1], exact, atol=6 * 1e-4)

@@ -16,6 +16,7 @@ from matplotlib.tri import Triangulation
 
 from pbem.arrays import Real
 from pbem.errors import ResultFileError
+from pbem.results.drawn_overlap import describe_overlap
 from pbem.results.field_formulas import FIELDS
 from pbem.results.field_values import VertexField, VertexValues
 from pbem.results.outline import to_columns, trace_outlines
@@ -178,8 +179,8 @@ class FieldPicture:
         bar.locator = MaxNLocator(6)
         bar.update_ticks()
         self._draw_contours(axes, triangulation, values, low, high, bar)
-        self._draw_outlines(axes, step)
-        notes = self._mark_extremes(axes, values, places)
+        overlap = self._draw_outlines(axes, step)
+        notes = [*self._mark_extremes(axes, values, places), overlap]
         finish_plane(axes, self._results, self._frame, page)
         said = describe_step(self._results, step) + (f", displacements × {self._magnify:g}" if self._magnify else "")
         notes = [self._describe_cut(title, low, high), *notes, describe_box(box)]
@@ -239,7 +240,8 @@ class FieldPicture:
                                         linestyles=dashes, zorder=2)
                 bar.add_lines(lines, erase=False)  # type: ignore[attr-defined]
 
-    def _draw_outlines(self, axes: Axes, step: int) -> None:
+    def _draw_outlines(self, axes: Axes, step: int) -> str:
+        """Draw them; returns what is to be said of bodies that overlap."""
         results = self._results
         outlines = trace_outlines(results.nodes, results.elements, results.displacement_at(step))
         if self._magnify:
@@ -247,6 +249,7 @@ class FieldPicture:
             axes.add_collection(LineCollection(before, colors="0.6", linewidths=0.5, zorder=0.5))
         lines = [each.position + self._magnify * each.displacement for each in outlines]
         axes.add_collection(LineCollection(lines, colors="0.1", linewidths=0.8, zorder=3))
+        return describe_overlap(outlines, self._magnify, find_tools(results))
 
     def _mark_extremes(self, axes: Axes, values: Real, places: Real) -> list[str]:
         """Marks with the values; returns what is to be said of them."""

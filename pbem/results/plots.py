@@ -15,10 +15,21 @@ from pbem.arrays import Real
 from pbem.results.body_plot import draw_body
 from pbem.results.curve_plot import LINE_STYLES, draw_profile, finish_axes
 from pbem.results.curve_profile import Profile, check_abscissa, read_profile
+from pbem.results.drawn_overlap import describe_overlap
 from pbem.results.label_room import part_labels
 from pbem.results.lazy import Contact
 from pbem.results.model_plot import plot_model
-from pbem.results.page import Page, add_legend_row, choose_box, describe_box, save, widen_box, write_around
+from pbem.results.outline import trace_outlines
+from pbem.results.page import (
+    Page,
+    add_legend_row,
+    choose_box,
+    describe_box,
+    find_tools,
+    save,
+    widen_box,
+    write_around,
+)
 from pbem.results.plot_style import MODES, choose_magnification, describe_step, escape, label, style
 from pbem.results.reader import Results
 from pbem.results.trace_names import find_names
@@ -125,7 +136,7 @@ class BodyPicture:
                 handles += [Line2D([], [], color="0.35", linewidth=0.9, linestyle=line, label=text)
                             for line, text in zip(LINE_STYLES, LINES, strict=False)]
             write_around(figure, f"{describe_step(results, step)}, displacements × {self._magnify:g}",
-                         [*notes, self._say_left_out()])
+                         [*notes, self._say_overlap(step), self._say_left_out()])
         # One for all axes, between the body and the lines.
         add_legend_row(figure, grid[1, :], handles, page)
         part_labels(axes, names)
@@ -145,6 +156,11 @@ class BodyPicture:
         pair[0].set_title(escape(contact.name), loc="left")
         return [Line2D([], [], linestyle="none", label=how.name, **how.line)
                 for which, how in MODES.items() if int(which) in used and len(results.pairs.interface) <= 300]
+
+    def _say_overlap(self, step: int) -> str:
+        results = self._results
+        outlines = trace_outlines(results.nodes, results.elements, results.displacement_at(step))
+        return describe_overlap(outlines, self._magnify, find_tools(results))
 
     def _say_left_out(self) -> str:
         left_out = len(self._results.contact) - len(self._names)

@@ -19,6 +19,7 @@ from pbem.errors import ResultFileError
 from pbem.results.drawn_overlap import describe_overlap
 from pbem.results.field_formulas import FIELDS
 from pbem.results.field_values import VertexField, VertexValues
+from pbem.results.magnification import choose_magnification
 from pbem.results.outline import to_columns, trace_outlines
 from pbem.results.page import (
     Page,
@@ -32,7 +33,7 @@ from pbem.results.page import (
     write_around,
 )
 from pbem.results.picture_limits import Limits, limit_field, print_number
-from pbem.results.plot_style import choose_magnification, describe_step, label, style
+from pbem.results.plot_style import describe_step, label, style
 from pbem.results.reader import Results
 from pbem.results.region_points import View
 from pbem.results.region_triangles import Triangles, triangulate
@@ -121,10 +122,8 @@ class FieldPicture:
         )
         self._magnify = 0.0
         if options.displaced:
-            largest = max((np.nan_to_num(results.displacement_at(at)) for at in self._steps),
-                          key=lambda u: float(np.abs(u).max()))
-            size = float(np.ptp(results.nodes.position, axis=0).max())
-            self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+            moved = [results.displacement_at(at) for at in self._steps]
+            self._magnify = choose_magnification(results, moved) if options.magnify is None else options.magnify
         # The same for all steps.
         places = [to_columns(self._triangles.position) + self._magnify * each for each in self._values.displacement]
         # Of an infinite region there is no outline that could be displaced out of the box.

@@ -11,11 +11,9 @@ from functools import lru_cache
 from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties, findfont, get_font
 
-from pbem.arrays import Real
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.description.generation import GeneratedGroup
 from pbem.results.reader import Results
@@ -118,13 +116,3 @@ def describe_step(results: Results, step: int) -> str:
     stage = escape(steps.stage_names[int(steps.stage[step])])
     title = "\n".join(textwrap.wrap(escape(results.title), TITLE_WIDTH))
     return f"{title}\nstep {steps.number[step]} ({stage}, factor {steps.factor[step]:.4g})".strip()
-
-
-def choose_magnification(displacement: Real, size: float) -> float:
-    """1, 2 or 5 times a power of ten that brings the largest displacement to about 7 % of the size; at least 1."""
-    largest = float(np.abs(displacement).max(initial=0.0))
-    if largest == 0.0:
-        return 1.0
-    wanted = 0.07 * size / largest
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return max(1.0, float(power * max(digit for digit in (1, 2, 5) if digit * power <= wanted * (1 + 1e-12))))

@@ -18,6 +18,7 @@ from pbem.results.curve_profile import Profile, check_abscissa, read_profile
 from pbem.results.drawn_overlap import describe_overlap
 from pbem.results.label_room import part_labels
 from pbem.results.lazy import Contact
+from pbem.results.magnification import choose_magnification
 from pbem.results.model_plot import plot_model
 from pbem.results.outline import trace_outlines
 from pbem.results.page import (
@@ -30,7 +31,7 @@ from pbem.results.page import (
     widen_box,
     write_around,
 )
-from pbem.results.plot_style import MODES, choose_magnification, describe_step, escape, label, style
+from pbem.results.plot_style import MODES, describe_step, escape, label, style
 from pbem.results.reader import Results
 from pbem.results.trace_names import find_names
 
@@ -98,10 +99,10 @@ class BodyPicture:
             self._labels = {name: [name] for name in self._names}
         else:
             self._labels = find_names(options.labels, names)
-        size = float(np.ptp(results.nodes.position, axis=0).max())
-        moved = [np.nan_to_num(results.displacement_at(at)) for at in self._steps]
+        given = [results.displacement_at(at) for at in self._steps]
+        moved = [np.nan_to_num(each) for each in given]
         largest = max(moved, key=lambda each: float(np.abs(each).max(initial=0.0)), default=np.zeros((1, 2)))
-        self._magnify = choose_magnification(largest, size) if options.magnify is None else options.magnify
+        self._magnify = choose_magnification(results, given) if options.magnify is None else options.magnify
         places = [results.nodes.position, *(results.nodes.position + self._magnify * each for each in moved)]
         self._frame = widen_box(self._box, places, 0.04)
         # What is this small beside all that moves, or is borne, is rounding.

@@ -17,7 +17,7 @@ from pbem.model.model import Condition, Model
 from pbem.results.model_plot import draw_model
 from pbem.results.outline import POINTS_PER_ELEMENT, trace_outlines
 from pbem.results.plot_style import FORCE, MODES, MOTION, label
-from pbem.results.plots import choose_magnification, draw_results, plot_model, plot_results
+from pbem.results.plots import draw_results, plot_model, plot_results
 from pbem.results.reader import Results, open_results
 from pbem.results.writer import ResultWriter
 from tests.unit.results_sample import make_mesh, make_model, make_steps
@@ -117,14 +117,6 @@ def test_pictures_are_written(tmp_path: Path, ending: str) -> None:
     plot_results(write_results(tmp_path / "a.h5"), tmp_path / f"a.{ending}")
     plot_model(MODEL, MESH, tmp_path / f"b.{ending}")
     assert min((tmp_path / f"{name}.{ending}").stat().st_size for name in "ab") > 5000
-
-
-def test_magnification_is_a_round_number_that_shows_the_displacement() -> None:
-    assert choose_magnification(np.array([[1e-3, -2e-4]]), 2.0) == 100
-    assert choose_magnification(np.array([[0.0, -0.7e-3]]), 1.0) == 100
-    assert choose_magnification(np.array([[0.0, -0.701e-3]]), 1.0) == 50
-    assert choose_magnification(np.array([[3.0, 0.0]]), 1.0) == 1
-    assert choose_magnification(np.zeros((3, 2)), 1.0) == 1
 
 
 def test_outlines_close_and_follow_a_linear_displacement(tmp_path: Path) -> None:

@@ -114,7 +114,9 @@ class LengthField:
     ) -> None:
         """loads: curves around a region, and the places of point loads inside of it."""
         legs = surroundings.legs
-        self.surroundings, self.wedges, self.reach = surroundings, wedges, Reach(REACH[order], BENDING[order])
+        self.surroundings, self.wedges, self.reach = (
+            surroundings, wedges, Reach(REACH[order], BENDING[order], order < 2)
+        )
         self._least_reach = self.reach.bending if surroundings.is_mixed else self.reach.usual
         self.length = np.array([leg.length for leg in legs])
         self.kept = np.array([name in kept for name in surroundings.curve], dtype=bool)

@@ -46,8 +46,12 @@ SHARP, LEAST_AT_TURN = math.radians(60.0) * (1 - TIE), 4
 # The same of constant and linear elements where one leg is shorter than this part of the other: K of wings of a
 # hundredth was off by 0.9 to 3.3 % at 15 to 50 degrees with powers.
 SHARP_BESIDE_WING, WING = math.radians(10.0) * (1 - TIE), 0.2 * (1 - TIE)
-# The angle between its legs (radians) below which lengths fall more slowly.
-SHARPER = math.radians(80.0)
+# The angle between its legs (radians) below which lengths fall more slowly, and to a shorter last bit: K of a wing that
+# the other leg shields was off by 0.3 % at order 3 and 34 to 45 degrees with that of other corners (0.1 % with this).
+SHARPER, SHARPER_BIT = math.radians(80.0), 0.2
+# Constant and linear elements fall with this power of the angle there, in place of 1: K was off by 0.5 to 1 % on any
+# number of elements elsewhere. LEAST_GROWTH bounds their number.
+LINEAR_FOLD, LEAST_GROWTH = 4, 0.06
 # Degrees: below, the last bit follows its neighbour.
 TIED = 25.0 * (1 - TIE)
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
@@ -57,10 +61,11 @@ MOST_GROWTH = 1.0
 @dataclass(frozen=True)
 class Reach:
     """Longest element, as a multiple of the distance to the next face: usual; bending: between a crack and a face that
-    bounds the region, where what lies between bends."""
+    bounds the region, where what lies between bends; linear: elements are of order 1 or 0."""
 
     usual: float
     bending: float
+    linear: bool = False
 
 
 @dataclass(frozen=True)
@@ -131,7 +136,8 @@ def measure_growth(angle: float, reach: float) -> float:
 
 def _measure_growth_of_leg(corner: Corner, end: tuple[int, bool], reach: Reach) -> float:
     if corner.turning:
-        return 0.5 * reach.usual * min(1.0, corner.angle / SHARPER)
+        fold = min(1.0, corner.angle / SHARPER)
+        return 0.5 * reach.usual * (max(fold**LINEAR_FOLD, 2 * LEAST_GROWTH) if reach.linear else fold)
     if end in corner.beside:
         return MOST_GROWTH if corner.ends else reach.usual
     growth = measure_growth(corner.angle, reach.usual)
@@ -179,6 +185,8 @@ def find_wedges(
         corners.append(replace(corner, branching=branching, turning=turning))
         shortest = min(legs[number].length for number, _ in ends)
         bit = measure_last_bit(corner.angle, branching or turning) * shortest
+        if turning and corner.angle < SHARPER:
+            bit *= SHARPER_BIT
         bits.append(bit)
         if not narrow:
             continue

@@ -18,6 +18,7 @@ from pbem.exact import (
     inclined_crack_intensity,
 )
 from pbem.mesh.generate import generate_mesh
+from pbem.model import sliver
 from pbem.model.in_situ import LinearStress
 from pbem.model.material import Material
 from pbem.model.model import Law, Model, Stage
@@ -152,6 +153,29 @@ def test_a_crack_of_linear_elements_with_a_short_wing(degrees: float, wing: floa
     kink = Kink(degrees, wing, (-along, 0j, end), pieces, (0.4, 0.9, -0.3), 1)
     found = measure_kink(kink, given=False)
     assert found.K < 3e-3 and found.J < 8e-3
+
+
+# Folded back by 135 and 146 degrees, with wings that the other leg shields. Linear elements: off by 0.9 % on any number
+# of elements, before lengths towards the corner fell with the fourth power of the angle between the legs.
+@pytest.mark.parametrize("seed", [29057, 29293])
+def test_a_wing_that_is_folded_back_on_its_crack(seed: int) -> None:
+    kink = draw_kink(seed)
+    assert kink.order == 1
+    assert measure_kink(kink).K < 5e-3
+    assert measure_kink(kink, given=False).K < 5e-3
+
+
+@pytest.mark.parametrize("seed", [29057, 29293])
+def test_the_element_in_the_corner_of_a_folded_crack_is_short_enough(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """K of the wing was off by 0.3 % with an element five times as long there, whatever the order."""
+    pieces = [line(*piece[:3]) for piece in draw_kink(seed).pieces]
+    remote = draw_kink(seed).remote
+    found = solve_tips(pieces, remote, 3)
+    monkeypatch.setattr(sliver, "SHARPER_BIT", 0.01 * sliver.SHARPER_BIT)
+    right = solve_tips(pieces, remote, 3)
+    assert (np.hypot(*(found[:2] - right[:2])) < 1.5e-3 * np.hypot(*right[:2])).all()
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

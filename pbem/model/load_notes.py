@@ -30,6 +30,7 @@ def note_loads(model: Model) -> list[str]:
         *(stage.gravity if weights else ()), *(each for values in stage.rigid.values() for each in values))]
     loads += [not each.is_zero for stage in model.stages for each in stage.swelling.values()]
     loads += [value for stage in model.stages for force in stage.point_forces.values() for value in force]
+    loads += [value for stage in model.stages for values in stage.support_values.values() for value in values]
     loads += [not stress.is_zero for stress in model.initial_stress.values()]
     laws = [joint.law for joints in (model.interfaces, model.contacts) for joint in joints.values()]
     loads += [isinstance(law.gap, Varying) or law.gap < 0 for law in laws if law.kind not in ("bonded", "open")]

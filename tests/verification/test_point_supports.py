@@ -135,3 +135,53 @@ def _interpolate(results: pbem.Results, place: complex) -> complex:
         found.append(np.clip(s.real[element], -1, 1) ** np.arange(count)
                      @ np.linalg.solve(np.vander(local, increasing=True), values))
     return complex(np.mean(found))
+
+
+def make_hovering_block(unit: float, *stages: dict[str, Any]) -> dict[str, Any]:
+    """A block that hovers over a wider one by a tenth of its side and is moved by supports; lengths times `unit`."""
+    corners = [[0, 0], [3, 0], [3, 1], [0, 1], [0, 0]]
+    upper = [[1, 1.1], [2, 1.1], [2, 2], [1, 2], [1, 1.1]]
+    curves = {name: points[k : k + 2] for points, names in (
+        (corners, ("bottom", "right", "floor", "left")), (upper, ("face", "up_right", "top", "up_left")),
+    ) for k, name in enumerate(names)}  # fmt: skip
+    return {
+        "materials": {"m": {"young": YOUNG, "poisson": POISSON}},
+        "curves": {name: {"points": (unit * np.array(points)).tolist(), "elements": 4}
+                   for name, points in curves.items()},
+        "regions": {"base": {"material": "m", "boundary": ["bottom", "right", "floor", "left"]},
+                    "block": {"material": "m", "boundary": ["face", "up_right", "top", "up_left"]}},
+        "contacts": {"seat": {"between": ["floor", "face"], "friction": 0.4}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}},
+        "point_supports": {"one": {"at": [unit, 2 * unit], "ux": 0.0, "uy": 0.0},
+                           "other": {"at": [2 * unit, 2 * unit], "uy": 0.0}},
+        "stages": [{"steps": 2, "point_supports": {
+            "one": {"ux": 0.05 * unit, "uy": 0.02 * unit}, "other": {"uy": 0.02 * unit}}}, *stages],
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+@pytest.mark.parametrize("resumed", [False, True])
+def test_faces_that_are_closed_stay_where_supports_have_moved_them(unit: float, resumed: bool, tmp_path: Path) -> None:
+    """The jumps of the faces are those of the displacements, and a stage that bonds them keeps them."""
+    path, whole = tmp_path / "weld.h5", make_hovering_block(unit, {"close": ["seat"]})
+    if resumed:
+        pbem.run(make_hovering_block(unit), path)
+    results = pbem.run(whole, path, resume=resumed)
+    seat, moved = results.contact["seat"], unit * np.array([0.05, 0.02])
+    for step, part in enumerate((0.5, 1.0, 1.0)):
+        np.testing.assert_allclose(seat.opening[step], 0.1 * unit + part * moved[1], rtol=1e-9)
+        np.testing.assert_allclose(np.abs(seat.slip[step]), part * moved[0], rtol=1e-9)
+        of_block = results.nodes.region == results.nodes.region_names.index("block")
+        np.testing.assert_allclose(results.displacement[step][of_block], np.tile(part * moved, (of_block.sum(), 1)),
+                                   rtol=1e-9)
+    assert (seat.mode[-1] == 0).all()
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6])
+def test_supports_do_not_move_bodies_into_each_other(unit: float, tmp_path: Path) -> None:
+    down = {"point_supports": {"one": {"uy": -0.3 * unit}, "other": {"uy": -0.3 * unit}}}
+    with pytest.raises(pbem.ConvergenceError, match=r"overlap: in stage .* 'seat' .* deep into each other near"):
+        pbem.run(make_hovering_block(unit, down), tmp_path / "overlap.h5")
+    down = {"point_supports": {"one": {"uy": -0.0999 * unit}, "other": {"uy": -0.0999 * unit}}}
+    results = pbem.run(make_hovering_block(unit, down), tmp_path / "apart.h5")
+    np.testing.assert_allclose(results.contact["seat"].opening[-1], 1e-4 * unit, rtol=1e-6)

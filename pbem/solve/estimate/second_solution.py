@@ -97,7 +97,8 @@ class SecondSolution:
         self.memory = commit(
             self.problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
         self._watch.check()
-        found = describe_step(self.problem, solution, self.memory, step.number, step.stage, step.factor)
+        found, self.memory = describe_step(
+            self.problem, solution, self.memory, step.number, step.stage, step.factor)
         self._contact = found.contact
         return found
 

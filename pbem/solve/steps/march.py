@@ -128,7 +128,7 @@ def march(
                 unfinished = None
                 memory = commit(problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
                 number += 1
-                step = describe_step(problem, solution, memory, number, stage, reached, recover)
+                step, memory = describe_step(problem, solution, memory, number, stage, reached, recover)
                 step = replace(step, ahead=describe_ceiling(ceiling))
                 noted = note_imbalance(problem, step, noted, reporter)
                 told = note_nonlinearity(problem, step, told, reporter)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbem.arrays import Complex, Real
 from pbem.bem.rigid_motions import interpolates_rotation
-from pbem.contact.laws import Memory
+from pbem.contact.laws import Memory, commit
 from pbem.contact.loads import Load
 from pbem.contact.separating import stick_bonded
 from pbem.solve.nonlinear.balance import measure_balance
@@ -14,15 +16,19 @@ from pbem.solve.nonlinear.newton import Solution
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.step import ContactState, Step
 from pbem.solve.steps.linearity import measure_linearity
-from pbem.solve.steps.settling import settle
+from pbem.solve.steps.settling import refuse_overlap, settle
 
 
 def describe_step(
     problem: Problem, solution: Solution, memory: Memory, number: int, stage: int, factor: float,
     recover: bool = True,
-) -> Step:
-    """Displacements and tractions on all faces, crack faces recovered from their displacement equation, and contact.
+) -> tuple[Step, Memory]:
+    """Displacements and tractions on all faces, crack faces recovered from their displacement equation, and contact;
+    and the memory of the pairs where these have come to rest.
 
+    memory: of the solution, whose bodies may still have to be moved as a whole (see `settle`): faces that are closed
+    from the next step on, or meet, do so where they have been moved to. Raises ConvergenceError ("overlap") where that
+    is into each other.
     recover: without, the mean displacement of both faces of a crack is left out, so that they are half the jump apart
     from 0: enough for energies, in which it has no part, and for all that follows from jumps and tractions.
     """
@@ -37,14 +43,18 @@ def describe_step(
     opposite = np.zeros(mesh.nodes, dtype=complex)
     opposite[cracks] = mean - jump / 2
     order = problem.second_faces
-    pairs = solution.pairs if problem.arrangement is None else problem.arrangement.blank(solution.pairs)
+    pairs = solution.pairs
     everywhere = np.concatenate([displacement, opposite[order]])
     free = problem.find_free_motions(stick_bonded(problem.laws, memory, solution.modes))
-    slip, reactions = pairs.g_s, {}
+    reactions: dict[str, Real] = {}
     settled = settle(problem, load, everywhere, traction, stage, factor, free.motions if free.unheld is None else ())
     if settled is not None:
-        everywhere, slip, reactions = everywhere + settled.displacement, slip + settled.slip, settled.reactions
-    return Step(
+        everywhere, reactions = everywhere + settled.displacement, settled.reactions
+        pairs = replace(pairs, g_n=pairs.g_n + settled.opening, g_s=pairs.g_s + settled.slip)
+        refuse_overlap(problem, solution.modes, pairs.g_n, settled.opening, stage)
+        memory = commit(problem.laws, solution.memory, solution.modes, pairs, solution.pressure)
+    shown = pairs if problem.arrangement is None else problem.arrangement.blank(pairs)
+    step = Step(
         number=number,
         stage=stage,
         factor=factor,
@@ -54,17 +64,18 @@ def describe_step(
         traction=np.concatenate([traction, -traction[order]]),
         contact=ContactState(
             mode=solution.modes.mode,
-            opening=pairs.g_n,
-            slip=slip,
-            traction_n=pairs.p_n,
-            traction_s=pairs.p_s,
+            opening=shown.g_n,
+            slip=shown.g_s,
+            traction_n=shown.p_n,
+            traction_s=shown.p_s,
             internal=memory.internal,
         ),
         balance=measure_balance(problem, solution.v, load, free),
-        linearity=measure_linearity(mesh, everywhere, slip),
+        linearity=measure_linearity(mesh, everywhere, shown.g_s),
         duration=solution.memory.duration,
         support_reactions=reactions,
     )
+    return step, memory
 
 
 def _recover_means(problem: Problem, v: Real, load: Load) -> Complex:

@@ -12,7 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Real
+from pbem.contact.laws import OPEN, ModeState
 from pbem.contact.loads import Load
+from pbem.errors import ConvergenceError
+from pbem.geometry.junction import format_point
 from pbem.mesh.interpolation import interpolate, locate_nodes
 from pbem.mesh.mesh import list_faces
 from pbem.model.rigid_body_modes import RigidBodyMode
@@ -25,15 +28,20 @@ from pbem.model.support_motions import (
     see_motions,
     weigh_turns,
 )
+from pbem.parallel import do_on_first
 from pbem.solve.problem.problem import Problem
+
+# Faces that lie in each other by less than this part of the way that bodies were moved touch.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Settled:
-    """displacement (f,): what is added on all faces; slip (m,): of all pairs; reactions: of the supports, by name (2,).
-    """
+    """displacement (f,): what is added on all faces; opening, slip (m,): of all pairs; reactions: of the supports, by
+    name (2,)."""
 
     displacement: Complex
+    opening: Real
     slip: Real
     reactions: dict[str, Real]
 
@@ -48,7 +56,8 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     mesh, model = problem.mesh, problem.model
     none = {name: np.zeros(2) for name in model.point_supports}
     if not motions or not (none or load.of_points.any()):
-        return Settled(np.zeros_like(displacement), np.zeros(mesh.pairs.count), none) if none else None
+        still = np.zeros(mesh.pairs.count)
+        return Settled(np.zeros_like(displacement), still, still, none) if none else None
     placed = place_supports(model.point_supports.values(), motions, model.stages[stage].construction.removed)
     seen = see_motions(placed, motions)
     wanted = _find_wanted(problem, placed, displacement, stage, factor)
@@ -74,7 +83,32 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
                 if held:
                     reactions[each.support.name][axis] = carried[at]
                     at += 1
-    return Settled(moved, _slide(problem, motions, parts), reactions)
+    return Settled(moved, *_move_pairs(problem, motions, parts), reactions)
+
+
+def refuse_overlap(problem: Problem, modes: ModeState, opening: Real, moved: Real, stage: int) -> None:
+    """Raise ConvergenceError ("overlap") where bodies have been moved into each other as a whole.
+
+    opening (m,): of the pairs; moved (m,): what of it the motion has added. Told by the first rank for all. Contact has
+    been found without the motion: where it is to hold the body, other motions are free (theory, 102).
+    """
+    def refuse() -> None:
+        apart = (modes.mode == OPEN) & ~problem.laws.parted & (moved < 0)
+        if problem.arrangement is not None:
+            apart &= ~problem.arrangement.bared
+        depth = np.where(apart, np.minimum(-opening, -moved), 0.0)
+        worst = int(np.argmax(depth)) if len(depth) else 0
+        if not len(depth) or depth[worst] <= ROUNDING * np.abs(moved).max():
+            return
+        pairs, mesh = problem.mesh.pairs, problem.mesh
+        raise ConvergenceError(
+            "overlap",
+            f"in stage {problem.model.stages[stage].name!r} the point supports move the faces of "
+            f"'{mesh.interface_names[pairs.interface[worst]]}' {depth[worst]:.3g} deep into each other near "
+            f"{format_point(complex(pairs.position[worst]) + problem.model.origin)}: supports carry no load, so that "
+            "they cannot press bodies together; prescribe displacements along a curve")
+
+    do_on_first(problem.comm, ConvergenceError, refuse)
 
 
 def _find_wanted(
@@ -149,9 +183,9 @@ def _split(values: Complex) -> Real:
     return np.stack([values.real, values.imag], axis=1).ravel()
 
 
-def _slide(problem: Problem, motions: tuple[RigidBodyMode, ...], parts: Real) -> Real:
-    """What the motions add to the slip of the pairs (m,): of the second region against the first."""
-    pairs, slip = problem.mesh.pairs, np.zeros(problem.mesh.pairs.count)
+def _move_pairs(problem: Problem, motions: tuple[RigidBodyMode, ...], parts: Real) -> tuple[Real, Real]:
+    """What the motions add to opening and slip of the pairs (m,): of the second region against the first."""
+    pairs, jump = problem.mesh.pairs, np.zeros(problem.mesh.pairs.count, dtype=complex)
     model = problem.model
     bounded = {side.curve: region.name for region in model.regions for loop in region.loops for side in loop.sides}
     for number, name in enumerate(problem.mesh.interface_names):
@@ -165,5 +199,5 @@ def _slide(problem: Problem, motions: tuple[RigidBodyMode, ...], parts: Real) ->
         for part, motion in zip(parts, motions, strict=True):
             (a, v), (b, w) = (motion.velocities.get(region, (0j, 0.0)) for region in (first, second))
             away = b - a + 1j * (w - v) * pairs.position[own]
-            slip[own] += part * (np.conj(1j * pairs.normal[own]) * away).real
-    return slip
+            jump[own] += part * np.conj(pairs.normal[own]) * away
+    return jump.real, jump.imag

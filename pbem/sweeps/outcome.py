@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -14,12 +14,13 @@ from pbem.arrays import Integer, Real
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
+from pbem.results.absent import Absence
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.interface_tips import list_tip_curves
 from pbem.results.pair_weights import weigh_mesh_pairs
 from pbem.results.rigid import measure_rigid
 from pbem.results.tips import collect_tip_rules
-from pbem.solve.problem.step import SilentReporter, Step
+from pbem.solve.problem.step import ContactState, SilentReporter, Step
 
 FACTORS = ("KI", "KII", "J", "T")
 Kind = Literal["reactions", "contact", "tips", "rigid"]
@@ -88,6 +89,7 @@ class Outcome(SilentReporter):
     model: Model
     mesh: Mesh
     energy: Energy
+    _absence: Absence
     _balance: EnergyBalance
 
     def __init__(self) -> None:
@@ -105,6 +107,7 @@ class Outcome(SilentReporter):
         self.__dict__ = {
             "step": None, "iterations": self.iterations, "started": self.started, "notes": self.notes, "model": model,
             "mesh": mesh, "_balance": EnergyBalance(model, mesh, None, None), "energy": Energy(0.0, 0.0, 0.0),
+            "_absence": Absence(model, mesh, np.zeros(0, dtype=np.int64)),
         }
 
     def accept(self, step: Step) -> None:
@@ -112,7 +115,8 @@ class Outcome(SilentReporter):
         self.energy = self._balance.add(step)
         self.iterations += len(step.iterations)
         self.step = step
-        self.__dict__.pop("_tips", None)
+        for name in ("_tips", "contact"):
+            self.__dict__.pop(name, None)
 
     def start_step(self, stage: int, reached: float, target: float) -> None:
         """A step begins."""
@@ -128,6 +132,11 @@ class Outcome(SilentReporter):
         """The last step; there is one."""
         assert self.step is not None
         return self.step
+
+    @cached_property
+    def contact(self) -> ContactState:
+        """The pairs after the last step, without jumps where a stage has removed a side (NaN), as results have them."""
+        return self._absence.blank(replace(self.last, interior=None)).contact
 
     @cached_property
     def names(self) -> Names:
@@ -180,5 +189,5 @@ class Outcome(SilentReporter):
         rules = collect_tip_rules(self.model, self.mesh)
         if not rules.cracks:
             return {}
-        values = rules.evaluate_all(self.last)
+        values = self._absence.blank_tips(self.last.stage, rules.cracks, rules.evaluate_all(self.last))
         return {name: {kind: values[kind][k] for kind in FACTORS} for k, name in enumerate(rules.cracks)}

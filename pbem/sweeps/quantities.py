@@ -216,14 +216,19 @@ def _find_step(outcome: Outcome, name: str) -> float:
 
 
 def _summarise(outcome: Outcome, members: tuple[str, ...], field: str, what: str) -> float:
-    """A number for the pairs of some interfaces; mean, share and integral are over their length."""
+    """A number for the pairs of some interfaces; mean, share and integral are over their length. Jumps are those of
+    pairs that have both sides; NaN without any."""
     pairs = np.concatenate([np.zeros(0, dtype=np.int64), *(outcome.find_pairs(name) for name in members)])
     if not len(pairs):
         return math.nan
-    contact, weight = outcome.last.contact, outcome.mesh.pairs.weight[pairs]
+    contact, weight = outcome.contact, outcome.mesh.pairs.weight[pairs]
     if field == "status":
         return float(weight[contact.mode[pairs] == MODES[what]].sum() / weight.sum())
     values = getattr(contact, field)[pairs]
+    there = ~np.isnan(values)
+    pairs, weight, values = pairs[there], weight[there], values[there]
+    if not len(pairs):
+        return math.nan
     if what in ("mean", "integral"):
         # Beside tips jumps have the root's shape, which the plain weights integrate wrongly.
         whole = float(outcome.weights[field in JUMPS][pairs] @ values)

@@ -125,22 +125,25 @@ def sweep(
     check_arguments(operator, petsc, {"force": force, "neighbours": neighbours}, listener)
     folder = None if keep is None else Path(keep)
     setting = Setting(case, {} if set is None else set, operator, petsc or {}, folder, neighbours, label)
+    file: list[TableFile] = []
     try:
         with abort_if_unexpected(comm, PbemError), petsc_log(setting.name, setting.petsc):
             with clock.piece("start"):
                 check_start(comm)
-            file: list[TableFile] = []
             with clock.piece("reading"):
                 several = do_on_first(comm, PbemError, lambda: _check(values, quantities, setting.fixed))
                 plan = do_on_first(comm, PbemError, lambda: _make_plan(
                     setting, several, quantities, out, force, comm, file, option))
             columns = read_quantities(plan.quantities, plan.names)
             rows = _compute_all(setting, plan, columns, comm, _Keeper(several, file, listener, len(plan.todo)))
-            return _make_table(several, [each.title for each in columns], rows)
+            return _make_table(several, [column.title for column in columns], rows)
     except StopError as error:
         if error.reason == "SIGINT":  # as without MPI, so that it ends whatever called this
             raise KeyboardInterrupt from error
         raise
+    finally:
+        for each in file:
+            each.close()
 
 
 def _check(values: Mapping[str, Any], quantities: Any, fixed: Any) -> dict[str, list[Any]]:

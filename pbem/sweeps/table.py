@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.errors import ResultFileError, StorageError, printable
+from pbem.results.journal import lock
 from pbem.results.tables import frame_columns
 from pbem.sweeps.values import write_cell
 
@@ -105,14 +106,17 @@ def _show(value: Any) -> str:
 
 
 class TableFile:
-    """A table of comma-separated values to which rows are added one by one; for one rank only.
+    """A table of comma-separated values to which rows are added one by one; for one rank of one sweep only, which has
+    the lock of the file until `close`: what another sweep adds meanwhile would be lost when the rows are sorted.
 
     header: names of its columns. done: the rows that it has, by the cells of their values.
     """
 
     def __init__(self, path: str | os.PathLike[str], values: Sequence[str], quantities: Sequence[str], mark: str,
                  force: bool) -> None:
-        """Raises ResultFileError if the file cannot be written, is no table of a sweep, or is that of another one."""
+        """Raises ResultFileError if the file cannot be written, is no table of a sweep, or is that of another one, or
+        if another sweep is writing it."""
+        self._lock = -1
         self.path, self._values, self._quantities, self._mark = Path(path), len(values), len(quantities), mark
         self.header = [*values, *quantities, *LAST_COLUMNS]
         self.done: dict[tuple[str, ...], Row] = {}
@@ -120,15 +124,37 @@ class TableFile:
         try:
             if self.path.is_dir():
                 raise ResultFileError(str(path), "is a folder; name a file in it")
-            there = self.path.exists() and self.path.stat().st_size > 0
+            if self.path.exists() and not self.path.is_file():
+                raise ResultFileError(str(path), "is not a regular file")
+            self._take_lock()
+            there = self.path.stat().st_size > 0
             if there:
                 self._take(self.path.read_bytes(), force)
             if not there or force:
                 self._replace([])
-            else:
-                self.path.open("ab").close()
         except OSError as error:
+            self.close()
             raise ResultFileError(str(path), f"cannot be written ({error.strerror or error})") from error
+        except BaseException:
+            self.close()
+            raise
+
+    def _take_lock(self) -> None:
+        """Make the file if there is none, and lock it; once more if another sweep has replaced it meanwhile."""
+        while True:
+            self._lock = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            if not lock(self._lock):
+                raise ResultFileError(
+                    str(self.path), "is being written by another sweep; wait for its end, or name another file")
+            if self.path.exists() and os.path.samestat(os.fstat(self._lock), self.path.stat()):
+                return
+            self.close()
+
+    def close(self) -> None:
+        """Give the lock back."""
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
 
     def _take(self, data: bytes, force: bool) -> None:
         try:
@@ -200,7 +226,12 @@ class TableFile:
             file.write(_write_lines([self.header, *(row.write(self._mark) for row in rows)]))
             file.flush()
             os.fsync(file.fileno())
-        part.replace(target)
+            former, self._lock = self._lock, os.dup(file.fileno())
+        try:
+            lock(self._lock)
+            part.replace(target)
+        finally:
+            os.close(former)
 
 
 def _write_lines(lines: Sequence[Sequence[str]]) -> str:

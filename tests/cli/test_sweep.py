@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.bundled import find_case
 from pbem.cli import main
 from pbem.errors import CaseError, ResultFileError
 from pbem.results.reader import open_results
@@ -117,6 +119,24 @@ def test_a_table_is_gone_on_with(folder: Path, capsys: Capture) -> None:
     assert main(command) == 0 and "0 cases in" in capsys.readouterr().out
     table = pbem.sweep("blocks.toml", VALUES, ["reactions.top.x"], out="t.csv")
     assert table["iterations"][1] == int(rows[1]["iterations"])
+
+
+def test_a_table_is_written_by_one_sweep_at_a_time(folder: Path) -> None:
+    """Rows of another one would be lost when the first sorts them at its end."""
+    refused = []
+
+    def interfere(*_: object) -> None:
+        with pytest.raises(ResultFileError, match="is being written by another sweep"):
+            pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.6]}, ["energy.elastic"], out="t.csv")
+        refused.append(True)
+
+    # The first sweep makes the file, the second goes on with it and sorts its rows.
+    for frictions in ([0.3, 0.5], [0.1, 0.3, 0.5]):
+        pbem.sweep("blocks.toml", {"interfaces.joint.friction": frictions}, ["energy.elastic"], out="t.csv",
+                   listener=interfere)
+    assert len(refused) == 3
+    pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.6]}, ["energy.elastic"], out="t.csv")
+    assert sorted(row["interfaces.joint.friction"] for row in read("t.csv")) == ["0.1", "0.3", "0.5", "0.6"]
 
 
 def test_a_table_of_another_sweep_is_refused(folder: Path, capsys: Capture) -> None:
@@ -444,6 +464,38 @@ def test_a_table_prints_and_becomes_a_dataframe(folder: Path) -> None:
 def test_a_file_that_cannot_be_a_table_is_refused(folder: Path) -> None:
     with pytest.raises(ResultFileError, match="is a folder"):
         pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.1]}, out=".")
+    os.mkfifo("pipe")
+    with pytest.raises(ResultFileError, match="is not a regular file"):
+        pbem.sweep("blocks.toml", {"interfaces.joint.friction": [0.1]}, out="pipe")
+    assert not Path("pipe").is_file()
+
+
+def test_faces_of_regions_that_are_gone_have_no_jumps(folder: Path) -> None:
+    """As in results: neither do they count among all, nor do cracks in such regions have factors."""
+    case = find_case("tunnel_excavated").read_text()
+    for before, after in (('boundary = ["wall"]', 'boundary = ["wall"]\ncracks = ["slit"]'),
+                          ("[curves]", "[curves]\nslit = { points = [[-1, 0], [1, 0.5]], elements = 4 }"),
+                          ("[interfaces.joint]", "[interfaces.slit]\nfriction = 0.1\n[interfaces.joint]")):
+        case = case.replace(before, after, 1)
+    Path("tunnel.toml").write_text(case)
+    wanted = [f"contact.{name}{what}" for name in ("wall.", "slit.", "joint.", "") for what in (
+        "slip.largest", "slip.mean", "opening.max", "traction_n.mean")]
+    wanted += ["tips.slit.KII", "tips.joint.KII", "tips.KII"]
+    row = next(iter(pbem.sweep("tunnel.toml", {"interfaces.joint.friction": [0.3]}, wanted)))
+    results = pbem.run("tunnel.toml", "tunnel.h5")
+    for name in ("wall", "slit", "joint"):
+        contact = results.contact[name]
+        largest = np.abs(contact.slip[-1]).max(), contact.opening[-1].max()
+        found = [row[f"contact.{name}.{what}"] for what in ("slip.largest", "opening.max")]
+        assert found == pytest.approx(list(largest), rel=1e-9, abs=1e-12, nan_ok=True)
+    joint = results.contact["joint"]
+    assert row["contact.slip.largest"] == row["contact.joint.slip.largest"] > 0
+    assert row["contact.slip.mean"] == row["contact.joint.slip.mean"] == pytest.approx(
+        joint.integrate("slip")[-1] / math.hypot(10.2, 1.5), rel=1e-6)
+    assert math.isnan(row["contact.wall.slip.mean"]) and math.isnan(row["tips.slit.KII"])
+    assert row["tips.KII"] == row["tips.joint.KII"] == pytest.approx(
+        max(results.tips["joint"].KII[-1], key=abs), rel=1e-9)
+    assert row["contact.wall.traction_n.mean"] == pytest.approx(-7.5, rel=1e-6)
 
 
 @pytest.mark.parametrize("wrong, said", [

@@ -115,10 +115,9 @@ def _tabulate_rigid(results: Results) -> Table:
 
 def _tabulate_tips(results: Results) -> Table:
     """Ends of cracks that are tips at any step."""
-    names, k = list(results.tips), len(results.steps)
+    names = list(results.tips)
     kinds = ("KI", "KII", "J", "T")
-    values = {kind: np.stack([getattr(tips, kind) for tips in results.tips.values()], axis=1).reshape(k, -1)
-              for kind in kinds}
+    values = {kind: np.concatenate([getattr(tips, kind) for tips in results.tips.values()], axis=1) for kind in kinds}
     there = ~np.all([np.isnan(each).all(axis=0) for each in (values["KI"], values["J"])], axis=0)
     places = np.array([results.find_curve_ends(name) for name in names]).reshape(-1, 2)[there]
     crack = np.repeat(np.array(names, dtype=object), 2)[there]

@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,11 @@ from pbem.cli import main
 from pbem.results.journal import lock
 from pbem.results.pair_weights import weigh_pairs
 from pbem.results.reader import Results, open_results
-from pbem.results.tables import make_table
+from pbem.results.tables import list_tables, make_table
 from pbem.results.traces import list_traces
 from pbem.results.vtkhdf import export_vtkhdf
 from pbem.results.writer import ResultWriter
+from pbem.solve.problem.step import SilentReporter
 from tests.cli.cli_sample import BLOCKS
 from tests.unit.results_sample import make_mesh, make_model, make_steps
 
@@ -240,6 +242,26 @@ def test_tables_by_the_command(cracks: Results, tmp_path: Path, capsys: pytest.C
     assert {row["crack"] for row in tips if row["KI"]} <= set(cracks.tips)
     with pytest.raises(pbem.ResultFileError, match="no table 'othr'; did you mean 'other'"):
         make_table(cracks, "othr")
+
+
+class Stopping(SilentReporter):
+    """Stops the run in its first step, as batch systems do."""
+
+    def start_step(self, stage: int, reached: float, target: float) -> None:
+        """Send the signal."""
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+@pytest.mark.parametrize(("text", "kinds"), [(CRACKS, {"tips", "interior"}), (BLOCKS, {"reactions"})])
+def test_tables_of_a_run_that_has_stored_no_step_have_no_rows(text: str, kinds: set[str], tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(text)
+    with pytest.raises(pbem.StopError):
+        pbem.run(tmp_path / "case.toml", tmp_path / "begun.h5", reporter=Stopping())
+    begun = open_results(tmp_path / "begun.h5")
+    names = list_tables(begun)
+    assert kinds | {"steps", "contact"} <= set(names)
+    for name in (*names, "*"):
+        assert {len(column) for column in make_table(begun, name).values()} == {0}, name
 
 
 def test_a_trace_stands_for_its_pieces(

@@ -185,3 +185,13 @@ def test_supports_do_not_move_bodies_into_each_other(unit: float, tmp_path: Path
     down = {"point_supports": {"one": {"uy": -0.0999 * unit}, "other": {"uy": -0.0999 * unit}}}
     results = pbem.run(make_hovering_block(unit, down), tmp_path / "apart.h5")
     np.testing.assert_allclose(results.contact["seat"].opening[-1], 1e-4 * unit, rtol=1e-6)
+
+
+def test_what_fluid_in_a_gap_does_as_supports_move_a_block(tmp_path: Path) -> None:
+    """Forces in balance do no work on the way, whatever that is: external work stays what is stored."""
+    case = make_hovering_block(1.0)
+    case["contacts"]["seat"]["pressure"] = case["boundary"].setdefault("top", {})["pressure"] = 1.0
+    case["stages"] = [{"steps": 1}, {"steps": 2, "point_supports": case["stages"][0]["point_supports"]}]
+    energy = pbem.run(case, tmp_path / "fluid.h5").energy
+    np.testing.assert_allclose(energy.external, energy.elastic, rtol=1e-3)
+    np.testing.assert_allclose(energy.elastic, energy.elastic[0], rtol=1e-9)

@@ -51,14 +51,13 @@ class Settled:
 
     modes: None if none were found. exhaustive: whether then every choice was tried and there are none at all (while the
     other pairs keep their modes). tried: number of complementarity problems that were solved. wrong (s,): pairs whose
-    own compliance has the wrong sign, on meshes that cannot carry contact. effort: what that took (see OperationCount).
+    own compliance has the wrong sign, on meshes that cannot carry contact.
     """
 
     modes: ModeState | None
     exhaustive: bool
     tried: int
     wrong: Bool
-    effort: float = 0.0
 
 
 def settle_subset(
@@ -70,15 +69,6 @@ def settle_subset(
     holds: whether all bodies are held in modes of these pairs; modes that free one are none. Nothing more is looked for
     once the subset's effort is spent.
     """
-    before = subset.effort.taken
-    found = _settle(subset, response, judge, holds)
-    return replace(found, effort=subset.effort.taken - before)
-
-
-def _settle(
-    subset: Subset, response: Response, judge: Callable[[ModeState, PairState], Proposal],
-    holds: Callable[[ModeState], bool],
-) -> Settled:
     problem = pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
     compliance, sprung = find_compliance(problem)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.closure import choose_traction
-from pbem.contact.complementarity import take_subset
+from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import (
     SLIP,
@@ -29,6 +29,7 @@ from pbem.contact.modes import (
     limit_changes,
     linearise,
 )
+from pbem.contact.pivoting import OperationCount
 from pbem.contact.seat import find_seat
 from pbem.contact.separating import choose_bond_slip, choose_jump
 from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
@@ -337,7 +338,7 @@ def _pivot(
     if not len(group):
         return None
     response = find_response(problem, tangent, constraints, load, law, solved, group)
-    subset = search.limit(take_subset(problem.laws, memory, load.pressure, modes, group))
+    whole = take_subset(problem.laws, memory, load.pressure, modes, group)
 
     # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
     alone = search.excluded
@@ -349,14 +350,15 @@ def _pivot(
     def complete(own: ModeState) -> ModeState:
         return follow_leaders(problem.laws, start.put(group, own))
 
-    def settle() -> Settled:
+    def settle(effort: OperationCount) -> Settled:
+        subset = replace(whole, effort=effort)
         if tangent.settling.nearby and len(group) > MOST_ASKED:
             return settle_parts(subset, response, search.proposal.modes, group, judge)
-        found, refused = _settle(True)
+        found, refused = _settle(subset, True)
         # Modes that other anchors hold are still nearer, where there are none with those that act.
-        return _settle(False)[0] if found.modes is None and refused else found
+        return _settle(subset, False)[0] if found.modes is None and refused else found
 
-    def _settle(anchored: bool) -> tuple[Settled, bool]:
+    def _settle(subset: Subset, anchored: bool) -> tuple[Settled, bool]:
         """What is found, and whether modes were refused only as other anchors than those that act would hold them."""
         refused = False
 
@@ -369,9 +371,9 @@ def _pivot(
 
         found = settle_subset(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure), holds)
-        return replace(found, effort=subset.effort.taken), refused
+        return found, refused
 
-    found: Settled = problem.decide(settle)
+    found = search.pivot(problem, settle)
     ends = search.conclude(found)
     if found.modes is None and search.widen(ends):
         return _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)

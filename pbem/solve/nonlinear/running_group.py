@@ -7,6 +7,8 @@ modes; pairs that change next join them. Nothing is tried where every pair costs
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
@@ -15,6 +17,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import SLIP, Memory, ModeState, find_pivoting, follow_leaders
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
+from pbem.contact.pivoting import OperationCount
 from pbem.contact.running import Rest, find_running, run_on
 from pbem.solve.nonlinear.hold import Hold
 from pbem.solve.nonlinear.judging import make_judge
@@ -106,7 +109,7 @@ def find_rest(
     if not len(group) or search.is_spent():
         return None
     response = find_response(problem, tangent, constraints, load, law, solved, group)
-    subset = search.limit(take_subset(problem.laws, memory, load.pressure, modes, group))
+    whole = take_subset(problem.laws, memory, load.pressure, modes, group)
     judge = make_judge(problem, solved, search.globalisation)
 
     def complete(own: ModeState) -> ModeState:
@@ -117,15 +120,14 @@ def find_rest(
         everywhere[group] = values
         return everywhere
 
-    def run() -> tuple[Rest | None, float]:
+    def run(effort: OperationCount) -> Rest | None:
+        subset = replace(whole, effort=effort)
         found = run_on(
             subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
             lambda own: not hold.leaves_free(complete(own)),
         )
-        whole = found and Rest(complete(found.modes), spread(found.normal_traction), spread(found.slip))
-        return whole, subset.effort.taken
+        return found and Rest(complete(found.modes), spread(found.normal_traction), spread(found.slip))
 
-    found, effort = problem.decide(run)
-    search.effort += effort
+    found = search.pivot(problem, run)
     running.conclude(group, found is not None)
     return found

@@ -19,12 +19,13 @@ tangent comes back at once, as the fixed point itself closes in slowly.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from pbem.arrays import Bool, Integer
-from pbem.contact.complementarity import Subset
 from pbem.contact.laws import find_linear, find_pivoting
 from pbem.contact.modes import Frozen, Proposal
 from pbem.contact.pivoting import OperationCount
@@ -33,6 +34,8 @@ from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.preconditioner.subdomains import is_one_group
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import TangentOperator
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -224,9 +227,16 @@ class Search:
         """Whether pivoting has taken all that it may: Newton's steps go on alone, as many as are left."""
         return self.effort >= self.most_effort
 
-    def limit(self, subset: Subset) -> Subset:
-        """The subset, whose problems may take what is left."""
-        return replace(subset, effort=OperationCount(self.most_effort - self.effort))
+    def pivot(self, problem: Problem, find: Callable[[OperationCount], T]) -> T:
+        """What the first rank finds by pivoting, for all (see Problem.decide); problems may take what is left, and what
+        they took is counted here."""
+        def count() -> tuple[T, float]:
+            effort = OperationCount(self.most_effort - self.effort)
+            return find(effort), effort.taken
+
+        found, taken = problem.decide(count)
+        self.effort += taken
+        return found
 
     def choose_group(self) -> Integer:
         """The pairs (s,), rising, that are to be solved by pivoting next; none while Newton's steps do well."""
@@ -270,7 +280,6 @@ class Search:
         That is certain where all choices were tried for the same pairs twice, with what all others make of it between;
         of pairs that lose their cohesion where they part it is taken from FUTILE failures in turn.
         """
-        self.effort += found.effort
         if found.modes is not None:
             self.widening = False
             self.futile = self.pause = 0

@@ -54,7 +54,7 @@ def settle_parts(
 
     Sets for which none are found take the modes that are proposed (m,). Nothing is said of whether there are any.
     """
-    count, before = subset.laws.count, subset.effort.taken
+    count = subset.laws.count
     links = np.abs(response.change).max(axis=1).reshape(count, count, 2).max(axis=2) > 0
     number, label = csgraph.connected_components(sparse.csr_matrix(links), directed=False)
     mode, sign = proposed.mode[group].copy(), proposed.sign[group].copy()
@@ -72,7 +72,7 @@ def settle_parts(
         wrong[own] = found.wrong
         if found.modes is not None:
             mode[own], sign[own], found_any = found.modes.mode, found.modes.sign, True
-    return Settled(ModeState(mode, sign) if found_any else None, False, 1, wrong, subset.effort.taken - before)
+    return Settled(ModeState(mode, sign) if found_any else None, False, 1, wrong)
 
 
 def respond_nearby(

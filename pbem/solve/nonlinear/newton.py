@@ -10,39 +10,25 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.closure import choose_traction
-from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import ConstraintMap
-from pbem.contact.laws import (
-    SLIP,
-    Memory,
-    ModeState,
-    PairState,
-    find_linear,
-    follow_leaders,
-    plastic_slip,
-)
+from pbem.contact.laws import SLIP, Memory, ModeState, PairState, find_linear, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
-from pbem.contact.modes import (
-    Linearisation,
-    Proposal,
-    choose_slip,
-    limit_changes,
-    linearise,
-)
-from pbem.contact.pivoting import OperationCount
+from pbem.contact.modes import Frozen, Linearisation, choose_slip, limit_changes, linearise
+from pbem.contact.running import Rest
 from pbem.contact.seat import find_seat
 from pbem.contact.separating import choose_bond_slip, choose_jump
-from pbem.contact.subset import MOST_PIVOTED, Settled, settle_subset
+from pbem.contact.subset import MOST_PIVOTED
 from pbem.errors import ConvergenceError, StopError
 from pbem.parallel import broadcast
-from pbem.solve.nonlinear.cascade import run_cascade
+from pbem.solve.nonlinear.cascade import Cascade, run_cascade
 from pbem.solve.nonlinear.checkpoint import Checkpoint, Course, Plain, begin_course
 from pbem.solve.nonlinear.damped import can_be_damped, rest_late
 from pbem.solve.nonlinear.fixed_point import FixedPoint
 from pbem.solve.nonlinear.forcing import Forcing
 from pbem.solve.nonlinear.hold import Hold
-from pbem.solve.nonlinear.judging import find_floor, judge_solution, make_judge
+from pbem.solve.nonlinear.judging import Outcome, find_floor, judge_solution
 from pbem.solve.nonlinear.open_blocks import OpenBlocks
+from pbem.solve.nonlinear.pivoted_group import end_search, pivot_group
 from pbem.solve.nonlinear.recorded import Record
 from pbem.solve.nonlinear.running_group import RunningGroup, find_rest
 from pbem.solve.nonlinear.search import (
@@ -54,12 +40,9 @@ from pbem.solve.nonlinear.search import (
     list_searches,
 )
 from pbem.solve.nonlinear.smooth_search import CLOSELIEST, SmoothSearch
-from pbem.solve.nonlinear.unsettled import describe_unsettled
 from pbem.solve.problem.problem import Problem
-from pbem.solve.problem.response import find_response
 from pbem.solve.problem.step import Iteration, Supervisor
 from pbem.solve.problem.tangent import Solved, TangentOperator
-from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
 
 
 @dataclass(frozen=True)
@@ -146,243 +129,244 @@ def _search_modes(
     checkpoint = Checkpoint(tangent, load, iterations, parts)
     course = checkpoint.resume(resumed) if resumed else None
     try:
-        return _run_search(problem, tangent, memory, load, reporter, refuse, hurried, iterations, checkpoint, course,
-                           **parts)  # type: ignore[arg-type]
+        return _Run(problem, tangent, memory, load, reporter, refuse, hurried, iterations, checkpoint, course,
+                    **parts).find()  # type: ignore[arg-type]
     except StopError as stop:
         stop.unfinished = checkpoint.describe()
         raise
 
 
-def _run_search(
-    problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
-    refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
-    checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
-    fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup, blocks: OpenBlocks,
-) -> Solution:
-    """See _search_modes; course: with which it begins, None at its first iteration."""
-    laws = problem.laws
-    course = course or begin_course(hold, len(iterations) // PATIENCE)
-    modes, normal_traction, slip, jump = course.modes, course.normal_traction, course.slip, course.jump
-    memory, kept, asked = memory.lose(course.broken), course.kept, course.asked
-    record = Record(problem, reporter, iterations)
-    most = problem.model.solver.newton_max_iterations
+@dataclass(frozen=True)
+class _Iterated:
+    """An iteration: the laws and constraints that it solved with, the solution, and what that says of its modes."""
 
-    def pause() -> None:
-        checkpoint.follow()
-        reporter.pause()
+    law: Linearisation
+    constraints: ConstraintMap
+    solved: Solved
+    outcome: Outcome
 
-    while True:
-        checkpoint.take(Course(memory.broken, modes, normal_traction, slip, jump, kept, asked))
-        reporter.pause()
-        if smoothing.begun:
-            try:
-                modes, pairs = smoothing.find(tangent, hold, forcing, modes, record, most - search.taken - 1, pause)
-            except ConvergenceError:  # the true laws may have what smoothed ones have not
+
+class _Run:
+    """One search, iteration by iteration: its parts, and what the next iteration begins with (see Course)."""
+
+    def __init__(
+        self, problem: Problem, tangent: TangentOperator, memory: Memory, load: Load, reporter: Supervisor,
+        refuse: Callable[[Memory], ConvergenceError | None], hurried: bool, iterations: list[Iteration],
+        checkpoint: Checkpoint, course: Course | None, *, hold: Hold, search: Search, forcing: Forcing,
+        fixed_point: FixedPoint, smoothing: SmoothSearch, running: RunningGroup, blocks: OpenBlocks,
+    ) -> None:
+        """See _search_modes; course: with which it begins, None at its first iteration."""
+        self.problem, self.laws, self.tangent, self.load, self.reporter = problem, problem.laws, tangent, load, reporter
+        self.refuse, self.hurried, self.iterations, self.checkpoint = refuse, hurried, iterations, checkpoint
+        self.hold, self.search, self.forcing, self.fixed_point = hold, search, forcing, fixed_point
+        self.smoothing, self.running, self.blocks = smoothing, running, blocks
+        course = course or begin_course(hold, len(iterations) // PATIENCE)
+        self.modes, self.normal_traction, self.slip, self.jump = (
+            course.modes, course.normal_traction, course.slip, course.jump)
+        self.memory, self.kept, self.asked = memory.lose(course.broken), course.kept, course.asked
+        self.record = Record(problem, reporter, iterations)
+        self.most = problem.model.solver.newton_max_iterations
+        self.frozen: Frozen = "nothing"  # what the tangent of the last iteration left out
+
+    def find(self) -> Solution:
+        """The solution of the step; see solve_step."""
+        while True:
+            self.checkpoint.take(Course(self.memory.broken, self.modes, self.normal_traction, self.slip, self.jump,
+                                        self.kept, self.asked))
+            self.reporter.pause()
+            if self.smoothing.begun:
+                self._follow_smoothed()
                 continue
-            finally:
-                search.spent += smoothing.taken
-                smoothing.begun = False
-            hold.loose = True
-            blocks.begin(pairs)
-            normal_traction, slip = pairs.p_n, plastic_slip(laws, pairs)
-            modes = problem.decide(lambda new=modes, at=pairs, slipped=slip - memory.slip: follow_leaders(  # type: ignore[misc]
-                laws, hold.apply(new, at.g_n, slipped)))
-            continue
-        begin = time.perf_counter()
-        law = blocks.stiffen(linearise(
-            laws, modes, normal_traction, slip, memory, load.pressure, problem.traction_scale,
-            search.globalisation.frozen, jump,
-        ), modes)
-        constraints = hold.release(problem.constrain(law, load), modes)
+            begin = time.perf_counter()
+            found = self._iterate()
+            if found is None:
+                continue
+            found, cascade = self._let_bonds_fail(found)
+            self.record.add(found.solved, self.modes, found.outcome.proposal.changed, begin)
+            solution = self._conclude(found, cascade)
+            if solution is not None:
+                return solution
+            self._ask_for_balance(found, cascade)
+            if not self._go_on_otherwise(found):
+                self._move_on(found, cascade)
+
+    def _follow_smoothed(self) -> None:
+        """Go on from what smoothed laws lead to; from the same modes where these do not settle."""
+        smoothing = self.smoothing
+
+        def pause() -> None:
+            self.checkpoint.follow()
+            self.reporter.pause()
+
+        try:
+            modes, pairs = smoothing.find(self.tangent, self.hold, self.forcing, self.modes, self.record,
+                                          self.most - self.search.taken - 1, pause)
+        except ConvergenceError:  # the true laws may have what smoothed ones have not
+            return
+        finally:
+            self.search.spent += smoothing.taken
+            smoothing.begun = False
+        self.hold.loose = True
+        self.blocks.begin(pairs)
+        self.normal_traction, self.slip = pairs.p_n, plastic_slip(self.laws, pairs)
+        self.modes = self._hold_bodies(modes, pairs)
+
+    def _hold_bodies(self, modes: ModeState, pairs: PairState, before: ModeState | None = None) -> ModeState:
+        """The modes, with those of pairs that hold bodies in this state, and those of leaders; by the first rank."""
+        slipped = plastic_slip(self.laws, pairs) - self.memory.slip
+        return self.problem.decide(lambda: follow_leaders(
+            self.laws, self.hold.apply(modes, pairs.g_n, slipped, before)))
+
+    def _iterate(self) -> _Iterated | None:
+        """Solve with the laws as they are in the present modes; None where that is begun anew with stiffer blocks."""
+        problem, load, search, forcing = self.problem, self.load, self.search, self.forcing
+        law = self.blocks.stiffen(linearise(
+            self.laws, self.modes, self.normal_traction, self.slip, self.memory, load.pressure, problem.traction_scale,
+            search.globalisation.frozen, self.jump,
+        ), self.modes)
+        constraints = self.hold.release(problem.constrain(law, load), self.modes)
         part = forcing.choose(search.level > 0)
         try:
-            solved = tangent.solve(constraints, load, law, min(part, CLOSELIEST) if search.smoothed else part)
+            solved = self.tangent.solve(constraints, load, law, min(part, CLOSELIEST) if search.smoothed else part)
             loosely = solved.loosely
             forcing.used |= loosely
             search.plain = PLAIN_FROM_SMOOTHED if search.smoothed else PLAIN_IF_LOOSE if loosely else PLAIN
-            outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation, blocks)
+            outcome = self._judge(law, solved)
             if outcome.settled and not solved.checked:
-                solved = tangent.check(solved, constraints, load, law)
-                outcome = judge_solution(hold, modes, memory, load, law, solved, search.globalisation, blocks)
+                solved = self.tangent.check(solved, constraints, load, law)
+                outcome = self._judge(law, solved)
                 if loosely and not outcome.settled:
                     forcing.tighten()
         except ConvergenceError as error:
-            if blocks.stiffen_again(error):
-                reporter.tell(f"  with more stiffness in open pairs again, as an iteration failed: {error}")
-                continue
+            if self.blocks.stiffen_again(error):
+                self.reporter.tell(f"  with more stiffness in open pairs again, as an iteration failed: {error}")
+                return None
             forcing.used |= part > 0 and error.reason == "linear solver"  # in full it may be solved
-            problem.decide(lambda now=modes: hold.refuse_free_motion(now))  # type: ignore[misc]
+            problem.decide(lambda: self.hold.refuse_free_motion(self.modes))
             raise
-        pairs, proposal = outcome.pairs, outcome.proposal
-        hold.state = pairs
-        fails, cascade = outcome.settled and bool(outcome.failing.any()), None
-        if fails:
-            floor = find_floor(problem, solved)
-            cascade = run_cascade(
-                problem, tangent, constraints, modes, memory, load, law, solved, outcome.failing, floor,
-                min(search.most_pivoted, MOST_PIVOTED), lambda now: not hold.leaves_free(now),
-            )
-            memory = memory.lose(cascade.broken)
-            proposal = judge_solution(hold, modes, memory, load, law, solved, search.globalisation, blocks).proposal
-            search.restart()
-        record.add(solved, modes, proposal.changed, begin)
-        driven = outcome.settled and not fails and hold.is_driven(modes, solved.v, load)
-        if driven:
-            search.restart()
-        elif outcome.settled and outcome.rests and not fails:
-            forcing.used = False  # what follows is said of a solution in full
-            problem.decide(lambda now=modes, at=pairs: hold.refuse_free_motion(now, at, load.pressure))  # type: ignore[misc]
-            for note in hold.describe(modes) if problem.comm.rank == 0 else ():
-                reporter.note(note)
-            whole = pairs.bear(load.carried)
-            return Solution(solved.unknowns, solved.v, whole, modes, memory, solved.residual, tuple(iterations),
-                            load.pressure)
-        before, asked = asked, len(iterations) // PATIENCE  # iterations with smoothed laws come several at a time
+        self.hold.state = outcome.pairs
+        return _Iterated(law, constraints, solved, outcome)
+
+    def _judge(self, law: Linearisation, solved: Solved) -> Outcome:
+        return judge_solution(self.hold, self.modes, self.memory, self.load, law, solved, self.search.globalisation,
+                              self.blocks)
+
+    def _let_bonds_fail(self, found: _Iterated) -> tuple[_Iterated, Cascade | None]:
+        """Once all else has settled, the bonds that fail are lost one after the other; with what the solution asks for
+        without them. None if none does."""
+        if not (found.outcome.settled and found.outcome.failing.any()):
+            return found, None
+        problem, solved, hold = self.problem, found.solved, self.hold
+        cascade = run_cascade(
+            problem, self.tangent, found.constraints, self.modes, self.memory, self.load, found.law, solved,
+            found.outcome.failing, find_floor(problem, solved), min(self.search.most_pivoted, MOST_PIVOTED),
+            lambda now: not hold.leaves_free(now),
+        )
+        self.memory = self.memory.lose(cascade.broken)
+        outcome = replace(found.outcome, proposal=self._judge(found.law, solved).proposal)
+        self.search.restart()
+        return replace(found, outcome=outcome), cascade
+
+    def _conclude(self, found: _Iterated, cascade: Cascade | None) -> Solution | None:
+        """The solution if the search has come to its end."""
+        outcome, solved, hold, load = found.outcome, found.solved, self.hold, self.load
+        if not outcome.settled or cascade:
+            return None
+        if hold.is_driven(self.modes, solved.v, load):
+            self.search.restart()
+            return None
+        if not outcome.rests:
+            return None
+        self.forcing.used = False  # what follows is said of a solution in full
+        self.problem.decide(lambda: hold.refuse_free_motion(self.modes, outcome.pairs, load.pressure))
+        for note in hold.describe(self.modes) if self.problem.comm.rank == 0 else ():
+            self.reporter.note(note)
+        whole = outcome.pairs.bear(load.carried)
+        return Solution(solved.unknowns, solved.v, whole, self.modes, self.memory, solved.residual,
+                        tuple(self.iterations), load.pressure)
+
+    def _ask_for_balance(self, found: _Iterated, cascade: Cascade | None) -> None:
+        """Raise ConvergenceError where nothing balances the loads: asked now and then."""
+        # Iterations with smoothed laws come several at a time.
+        before, self.asked = self.asked, len(self.iterations) // PATIENCE
         # Bonds that have failed are lost: what is left is asked at once, before the search runs into mechanisms.
-        refused = refuse(memory) if asked > before or fails else None
+        refused = self.refuse(self.memory) if self.asked > before or cascade else None
         if refused:
-            forcing.used = False  # no solution was asked for that
-            moves = problem.decide(lambda now=proposal.modes: hold.describe_collapse(now))  # type: ignore[misc]
+            self.forcing.used = False  # no solution was asked for that
+            moves = self.problem.decide(lambda: self.hold.describe_collapse(found.outcome.proposal.modes))
             raise ConvergenceError(refused.reason, refused.detail + moves)
-        frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
-        search.note(proposal, outcome.law_error)
-        blocks.move_on(pairs, outcome.floats)
-        running.note(search, proposal, outcome.law_error)
-        if search.taken >= most or (hurried and search.is_stuck()) or search.collapses():
-            raise _end(hold, "iteration limit", proposal, search)
+
+    def _go_on_otherwise(self, found: _Iterated) -> bool:
+        """Take note of an iteration; whether the next one begins from modes that were kept, or from smoothed laws.
+
+        Raises ConvergenceError ("iteration limit").
+        """
+        search, outcome = self.search, found.outcome
+        self.frozen, left = search.globalisation.frozen, search.leaves(outcome.law_error)
+        search.note(outcome.proposal, outcome.law_error)
+        self.blocks.move_on(outcome.pairs, outcome.floats)
+        self.running.note(search, outcome.proposal, outcome.law_error)
+        if search.taken >= self.most or (self.hurried and search.is_stuck()) or search.collapses():
+            raise end_search(self.hold, "iteration limit", outcome.proposal, search)
         if left:
-            modes, normal_traction, slip, jump = kept
-            continue
+            self.modes, self.normal_traction, self.slip, self.jump = self.kept
+            return True
         # One iteration at least is left for the true laws.
-        if smoothing.begins(search.counts, pairs) and search.taken + 1 < most:
+        if self.smoothing.begins(search.counts, outcome.pairs) and search.taken + 1 < self.most:
             search.go_on_from_smoothed()
-            smoothing.begun = True
-            continue
+            self.smoothing.begun = True
+            return True
+        return False
+
+    def _find_rest(self, found: _Iterated) -> Rest | None:
+        """Where the contact comes to rest, if that is asked for and found."""
         rest = None
-        if not cascade and search.asks_for_rest() and can_be_damped(problem, tangent):
-            rest = rest_late(problem, tangent, memory, load, search)
+        if self.search.asks_for_rest() and can_be_damped(self.problem, self.tangent):
+            rest = rest_late(self.problem, self.tangent, self.memory, self.load, self.search)
             if not rest:
-                tangent.solve(constraints, load, law)  # it is asked for responses again
-        if not cascade and not rest:
-            rest = find_rest(running, hold, tangent, constraints, modes, memory, load, law, solved, search)
+                self.tangent.solve(found.constraints, self.load, found.law)  # it is asked for responses again
+        return rest or find_rest(self.running, self.hold, self.tangent, found.constraints, self.modes, self.memory,
+                                 self.load, found.law, found.solved, self.search)
+
+    def _choose_modes(self, found: _Iterated, cascade: Cascade | None, rest: Rest | None) -> ModeState:
+        """The modes to go on with: those of a cascade of failures, or of a state of rest, of pivoting, or of some of
+        the pairs that want others."""
+        search, proposal = self.search, found.outcome.proposal
         chosen = cascade.modes if cascade else rest.modes if rest else None
         # The first rank alone knows which pairs hold a body.
-        share = broadcast(problem.comm, max(search.globalisation.share, hold.share))
+        share = broadcast(self.problem.comm, max(search.globalisation.share, self.hold.share))
         # What pivoting found may leave a body free, and those that hold it come back: then by single steps.
         if not cascade and not rest and not (share > search.globalisation.share):
-            chosen = _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
+            chosen = pivot_group(self.hold, self.tangent, found.constraints, self.modes, self.memory, self.load,
+                                 found.law, found.solved, search)
         back = chosen is not None and not rest and search.returns(chosen.fingerprint())
-        if back and not go_on_warily(forcing, search):
-            raise _end(hold, "mode cycle", proposal, search)
         if chosen is None:
-            chosen = limit_changes(modes, proposal, share)
-            if proposal.changed.any() and search.returns(chosen.fingerprint()) and not go_on_warily(forcing, search):
-                raise _end(hold, "mode cycle", proposal, search)
-        slipped, former = plastic_slip(laws, pairs) - memory.slip, modes
-        modes = problem.decide(
-            lambda new=chosen, at=pairs, slipped=slipped, now=modes: follow_leaders(  # type: ignore[misc]
-                laws, hold.apply(new, at.g_n, slipped, now)),
-        )
-        found = plastic_slip(laws, pairs)
-        seat = find_seat(laws, former, memory, pairs, load.pressure)
-        normal_traction = choose_traction(laws, former, normal_traction, pairs, load.pressure, seat)
-        if search.wary and frozen == "slip" and not proposal.changed.any():
-            found = problem.decide(lambda now=modes, at=slip, new=found: fixed_point.choose(  # type: ignore[misc]
-                now.fingerprint(), at, new, now.mode == SLIP))
-        slip = choose_slip(laws, modes, memory, slip, found, former)
-        slip = choose_bond_slip(laws, modes, memory, pairs, load.pressure, slip)
-        jump = choose_jump(laws, former, memory, pairs, load.pressure)
+            chosen = limit_changes(self.modes, proposal, share)
+            back = bool(proposal.changed.any()) and search.returns(chosen.fingerprint())
+        if back and not go_on_warily(self.forcing, search):
+            raise end_search(self.hold, "mode cycle", proposal, search)
+        return chosen
+
+    def _move_on(self, found: _Iterated, cascade: Cascade | None) -> None:
+        """Choose the modes of the next iteration, and where its laws are taken. Raises ConvergenceError ("mode cycle").
+        """
+        pairs, search, laws, memory, pressure = (
+            found.outcome.pairs, self.search, self.laws, self.memory, self.load.pressure)
+        rest = None if cascade else self._find_rest(found)
+        chosen, former = self._choose_modes(found, cascade, rest), self.modes
+        self.modes = self._hold_bodies(chosen, pairs, former)
+        slip = plastic_slip(laws, pairs)
+        seat = find_seat(laws, former, memory, pairs, pressure)
+        self.normal_traction = choose_traction(laws, former, self.normal_traction, pairs, pressure, seat)
+        if search.wary and self.frozen == "slip" and not found.outcome.proposal.changed.any():
+            last, new = self.slip, slip
+            slip = self.problem.decide(lambda: self.fixed_point.choose(
+                self.modes.fingerprint(), last, new, self.modes.mode == SLIP))
+        slip = choose_slip(laws, self.modes, memory, self.slip, slip, former)
+        self.slip = choose_bond_slip(laws, self.modes, memory, pairs, pressure, slip)
+        self.jump = choose_jump(laws, former, memory, pairs, pressure)
         if rest:
-            normal_traction = np.where(np.isnan(rest.normal_traction), normal_traction, rest.normal_traction)
-            slip = np.where(np.isnan(rest.slip), slip, rest.slip)
+            self.normal_traction = np.where(np.isnan(rest.normal_traction), self.normal_traction, rest.normal_traction)
+            self.slip = np.where(np.isnan(rest.slip), self.slip, rest.slip)
         if search.just_returned:
-            kept = (modes, normal_traction, slip, jump)
-
-
-def _end(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
-    """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
-    search.unsettled = reason != "no admissible modes"
-    if search.collapse:
-        return ConvergenceError("limit load", search.collapse)
-    spent = search.is_spent() and reason == "mode cycle"
-
-    def describe() -> ConvergenceError:
-        error = describe_unsettled(
-            hold.problem, "iteration limit" if spent else reason, proposal, search.failed_group, search.failed)
-        if search.is_spent() and error.reason == "iteration limit":
-            taken = "pivoting has taken all that so many iterations may (solver.newton_max_iterations)"
-            error = ConvergenceError(error.reason, f"{error.detail}; {taken}", error.places, error.unless)
-        hold.doubt_free_motion(proposal.modes, error)
-        return hold.describe_floating(proposal.modes) or error
-
-    return hold.problem.decide(describe)
-
-
-def _pivot(
-    hold: Hold, tangent: TangentOperator, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
-    law: Linearisation, solved: Solved, search: Search,
-) -> ModeState | None:
-    """The modes that all groups of a crack network settle on by themselves, or else with those of the search's group
-    solved by pivoting; None if it has none or they have no solution.
-
-    Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
-    """
-    problem = hold.problem
-    judge = make_judge(problem, solved, search.globalisation)
-    if search.may_sweep():
-        swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
-        if swept.fingerprint() != modes.fingerprint():
-            search.swept = True
-            return swept
-    group = search.choose_group()
-    if not len(group):
-        return None
-    response = find_response(problem, tangent, constraints, load, law, solved, group)
-    whole = take_subset(problem.laws, memory, load.pressure, modes, group)
-
-    # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
-    alone = search.excluded
-    start = ModeState(
-        np.where(alone, search.proposal.modes.mode, modes.mode).astype(np.int8),
-        np.where(alone, search.proposal.modes.sign, modes.sign),
-    )
-
-    def complete(own: ModeState) -> ModeState:
-        return follow_leaders(problem.laws, start.put(group, own))
-
-    def settle(effort: OperationCount) -> Settled:
-        subset = replace(whole, effort=effort)
-        if tangent.settling.nearby and len(group) > MOST_ASKED:
-            return settle_parts(subset, response, search.proposal.modes, group, judge)
-        found, refused = _settle(subset, True)
-        # Modes that other anchors hold are still nearer, where there are none with those that act.
-        return _settle(subset, False)[0] if found.modes is None and refused else found
-
-    def _settle(subset: Subset, anchored: bool) -> tuple[Settled, bool]:
-        """What is found, and whether modes were refused only as other anchors than those that act would hold them."""
-        refused = False
-
-        def holds(own: ModeState) -> bool:
-            nonlocal refused
-            if not hold.leaves_free(complete(own), anchored):
-                return True
-            refused = refused or (anchored and not hold.leaves_free(complete(own)))
-            return False
-
-        found = settle_subset(
-            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure), holds)
-        return found, refused
-
-    found = search.pivot(problem, settle)
-    ends = search.conclude(found)
-    if found.modes is None and search.widen(ends):
-        return _pivot(hold, tangent, constraints, modes, memory, load, law, solved, search)
-    # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
-    if ends and not broadcast(problem.comm, len(hold.pairs)):
-        raise _end(hold, "no admissible modes", search.proposal, search)
-    if found.modes is None:
-        return None
-    settled = complete(found.modes)
-    if tangent.settling.nearby and settled.fingerprint() == modes.fingerprint():
-        return None  # what is near says otherwise than the whole model did
-    return settled
+            self.kept = (self.modes, self.normal_traction, self.slip, self.jump)

@@ -1,0 +1,114 @@
+"""Groups of pairs that are solved by pivoting within a search, with all other pairs as they are; and how a search ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pbem.contact.complementarity import Subset, take_subset
+from pbem.contact.constraints import ConstraintMap
+from pbem.contact.laws import Memory, ModeState, follow_leaders
+from pbem.contact.loads import Load
+from pbem.contact.modes import Linearisation, Proposal
+from pbem.contact.pivoting import OperationCount
+from pbem.contact.subset import Settled, settle_subset
+from pbem.errors import ConvergenceError
+from pbem.parallel import broadcast
+from pbem.solve.nonlinear.hold import Hold
+from pbem.solve.nonlinear.judging import make_judge
+from pbem.solve.nonlinear.search import Search
+from pbem.solve.nonlinear.unsettled import describe_unsettled
+from pbem.solve.problem.response import find_response
+from pbem.solve.problem.tangent import Solved, TangentOperator
+from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
+
+
+def end_search(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
+    """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
+    search.unsettled = reason != "no admissible modes"
+    if search.collapse:
+        return ConvergenceError("limit load", search.collapse)
+    spent = search.is_spent() and reason == "mode cycle"
+
+    def describe() -> ConvergenceError:
+        error = describe_unsettled(
+            hold.problem, "iteration limit" if spent else reason, proposal, search.failed_group, search.failed)
+        if search.is_spent() and error.reason == "iteration limit":
+            taken = "pivoting has taken all that so many iterations may (solver.newton_max_iterations)"
+            error = ConvergenceError(error.reason, f"{error.detail}; {taken}", error.places, error.unless)
+        hold.doubt_free_motion(proposal.modes, error)
+        return hold.describe_floating(proposal.modes) or error
+
+    return hold.problem.decide(describe)
+
+
+def pivot_group(
+    hold: Hold, tangent: TangentOperator, constraints: ConstraintMap, modes: ModeState, memory: Memory, load: Load,
+    law: Linearisation, solved: Solved, search: Search,
+) -> ModeState | None:
+    """The modes that all groups of a crack network settle on by themselves, or else with those of the search's group
+    solved by pivoting; None if it has none or they have no solution.
+
+    Raises ConvergenceError: "no admissible modes" of these pairs while all others settle.
+    """
+    problem = hold.problem
+    judge = make_judge(problem, solved, search.globalisation)
+    if search.may_sweep():
+        swept = tangent.sweep(constraints, modes, memory, load, law, solved, judge)
+        if swept.fingerprint() != modes.fingerprint():
+            search.swept = True
+            return swept
+    group = search.choose_group()
+    if not len(group):
+        return None
+    response = find_response(problem, tangent, constraints, load, law, solved, group)
+    whole = take_subset(problem.laws, memory, load.pressure, modes, group)
+
+    # Pairs that cannot be in a group would else keep the modes that they are leaving as long as others are pivoted.
+    alone = search.excluded
+    start = ModeState(
+        np.where(alone, search.proposal.modes.mode, modes.mode).astype(np.int8),
+        np.where(alone, search.proposal.modes.sign, modes.sign),
+    )
+
+    def complete(own: ModeState) -> ModeState:
+        return follow_leaders(problem.laws, start.put(group, own))
+
+    def settle(effort: OperationCount) -> Settled:
+        subset = replace(whole, effort=effort)
+        if tangent.settling.nearby and len(group) > MOST_ASKED:
+            return settle_parts(subset, response, search.proposal.modes, group, judge)
+        found, refused = _settle(subset, True)
+        # Modes that other anchors hold are still nearer, where there are none with those that act.
+        return _settle(subset, False)[0] if found.modes is None and refused else found
+
+    def _settle(subset: Subset, anchored: bool) -> tuple[Settled, bool]:
+        """What is found, and whether modes were refused only as other anchors than those that act would hold them."""
+        refused = False
+
+        def holds(own: ModeState) -> bool:
+            nonlocal refused
+            if not hold.leaves_free(complete(own), anchored):
+                return True
+            refused = refused or (anchored and not hold.leaves_free(complete(own)))
+            return False
+
+        found = settle_subset(
+            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure), holds)
+        return found, refused
+
+    found = search.pivot(problem, settle)
+    ends = search.conclude(found)
+    if found.modes is None and search.widen(ends):
+        return pivot_group(hold, tangent, constraints, modes, memory, load, law, solved, search)
+    # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
+    if ends and not broadcast(problem.comm, len(hold.pairs)):
+        raise end_search(hold, "no admissible modes", search.proposal, search)
+    if found.modes is None:
+        return None
+    settled = complete(found.modes)
+    if tangent.settling.nearby and settled.fingerprint() == modes.fingerprint():
+        return None  # what is near says otherwise than the whole model did
+    return settled

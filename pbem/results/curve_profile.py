@@ -184,9 +184,24 @@ def _read_nodes(results: Results, name: str, quantity: str, step: int, abscissa:
     geometry = elements.geometry.select(own)
     local = geometry.preimage(to_complex(position).reshape(len(own), -1)).real
     arc = geometry.arc_lengths(local).ravel()
+    if _is_backward(results, name, own):
+        arc, position, values = geometry.lengths.sum() - arc[::-1], position[::-1], values[::-1]
     place = _measure(position, arc, abscissa, name)
     ends = elements.vertices[own[0], 0], elements.vertices[own[-1], 1]
     return Profile(name, title, is_length, place, values, None, place, values, bool((ends[0] == ends[1]).all()))
+
+
+def _is_backward(results: Results, name: str, own: Integer) -> bool:
+    """Whether elements (e,) along a whole curve, in the order in which a region travels along it, go against its
+    direction: lengths are measured from its first point, as those of pairs are. False in files of earlier versions."""
+    start, end, tangent = results.find_curve_course(name)
+    elements = results.elements.geometry.select(own[[0, -1]])
+    first, last = complex(elements.start[0]), complex(elements.end[1])
+    if start != end:
+        return bool(abs(last - start) < abs(first - start))
+    leaving, arriving = elements.directions()
+    along, against = leaving[0] / abs(leaving[0]), -arriving[1] / abs(arriving[1])
+    return bool(abs(against - tangent) < abs(along - tangent))
 
 
 def _evaluate_nodes(results: Results, quantity: str, which: Integer, step: int) -> Real:

@@ -196,11 +196,23 @@ class Results:
 
     def find_curve_ends(self, name: str) -> Real:
         """(2, 2): start and end of a curve; NaN in files of earlier versions."""
+        start, end, _ = self.find_curve_course(name)
+        return np.array([[start.real, start.imag], [end.real, end.imag]])
+
+    def find_curve_course(self, name: str) -> tuple[complex, complex, complex]:
+        """Start and end of a curve, and its direction at the start; NaN in files of earlier versions."""
         stored = self._configured
         if name not in stored.get("curves", {}):
-            return np.full((2, 2), np.nan)
+            unknown = complex(np.nan, np.nan)
+            return unknown, unknown, unknown
         legs = stored["curves"][name]["legs"]
-        return np.array([legs[0]["start"], legs[-1]["end"]]) + np.array(stored["origin"])
+        start, way, end = (complex(*point) for point in (legs[0]["start"], legs[0]["end"], legs[-1]["end"]))
+        if legs[0]["center"] is None:
+            tangent = way - start
+        else:
+            tangent = 1j * np.sign(legs[0]["sweep"]) * (start - complex(*legs[0]["center"]))
+        origin = complex(*stored["origin"])
+        return start + origin, end + origin, complex(tangent / abs(tangent))
 
     @cached_property
     def _configured(self) -> Mapping[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from pbem.arrays import Bool, Complex, Real
 from pbem.contact.laws import collect_laws
 from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
+from pbem.results.absent import Absence
 from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
 from pbem.results.rates import EndFinder, choose_force_divisor, choose_jump_divisors
@@ -101,6 +102,7 @@ class Comparison:
         self._model, self._mesh, self._beside = model, mesh, beside
         self._interfaces = list(sort_pairs(mesh).values())
         self._known = rules
+        self._absence = Absence(model, mesh, np.zeros(0, dtype=np.int64))
         # A stiff region goes along with a soft one: the energy of that is none of its own.
         self._modulus = np.array([region.material.plane_modulus for region in model.regions])[mesh.region]
         self._gap = collect_laws(model, mesh).gap
@@ -126,7 +128,9 @@ class Comparison:
 
     def measure_scales(self, step: Step) -> Scales:
         """The largest values of one step."""
-        contact, mesh, weight = step.contact, self._mesh, self._mesh.pairs.weight
+        # Of what a stage has removed: the gap that was there is no jump.
+        contact = self._absence.blank(replace(step, interior=None)).contact
+        mesh, weight = self._mesh, self._mesh.pairs.weight
         factors = self._rules.evaluate_factors(contact)
         square = weight * (contact.traction_n**2 + contact.traction_s**2)
         tractions = max((float(np.sqrt(square[p].sum() / weight[p].sum())) for p in self._interfaces), default=0.0)

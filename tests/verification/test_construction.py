@@ -305,3 +305,25 @@ def test_a_net_force_on_a_wall_is_refused(given: dict[str, Any], tmp_path: Path)
     case = make_tunnel([REST, {**CUT, "boundary": {"wall": given}}])
     with pytest.raises(pbem.CaseError, match=r"stage 'cut' drive it, with resultant \(\S+, 6\.28319\)"):
         pbem.run(case, tmp_path / "net.h5")
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.5])
+def test_the_gap_around_what_was_removed_is_no_jump(gap: float, tmp_path: Path) -> None:
+    """Errors are relative to the largest slip and opening that faces have had, whatever was between them at first."""
+    case = {
+        "materials": {"rock": {"young": 20e3, "poisson": 0.25}, "plug": {"young": 1e3, "poisson": 0.25}},
+        "curves": {"wall": {"center": [0, 0], "radius": 3, "elements": 16},
+                   "core": {"center": [0, 0], "radius": 3 - gap, "elements": 16},
+                   "joint": {"points": [[-4.5, 4.8], [5.7, 3.3]], "elements": 8}},
+        "regions": {"plug": {"material": "plug", "boundary": ["core"]},
+                    "rock": {"material": "rock", "infinite": True, "boundary": ["wall"], "cracks": ["joint"]}},
+        "contacts": {"fit": {"between": ["wall", "core"], "friction": 0.2}}, "interfaces": {"joint": {"friction": 0.3}},
+        "initial_stress": {"rock": {"sxx": -5.0, "syy": -10.0}},
+        "stages": [{"steps": 1}, {"steps": 1, "remove": ["plug"]}],
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "plug.h5")
+    errors, joint, fit = results.errors, results.contact["joint"], results.contact["fit"]
+    assert np.isnan(fit.opening[-1]).all()
+    largest = max(np.abs(each).max() for each in (joint.slip, joint.opening, fit.opening[0] - gap, fit.slip[0]))
+    expected = max(errors.slip["joint"][-1], errors.opening["joint"][-1]) / largest
+    assert errors.relative["jumps"][-1] == pytest.approx(expected, rel=0.02)

@@ -100,13 +100,16 @@ def refuse_overlap(problem: Problem, modes: ModeState, opening: Real, moved: Rea
         worst = int(np.argmax(depth)) if len(depth) else 0
         if not len(depth) or depth[worst] <= ROUNDING * np.abs(moved).max():
             return
-        pairs, mesh = problem.mesh.pairs, problem.mesh
+        pairs, mesh, model = problem.mesh.pairs, problem.mesh, problem.model
+        moves, ends = "the motion of bodies that nothing holds, none in the mean, moves", "hold them by point supports"
+        if model.point_supports:
+            moves, ends = "the point supports move", ("supports carry no load, so that they cannot press bodies "
+                                                      "together; prescribe displacements along a curve")
         raise ConvergenceError(
             "overlap",
-            f"in stage {problem.model.stages[stage].name!r} the point supports move the faces of "
+            f"in stage {model.stages[stage].name!r} {moves} the faces of "
             f"'{mesh.interface_names[pairs.interface[worst]]}' {depth[worst]:.3g} deep into each other near "
-            f"{format_point(complex(pairs.position[worst]) + problem.model.origin)}: supports carry no load, so that "
-            "they cannot press bodies together; prescribe displacements along a curve")
+            f"{format_point(complex(pairs.position[worst]) + model.origin)}: {ends}")
 
     do_on_first(problem.comm, ConvergenceError, refuse)
 

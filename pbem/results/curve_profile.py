@@ -211,7 +211,7 @@ def _evaluate_nodes(results: Results, quantity: str, which: Integer, step: int) 
     if quantity in ("ux", "uy", "u"):
         moved = results.displacement_at(step)[which]
         return np.hypot(*moved.T) if quantity == "u" else moved[:, 0 if quantity == "ux" else 1]
-    traction = results.traction[step][which]
+    traction = results.traction_at(step)[which]
     if quantity in ("tx", "ty"):
         return np.asarray(traction[:, 0 if quantity == "tx" else 1])
     along = normal if quantity == "normal" else np.stack([-normal[:, 1], normal[:, 0]], axis=1)

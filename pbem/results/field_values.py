@@ -116,7 +116,7 @@ def evaluate_faces(results: Results, step: int, face: Integer, s: Real) -> tuple
     local = geometry.preimage(to_complex(nodes.position)[number]).real
     shapes = interpolate(local, s[:, None])[:, 0]
     displacement = to_complex(results.displacement_at(step))[number]
-    traction, hoop = to_complex(results.traction[step])[number], results.hoop_stress[step][number]
+    traction, hoop = to_complex(results.traction_at(step))[number], results.hoop_stress[step][number]
     moved = (shapes * displacement).sum(axis=1)
     at_tips = np.flatnonzero(elements.tip[face])
     if len(at_tips):

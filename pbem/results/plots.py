@@ -107,7 +107,7 @@ class BodyPicture:
         self._frame = widen_box(self._box, places, 0.04)
         # What is this small beside all that moves, or is borne, is rounding.
         least = {True: ROUNDED * float(np.abs(largest).max(initial=0.0)), False: ROUNDED * max((
-            float(np.nan_to_num(np.abs(results.traction[at])).max(initial=0.0)) for at in self._steps), default=0.0)}
+            float(np.nan_to_num(np.abs(results.traction_at(at))).max(initial=0.0)) for at in self._steps), default=0.0)}
         self._profiles = {
             (name, quantity, at): _leave_out_rounding(
                 read_profile(results, name, quantity, at, options.abscissa), least[quantity in ("opening", "slip")])

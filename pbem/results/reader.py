@@ -114,10 +114,17 @@ class Results:
 
     def displacement_at(self, step: int) -> Real:
         """(n, 2) of one stored step (its index in the file, negative from the end) without loading the others."""
+        return self._read_at("fields/displacement", step)
+
+    def traction_at(self, step: int) -> Real:
+        """(n, 2) of one stored step, as `displacement_at`."""
+        return self._read_at("fields/traction", step)
+
+    def _read_at(self, name: str, step: int) -> Real:
         with open_quietly(self.path) as file:
-            moved: Real = file["fields/displacement"][range(len(self.steps))[step]]
+            values: Real = file[name][range(len(self.steps))[step]]
         gone = self.find_gone(step)
-        return np.where(gone[self.nodes.region, None], np.nan, moved) if gone.any() else moved
+        return np.where(gone[self.nodes.region, None], np.nan, values) if gone.any() else values
 
     def find_gone(self, step: int) -> Bool:
         """Which regions (r,) have been removed by a stored step."""

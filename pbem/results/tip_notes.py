@@ -27,7 +27,7 @@ def compare_release(results: Results) -> list[str]:
         return []
     largest = max((float(np.nanmax(tips.J[-1], initial=0.0)) for tips in results.tips.values()), default=0.0)
     found = []
-    stress = float(np.nanmax(np.abs(results.traction[-1]), initial=0.0))
+    stress = float(np.nanmax(np.abs(results.traction_at(-1)), initial=0.0))
     lengths = _measure_contacts(results)
     for name, tips in results.tips.items():
         least = (ROUNDING * stress) ** 2 * lengths.get(name, 0.0) / tips.plane_modulus

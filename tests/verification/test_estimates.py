@@ -414,3 +414,33 @@ def test_tractions_of_rounding_have_no_relative_error(stiff: float, tmp_path: Pa
     (tmp_path / "stack.toml").write_text(moved.replace('law = "coulomb"\nfriction = 0.3', 'law = "bonded"'))
     found = pbem.run(tmp_path / "stack.toml", tmp_path / "stack.h5").errors.relative
     assert all(float(found[name][-1]) == 0.0 for name in ("reactions", "tractions", "jumps"))
+
+
+def make_creeping_joint(length: float, stress: float) -> dict[str, Any]:
+    """A joint with rate-and-state friction beside a tunnel that is excavated; a mesh too coarse to be coarsened."""
+    law = {"law": "rate_and_state", "friction": 0.4, "rate_effect": 0.01, "state_effect": 0.005, "initial_state": 10.0,
+           "reference_rate": 1e-3 * length, "slip_distance": 0.01 * length}
+    return {
+        "materials": {"rock": {"young": 1e3 * stress, "poisson": 0.25}},
+        "curves": {"wall": {"center": [0, 0], "radius": 3 * length, "elements": 16},
+                   "joint": {"points": [[-4.5 * length, 4.8 * length], [5.7 * length, 3.3 * length]], "elements": 8}},
+        "regions": {"core": {"material": "rock", "boundary": ["wall"]},
+                    "rock": {"material": "rock", "infinite": True, "boundary": ["wall"], "cracks": ["joint"]}},
+        "initial_stress": {"rock": {"sxx": -5.0 * stress, "syy": -10.0 * stress}}, "interfaces": {"joint": law},
+        "stages": [{"steps": 2, "duration": 1.0, "remove": ["core"]},
+                   {"steps": 1, "duration": 1.0, "boundary": {"wall": {"pressure": 3.5 * stress}}}],
+    }  # fmt: skip
+
+
+def test_errors_of_creeping_faces_are_those_of_laws_that_hold_or_none(tmp_path: Path) -> None:
+    """In any units: what differs from a state that is off from its laws by half of the tractions is no error."""
+    one, other = (pbem.run(make_creeping_joint(length, stress), tmp_path / f"{length}.h5")
+                  for length, stress in ((1.0, 1.0), (1e-6, 1e9)))
+    np.testing.assert_allclose(other.contact["joint"].slip * 1e6, one.contact["joint"].slip, rtol=1e-9, atol=1e-12)
+    for kind in ("jumps", "factors", "tractions"):
+        errors = np.array([one.errors.relative[kind], other.errors.relative[kind]])
+        known = np.isfinite(errors).all(axis=0)
+        assert (errors[1] / errors[0])[known] == pytest.approx(1.0, rel=0.1), kind
+        assert known.all() or "did not converge" in one.errors.missing
+    known = pbem.run("velocity_step", tmp_path / "velocity.h5").errors
+    assert not known.missing and np.isfinite(known.relative["jumps"]).all()

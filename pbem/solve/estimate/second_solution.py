@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from pbem.contact.constraints import evaluate_pairs
 from pbem.contact.declaration import BROKEN, list_variables
-from pbem.contact.laws import SLIP, Memory, ModeState, commit, follow_leaders, start_memory
+from pbem.contact.laws import SLIP, Memory, ModeState, commit, find_creeping, follow_leaders, start_memory
 from pbem.contact.loads import Load
-from pbem.contact.modes import linearise
+from pbem.contact.modes import linearise, measure_law_error
 from pbem.errors import ConvergenceError
 from pbem.heap import give_back
 from pbem.parallel import StopSignals, do_on_first
@@ -27,6 +27,9 @@ from pbem.solve.problem.step import ContactState, SilentReporter, Step
 from pbem.solve.steps.recovery import describe_step
 from pbem.solve.system.assembly import assemble_problem
 from pbem.solve.system.kept import KeptProblems
+
+# Of the largest traction: so nearly the laws of faces that creep have to hold where statuses are those of the run.
+FULFILLED = 1e-2
 
 
 class SecondSolution:
@@ -119,7 +122,9 @@ class SecondSolution:
     def _solve_held(self, step: Step, load: Load) -> Solution:
         """The solution with the statuses of the run's pairs, which need not be those that this mesh wants.
 
-        In narrow wedges, or with cohesion that is lost as faces part, a coarser mesh may have none.
+        In narrow wedges, or with cohesion that is lost as faces part, a coarser mesh may have none. Raises
+        ConvergenceError where it does not fulfil the laws of faces that creep: their bound changes by all of itself
+        with rates that the run's slips do not tell.
         """
         problem, beside, contact = self.problem, self.beside, step.contact
         memory = replace(self.memory, duration=step.duration).lose(self._carry_internal(contact)[BROKEN.name])
@@ -135,6 +140,11 @@ class SecondSolution:
         if not solved.checked:
             solved = self.tangent.check(solved, constraints, load, law)
         pairs = evaluate_pairs(problem.mesh, law, solved.unknowns)
+        if find_creeping(problem.laws).any():
+            error = problem.decide(lambda: measure_law_error(problem.laws, modes, pairs, memory, load.pressure))
+            if error > FULFILLED:
+                raise ConvergenceError(
+                    "iteration limit", f"the laws of faces that creep are off by {error:.1e} of the tractions")
         pairs, residual = pairs.bear(load.carried), solved.residual
         return Solution(solved.unknowns, solved.v, pairs, modes, memory, residual, (), load.pressure)
 

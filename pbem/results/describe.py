@@ -78,9 +78,13 @@ ERROR_NAMES = {"reactions": "reactions", "jumps": "slips and openings", "tractio
 
 
 def describe_errors(results: Results) -> list[str]:
-    """Estimated errors: relative ones of the worst stored step in a line, then the interfaces' of the last step."""
-    errors = results.errors
+    """Estimated errors: relative ones of the worst stored step in a line, then the interfaces' of the last step. Where
+    they are not known of all steps, those of the last one."""
+    errors, when = results.errors, "at the worst of the steps"
     worst_step = {kind: float(np.max(values)) for kind, values in errors.relative.items()}
+    if errors.missing and np.isnan(list(worst_step.values())).any():
+        worst_step = {kind: float(values[-1]) for kind, values in errors.relative.items()}
+        when = f"at the last step; not known of all steps: {errors.missing}"
     relative = {name: worst_step[kind] for kind, name in ERROR_NAMES.items() if kind in worst_step}
     present = {
         "reactions": bool(errors.reactions), "slips and openings": bool(errors.slip),
@@ -94,7 +98,7 @@ def describe_errors(results: Results) -> list[str]:
         return [f"none: {errors.missing}"]
     lines = [
         ", ".join(f"{name} {value:.1e}" for name, value in shown.items())
-        + " of the largest in the model, at the worst of the steps"
+        + f" of the largest in the model, {when}"
     ]
     if len(errors.slip) > MOST_ERRORS:
         return lines

@@ -12,7 +12,8 @@ import pbem
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.model.in_situ import LinearStress
 from pbem.model.model import Condition
-from pbem.results.describe import describe_results
+from pbem.results.describe import describe_errors, describe_results
+from pbem.results.estimates import list_datasets
 from pbem.results.model_text import describe_model
 from pbem.results.reader import open_results
 from pbem.results.writer import ResultWriter
@@ -131,3 +132,16 @@ def test_works_that_are_rounding_are_not_measured_by_each_other(tmp_path: Path) 
     case["boundary"] = {**case["boundary"], "top": {"ty": 1.0}}
     pulled = describe_results(pbem.run(case, tmp_path / "pulled.h5"))
     assert "of the largest" in pulled.split("external work")[1].splitlines()[0]
+
+
+def test_errors_that_are_not_known_of_all_steps_are_those_of_the_last(tmp_path: Path) -> None:
+    reason = "at step 2 the second solution did not converge (iteration limit)"
+    with ResultWriter(tmp_path / "a.h5", MODEL, MESH, 1, "") as writer:
+        for number, step in enumerate(STEPS):
+            value = np.nan if number == 1 else 0.01 * (len(STEPS) - number)
+            writer.append(step, {name: np.full(shape, value) for name, shape in list_datasets(MODEL, MESH).items()})
+            if number == 1:
+                writer.note_missing(reason)
+    said = describe_errors(open_results(tmp_path / "a.h5"))[0]
+    assert "slips and openings 1.0e-02" in said and "nan" not in said
+    assert said.endswith(f"of the largest in the model, at the last step; not known of all steps: {reason}")

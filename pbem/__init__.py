@@ -32,6 +32,7 @@ from pbem.errors import (
     StopError,
     StorageError,
 )
+from pbem.loading import load_at_once
 from pbem.version import __version__
 
 if TYPE_CHECKING:
@@ -54,7 +55,8 @@ _AT_FIRST_USE = {"Case": "pbem.case.case", "run": "pbem.driver", "open_results":
 def __getattr__(name: str) -> Any:
     if name not in _AT_FIRST_USE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_AT_FIRST_USE[name]), name)
+    with load_at_once():
+        value = globals()[name] = getattr(import_module(_AT_FIRST_USE[name]), name)
     return value
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pbem.errors import LaunchError
+from pbem.loading import load_at_once
 
 
 def add_check_options(parser: argparse.ArgumentParser) -> None:
@@ -31,14 +32,15 @@ def check(case: Path, changes: Mapping[str, Any], ranks: int, as_json: bool, plo
 
     Raises CaseError with all its faults, LaunchError where there is not the memory for it.
     """
-    from pbem.case.build import read_checked_model
-    from pbem.environment import count_cores, is_set, read_site
-    from pbem.forecast.forecast import make_forecast, refuse_memory
-    from pbem.forecast.limits import OVERRIDE, read_limits
-    from pbem.mesh.generate import generate_mesh
-    from pbem.results.model_summary import summarise_model
-    from pbem.results.model_text import describe_model
-    from pbem.results.output import check_picture_path
+    with load_at_once():
+        from pbem.case.build import read_checked_model
+        from pbem.environment import count_cores, is_set, read_site
+        from pbem.forecast.forecast import make_forecast, refuse_memory
+        from pbem.forecast.limits import OVERRIDE, read_limits
+        from pbem.mesh.generate import generate_mesh
+        from pbem.results.model_summary import summarise_model
+        from pbem.results.model_text import describe_model
+        from pbem.results.output import check_picture_path
 
     model = read_checked_model(case, changes)
     if plot:

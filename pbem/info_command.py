@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from pbem.loading import load_at_once
+
 
 def add_info_arguments(parser: argparse.ArgumentParser) -> None:
     """The options of `pbem info`."""
@@ -26,7 +28,8 @@ def read_count(text: str) -> int:
 
 def describe(options: argparse.Namespace) -> str:
     """What the command prints. Raises ResultFileError."""
-    from pbem.results.reader import open_results
+    with load_at_once():
+        from pbem.results.reader import open_results
 
     results = open_results(options.file)
     if options.json:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from pbem.bundled import find_case
 from pbem.environment import find_launch
 from pbem.errors import ConvergenceError, LaunchError, LawError, PbemError, StopError, StorageError
+from pbem.loading import load_at_once
 from pbem.terminal import INTERRUPTED, NOT_CONVERGED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
 
 if TYPE_CHECKING:
@@ -63,17 +64,19 @@ def add_set_option(command: argparse.ArgumentParser) -> None:
 
 def run_case(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     """Compute the case of a command line; returns the exit code. All ranks call this together."""
-    from pbem.case.changed import label_option
-    from pbem.case.overrides import read_options
+    with load_at_once():
+        from pbem.case.changed import label_option
+        from pbem.case.overrides import read_options
 
     case = find_case(options.case)
     target = Path(options.output or case.stem + ".h5")
     changes = read_options(options.set)
 
     run = load_driver()
-    from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
-    from pbem.progress import make_reporter
-    from pbem.solve.launch.account import keep_account
+    with load_at_once():
+        from pbem.parallel import abort_if_unexpected, describe_lack, lacks_memory, world
+        from pbem.progress import make_reporter
+        from pbem.solve.launch.account import keep_account
 
     reporter: Reporter | None = None
     begun = time.perf_counter()
@@ -131,12 +134,14 @@ def _describe_rest(target: Path) -> str:
 def load_driver() -> Callable[..., Results]:
     """Import what computes; raises LaunchError on all ranks alike if MPI, PETSc or another library cannot be loaded."""
     try:
-        from pbem.parallel import refuse_together, wait_for_all, world
+        with load_at_once():
+            from pbem.parallel import refuse_together, wait_for_all, world
     except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py has not found the library of MPI
         raise LaunchError(f"MPI cannot be loaded: {error}; {_advise_to_load(error)}") from error
     fault = None
     try:
-        from pbem.driver import run
+        with load_at_once():
+            from pbem.driver import run
     except ImportError as error:
         fault = f"a library cannot be loaded: {error}; {_advise_to_load(error)}"
     # Loading PETSc is collective: where it fails on some ranks only, the others wait in it.

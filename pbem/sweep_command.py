@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pbem.bundled import find_case
 from pbem.errors import LaunchError, PbemError, StopError, StorageError
+from pbem.loading import load_at_once
 from pbem.run_command import OPERATORS, load_driver, say_wrong_launch
 from pbem.terminal import INTERRUPTED, UNEXPECTED, WRONG_INPUT, say, tell
 
@@ -49,16 +50,18 @@ def add_sweep_options(command: argparse.ArgumentParser) -> None:
 
 def run_sweep(options: argparse.Namespace, petsc: dict[str, str]) -> int:
     """Compute the cases of a command line; returns the exit code. All ranks call this together."""
-    from pbem.case.changed import label_option
-    from pbem.sweeps.values import read_values
+    with load_at_once():
+        from pbem.case.changed import label_option
+        from pbem.sweeps.values import read_values
 
     case = find_case(options.case)
     values = read_values(options.set)
     target = Path(options.output or case.stem + ".csv")
     load_driver()
-    from pbem.parallel import world
-    from pbem.solve.launch.account import keep_account
-    from pbem.sweeps.sweep import sweep
+    with load_at_once():
+        from pbem.parallel import world
+        from pbem.solve.launch.account import keep_account
+        from pbem.sweeps.sweep import sweep
 
     begun, counts = time.perf_counter(), {"finished": 0, "failed": 0, "refused": 0}
 

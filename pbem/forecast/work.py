@@ -8,10 +8,8 @@ import numpy as np
 
 from pbem.arrays import Integer
 from pbem.bem.body_factors import choose_body_factors
-from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements
 from pbem.bem.operator_choice import choose_operator
 from pbem.bem.rigid_motions import need_rotations
-from pbem.bem.tree import find_interactions
 from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import PairLaws, collect_laws
 from pbem.contact.loads import OuterNodes, collect_outer_nodes, evaluate_load, find_needed_columns
@@ -95,6 +93,9 @@ def _count_dense(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[float, f
 
 def _count_hierarchical(model: Model, mesh: Mesh, needed: np.ndarray) -> tuple[float, float]:
     """Entries of near blocks, and of the groups' inverses (about as many)."""
+    from pbem.bem.hierarchical import RATIO, choose_terms, sort_elements  # here, as most models are small
+    from pbem.bem.tree import find_interactions
+
     terms = choose_terms(model.solver.tolerance)
     parts = sort_elements(mesh, [region.material for region in model.regions], terms)
     forest = parts.forest

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from pbem.arrays import Real
 from pbem.description.case import Case
@@ -123,6 +122,8 @@ def _find_in_table(value: Varying, leg: Leg, passed: float) -> Real:
 
 def _find_in_expression(value: Varying, leg: Leg, passed: float) -> list[float]:
     """Fractions of a leg at which what max, min or abs choose by changes its sign."""
+    from scipy.optimize import brentq  # here, as few cases need it and it is a twentieth of what a start imports
+
     found = []
     at = np.linspace(0.0, 1.0, SAMPLES)
     for text in list_switches(value.expression):

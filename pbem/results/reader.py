@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import h5py
 import numpy as np
@@ -22,7 +22,6 @@ from pbem.errors import ResultFileError
 from pbem.model.refinement import Fractions
 from pbem.results.balance import read_balance
 from pbem.results.contents import Balances, Elements, Energies, Errors, Linearities, Nodes, Steps, Tips, Units
-from pbem.results.evaluation import Evaluation, Evaluator, Side
 from pbem.results.journal import is_being_written
 from pbem.results.layout import ENERGIES, read_fractions
 from pbem.results.lazy import AllPairs, Contact, Interfaces, InteriorPoints
@@ -40,6 +39,9 @@ from pbem.results.sections import (
     read_tips,
 )
 from pbem.results.trial import check_contents
+
+if TYPE_CHECKING:
+    from pbem.results.evaluation import Evaluation, Evaluator, Side
 
 STATUSES = ("running", "finished", "failed", "stopped")
 ATTEMPTS = 5
@@ -145,6 +147,8 @@ class Results:
         Raises ValueError for points of another shape or an unknown side, IndexError for a step that is not stored,
         ResultFileError for files without stored steps and those of earlier versions.
         """
+        from pbem.results.evaluation import Side
+
         if side not in get_args(Side):
             raise ValueError(f"side: found {side!r}; expected one of {', '.join(get_args(Side))}")
         if not len(self.steps):
@@ -155,6 +159,8 @@ class Results:
 
     @cached_property
     def _evaluator(self) -> Evaluator:
+        from pbem.results.evaluation import Evaluator  # here, as a run needs it for its file and never for this
+
         return Evaluator(self.path, self.nodes, self.elements, self.steps, self.configuration)
 
     def choose_steps(self, steps: int | Sequence[int] | None = None) -> list[int]:

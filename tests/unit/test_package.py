@@ -42,6 +42,33 @@ sys.exit(" ".join({"numpy", "h5py", "mpi4py", "petsc4py", "pydantic"} & set(sys.
     assert process.returncode == 0, process.stderr
 
 
+@pytest.mark.parametrize("before", ["gc.enable()", "gc.disable()"])
+def test_what_computes_is_loaded_without_collecting_and_leaves_the_collector_as_it_was(before: str) -> None:
+    code = f"""
+import gc, sys
+import pbem
+{before}
+was, found = gc.isenabled(), []
+gc.callbacks.append(lambda phase, info: found.append(info))
+pbem.run
+sys.exit(0 if gc.isenabled() == was and len(found) <= 2 else f"{{gc.isenabled()}}, {{len(found)}} collections")
+"""
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert process.returncode == 0, process.stderr
+
+
+def test_a_run_with_a_dense_operator_does_not_load_what_the_other_needs(tmp_path: Path) -> None:
+    code = """
+import sys
+import pbem
+pbem.run("two_blocks")
+not_needed = {"scipy.optimize", "pbem.bem.hierarchical", "pbem.solve.system.hierarchical", "pbem.results.evaluation"}
+sys.exit(" ".join(not_needed & set(sys.modules)) or 0)
+"""
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+
+
 def test_a_source_package_has_all_that_the_kernels_and_commands_need(tmp_path: Path) -> None:
     root, made = Path(__file__).resolve().parents[2], tmp_path / "copy"
     for folder in ("pbem", "cases"):

@@ -176,7 +176,7 @@ def _list_vertices(entity: Any, kind: str) -> list[tuple[complex, float]]:
         if not radius > 0:
             raise ValueError(f"a radius of {radius:g}")
         first = float(entity.dxf.start_angle) if kind == "ARC" else 0.0
-        turn = (float(entity.dxf.end_angle) - first) % 360 or 360.0 if kind == "ARC" else 360.0
+        turn = _turn(first, float(entity.dxf.end_angle)) if kind == "ARC" else 360.0
         parts = max(1, math.ceil(turn * QUARTERS / 360 - 1e-9))
         bulge = math.tan(math.radians(turn / parts) / 4)
         points = [center + radius * cmath.rect(1.0, math.radians(first + turn * k / parts)) for k in range(parts + 1)]
@@ -194,6 +194,13 @@ def _list_vertices(entity: Any, kind: str) -> list[tuple[complex, float]]:
     if closed and vertices:
         vertices.append((vertices[0][0], 0.0))
     return vertices
+
+
+def _turn(first: float, last: float) -> float:
+    """Degrees from one angle on counter-clockwise to another; 360 where they are the same but for their rounding."""
+    turn = (last - first) % 360
+    rounding = 2 * max(math.ulp(first), math.ulp(last))
+    return 360.0 if min(turn, 360 - turn) <= rounding else turn
 
 
 def _chain(vertices: Sequence[tuple[complex, float]]) -> list[Leg]:

@@ -16,6 +16,7 @@ import pytest
 import pbem
 from pbem.case import read_case
 from pbem.cli import main
+from pbem.importing.dxf_file import read_dxf
 from tests.cli.gmsh_sample import make_block, make_plate, make_ring, write_2, write_4
 
 Capture = pytest.CaptureFixture[str]
@@ -239,6 +240,17 @@ def test_drawings_of_all_kinds(capsys: Capture) -> None:
     assert curves["t5"]["radius"] == 1 and "angles" not in curves["t5"]
     said = capsys.readouterr().out
     assert "CIRCLE 2: one point or none" in said and "1 TEXT: only LINE" in said
+
+
+@pytest.mark.parametrize("first", [0.0, 10.1, 152.2, 154.2, 359.9])
+def test_an_arc_of_a_drawing_that_turns_by_360_degrees_is_a_circle(first: float) -> None:
+    """Whatever the rounding of its angles: 512.2 - 152.2 is above 360 by a bit."""
+    arc = write_dxf((0, "ARC", 8, 0, 10, 5.0, 20, 2.0, 40, 1.5, 50, first, 51, round(first + 360, 1)))
+    Path("map.dxf").write_text(arc)
+    [trace] = read_dxf(Path("map.dxf")).traces
+    length = sum(leg.length for part in trace.parts for leg in part)
+    assert length == pytest.approx(3 * np.pi, rel=1e-12)
+    assert trace.parts[0][0].start == trace.parts[-1][-1].end
 
 
 @pytest.mark.parametrize("name, text, expected", [

@@ -5,8 +5,8 @@ single contact pairs then open when they are pressed, and thin bodies bend too m
 REACH times the distance to the next face of its region. In the corner of a narrow wedge that makes lengths fall
 geometrically, alike on both of its sides, down to a last bit (see pbem.model.sliver). Towards an ordinary corner of a
 thin body they fall with the distance from it, down to a small part of the thickness. Beside a crack tip they grow by
-no more than SLOPE times the distance from the tip: the square-root shape of the tip's element needs neighbours of about
-its size. Legs that comply keep the elements that they have.
+no more than SLOPE times the distance from the tip, on other cracks too: the square-root shape of the tip's element
+needs neighbours of about its size. Legs that comply keep the elements that they have.
 """
 
 from __future__ import annotations

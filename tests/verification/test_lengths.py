@@ -1,7 +1,8 @@
 """Meshes that the program fits to near faces: thin bodies, ligaments, parallel cracks, slots and wedges.
 
 Reference solutions: beam theory in plane strain with Timoshenko's shear, Jeffery's eccentric ring (S. Timoshenko and
-J. Goodier, Theory of Elasticity, art. 73), the crack that a slot tends to, and the same model on a much finer mesh.
+J. Goodier, Theory of Elasticity, art. 73), collinear cracks and cracks along arcs (H. Tada, P. Paris and G. Irwin), the
+crack that a slot tends to, and the same model on a much finer mesh.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pbem.exact import arc_crack_intensity, collinear_cracks_intensity
 from tests.verification.proofs.proof import Solved, line, solve_case
 
 ROCK = {"young": 1000.0, "poisson": 0.2}
@@ -79,6 +81,46 @@ def solve_parallel_cracks(distance: float, elements: int, remote: dict[str, floa
 def test_the_factors_of_parallel_cracks(distance: float, remote: dict[str, float]) -> None:
     coarse, fine = (np.array(solve_parallel_cracks(distance, count, remote)) for count in (8, 120))
     assert np.abs(coarse - fine).max() < 0.01 * np.abs(fine).max()
+
+
+def solve_cracks(cracks: dict[str, Any], law: dict[str, Any], remote: dict[str, float], order: int = 2) -> Solved:
+    """Cracks in an infinite plane."""
+    return solve_case(
+        materials={"rock": ROCK}, curves=cracks, remote=remote, interfaces={name: law for name in cracks},
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": list(cracks)}},
+        analysis={"steps": 1, "order": order},
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("ligament", [3e-2, 1e-3, 1e-4])
+def test_the_factors_at_the_ligament_of_collinear_cracks(ligament: float, order: int) -> None:
+    inner, outer = ligament / 2, 1 + ligament / 2
+    cracks = {"left": line(-outer, -inner, 8), "right": line(inner, outer, 8)}
+    KI = solve_cracks(cracks, {"law": "open"}, {"syy": 1.0}, order).factors("right")[0]
+    exact = collinear_cracks_intensity(inner, outer, 1.0)
+    np.testing.assert_allclose(KI, exact, rtol={1: 1e-2, 2: 2e-3, 3: 2e-4}[order])
+
+
+def test_the_factors_of_a_crack_along_an_arc_that_is_all_but_closed() -> None:
+    arc = {"center": [0.0, 0.0], "radius": 1.0, "angles": [0.0, 359.0], "elements": 40}
+    factors = np.abs(solve_cracks({"arc": arc}, {"law": "open", "pressure": 1.0}, {}).factors("arc"))
+    exact = arc_crack_intensity(1.0, np.radians(179.5), 1.0)
+    np.testing.assert_allclose(factors.T, [exact, exact], atol=3e-3 * max(exact))
+
+
+@pytest.mark.parametrize("direction", [1j, np.exp(0.6j)])
+@pytest.mark.parametrize("distance", [1e-2, 1e-3])
+def test_the_factors_of_a_crack_that_all_but_meets_another_one(distance: float, direction: complex) -> None:
+    def solve(elements: int, order: int) -> np.ndarray:
+        near = 0.1 + distance * 1j
+        cracks = {"long": line(-1, 1, elements), "near": line(near, near + direction, elements)}
+        solved = solve_cracks(cracks, {"law": "open"}, {"sxx": 0.8, "syy": 0.6, "sxy": 0.2}, order)
+        return np.array([solved.factors("long"), solved.factors("near")])
+
+    coarse, fine = solve(8, 2), solve(32, 3)
+    error, size = (np.hypot(*np.moveaxis(each, 1, 0)) for each in (coarse - fine, fine))
+    assert (error < 0.01 * size).all()
 
 
 def solve_slot(width: float, scheme: str, counts: tuple[int, int] = (20, 27)) -> Solved:

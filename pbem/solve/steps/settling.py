@@ -1,7 +1,8 @@
 """The rigid motions of bodies that nothing holds, after a step: those that point supports ask for, or none in the mean.
 
 The solution has any of them: the equations know of a free body that its loads balance, and an anchor picks the motion
-whose mean is none but for known fields. Here the one that is wanted is added, which changes no stress.
+whose mean is none on one of its regions, but for known fields. Here the one that is wanted is added, which changes no
+stress.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Complex, Real
+from pbem.contact.anchor import group_motions
 from pbem.contact.laws import OPEN, ModeState
 from pbem.contact.loads import Load
 from pbem.errors import ConvergenceError
@@ -55,7 +57,8 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     """
     mesh, model = problem.mesh, problem.model
     none = {name: np.zeros(2) for name in model.point_supports}
-    if not motions or not (none or load.of_points.any()):
+    composite = _find_composite(problem, motions)
+    if not motions or not (none or load.of_points.any() or composite):
         still = np.zeros(mesh.pairs.count)
         return Settled(np.zeros_like(displacement), still, still, none) if none else None
     placed = place_supports(model.point_supports.values(), motions, model.stages[stage].construction.removed)
@@ -67,6 +70,10 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     moves = np.stack([_split(_move(problem, motion.velocities)[: mesh.nodes]) for motion in motions], axis=1)
     rest = _move(problem, problem.settled_motion)[: mesh.nodes] - load.of_points
     resting = np.linalg.lstsq(functional @ moves, functional @ _split(rest), rcond=None)[0]
+    for group in composite:
+        left = _split(_move(problem, problem.settled_motion) - displacement)[: 2 * mesh.nodes]
+        weight = np.repeat(np.sqrt(_weigh(problem, motions[group[0]].regions)), 2)
+        resting[group] = np.linalg.lstsq(weight[:, None] * moves[:, group], weight * left, rcond=None)[0]
     on_mesh = _see_on_mesh(problem, placed, motions)
     parts = choose_parts(on_mesh, wanted, resting, weigh_turns(motions, _find_middles(problem, motions), model.size))
     moved = sum((part * _move(problem, motion.velocities) for part, motion in zip(parts, motions, strict=True)),
@@ -112,6 +119,35 @@ def refuse_overlap(problem: Problem, modes: ModeState, opening: Real, moved: Rea
             f"{format_point(complex(pairs.position[worst]) + model.origin)}: {ends}")
 
     do_on_first(problem.comm, ConvergenceError, refuse)
+
+
+def _find_composite(problem: Problem, motions: tuple[RigidBodyMode, ...]) -> list[list[int]]:
+    """Numbers of the motions of each body of several regions that moves as a whole, and that nothing else may touch.
+
+    Anchors make the mean motion of one of its regions none, which depends on the axes and the order of the regions.
+    """
+    pairs, of_node = problem.mesh.pairs, problem.mesh.node_region
+    number = {id(motion): at for at, motion in enumerate(motions)}
+    found = []
+    for group in group_motions(motions):
+        regions = set(group[0].regions)
+        whole = len(regions) > 1 and all(
+            set(motion.regions) == regions and len({motion.velocities[name] for name in regions}) == 1
+            for motion in group
+        )
+        if not whole:
+            continue
+        inside = np.isin(problem.mesh.region_names, sorted(regions))[of_node]
+        if (inside[pairs.first] == inside[pairs.second]).all():
+            found.append([number[id(motion)] for motion in group])
+    return found
+
+
+def _weigh(problem: Problem, regions: Sequence[str]) -> Real:
+    """Lengths (nodes,) that belong to the nodes of regions, cracks left out; 0 elsewhere."""
+    mesh = problem.mesh
+    inside = np.isin(mesh.region_names, regions)[mesh.node_region]
+    return np.where(inside & ~mesh.node_crack, mesh.weight, 0.0)
 
 
 def _find_wanted(

@@ -1,0 +1,79 @@
+"""Bodies of several regions that nothing holds: their mean motion is none, whatever the axes and the order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+from pbem.arrays import Complex
+from pbem.results.reader import Results
+
+
+def make_halves(turn: complex, turned_round: bool = False, **more: Any) -> dict[str, Any]:
+    """Two halves of different materials, bonded, each with a part of a crack that a fluid opens."""
+    def line(*corners: complex, elements: int | list[int] = 8) -> dict[str, Any]:
+        placed = np.array(corners) * turn
+        return {"points": [[float(each.real), float(each.imag)] for each in placed], "elements": elements}
+
+    along = np.exp(1.2j)
+    curves = {
+        "seam1": line(-6, 0), "seam2": line(0, 6), "below": line(-6, -6 - 6j, 6 - 6j, 6, elements=[6, 8, 6]),
+        "above": line(6, 6 + 6j, -6 + 6j, -6, elements=[6, 8, 6]), "high": line(0, along), "low": line(0, -0.8 * along),
+    }  # fmt: skip
+    regions = {
+        "lower": {"material": "soft", "boundary": ["seam1", "seam2", "below"], "cracks": ["low"]},
+        "upper": {"material": "stiff", "boundary": ["seam1", "seam2", "above"], "cracks": ["high"]},
+    }
+    return {
+        "materials": {"soft": {"young": 1e3, "poisson": 0.25}, "stiff": {"young": 4e3, "poisson": 0.15}},
+        "curves": curves, "regions": dict(reversed(regions.items())) if turned_round else regions,
+        "interfaces": {name: {"law": "open", "pressure": 1.0} for name in ("low", "high")},
+        "analysis": {"steps": 1}, **more,
+    }  # fmt: skip
+
+
+def measure_mean(results: Results) -> tuple[complex, float]:
+    """The mean displacement along all faces but cracks, and the moment of displacements about their middle."""
+    elements = results.elements
+    length = np.where(elements.crack, 0.0, elements.geometry.lengths)
+    weight = np.outer(length, [5 / 18, 8 / 18, 5 / 18]).ravel()  # elements of order 2 have their nodes at Gauss points
+    places, moved = (each[: len(weight)] @ [1, 1j] for each in (results.nodes.position, results.displacement[-1]))
+    lever = places - weight @ places / weight.sum()
+    return complex(weight @ moved / weight.sum()), float((weight @ (np.conj(1j * lever) * moved)).real / weight.sum())
+
+
+def evaluate(case: dict[str, Any], turn: complex, path: Path) -> tuple[Results, Complex]:
+    """The results, and the displacement at some points as in the body that is not turned."""
+    results = pbem.run(case, path, force=True)
+    points = np.array([1 + 1.3j, 2 - 3j, -4 + 2j, -5 - 1j]) * turn
+    moved = results.evaluate(np.column_stack([points.real, points.imag])).displacement[-1] @ [1, 1j]
+    return results, moved / turn
+
+
+@pytest.mark.parametrize("degrees", [40.0, 90.0, 250.0])
+def test_the_mean_motion_of_a_free_body_of_two_regions_is_none(degrees: float, tmp_path: Path) -> None:
+    """Anchors are for single regions: the body moved by 0.3 of its largest displacement as it was turned."""
+    turn = complex(np.exp(1j * np.radians(degrees)))
+    still, expected = evaluate(make_halves(1 + 0j), 1 + 0j, tmp_path / "still.h5")
+    size = np.abs(still.displacement[-1]).max()
+    for turned_round in (False, True):
+        results, found = evaluate(make_halves(turn, turned_round), turn, tmp_path / "turned.h5")
+        assert np.abs(found - expected).max() < 1e-3 * size
+        mean, moment = measure_mean(results)
+        assert abs(mean) < 1e-9 * size and abs(moment) < 1e-9 * size
+
+
+def test_a_point_support_moves_a_body_of_two_regions_without_stress(tmp_path: Path) -> None:
+    still, expected = evaluate(make_halves(1 + 0j), 1 + 0j, tmp_path / "still.h5")
+    supports = {"one": {"at": [-6.0, -6.0], "ux": 0.0, "uy": 0.0}, "two": {"at": [6.0, -6.0], "uy": 0.0}}
+    held, found = evaluate(make_halves(1 + 0j, point_supports=supports), 1 + 0j, tmp_path / "held.h5")
+    np.testing.assert_allclose(held.traction, still.traction, atol=1e-9)
+    places = np.array([1 + 1.3j, 2 - 3j, -4 + 2j, -5 - 1j])
+    moved = found - expected
+    spin = (moved[1:] - moved[0]) / (places[1:] - places[0])
+    assert np.ptp(spin.imag) + np.ptp(spin.real) < 1e-9 and abs(spin.real).max() < 1e-9
+    np.testing.assert_allclose(held.evaluate([[-6, -6]]).displacement[-1], [[0.0, 0.0]], atol=1e-9)

@@ -10,6 +10,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.parts import find_parts
 from pbem.model.model import Model
 from pbem.results.contents import Balances
+from pbem.results.growing import append_row
 from pbem.results.opening import freeze, read_names
 from pbem.solve.problem.step import Step
 
@@ -36,9 +37,9 @@ def create_balance(file: h5py.File, model: Model, mesh: Mesh) -> None:
 
 def append_balance(file: h5py.File, step: Step) -> None:
     """Add a step's entries, which are not numbers where it tells nothing of its balance."""
-    for name, dataset in file["balance"].items() if "balance" in file else ():
-        dataset.resize(dataset.shape[0] + 1, axis=0)
-        dataset[-1] = np.nan if step.balance is None else getattr(step.balance, name)
+    group = file.get("balance")
+    for name in group if group else ():
+        append_row(group, name, np.nan if step.balance is None else getattr(step.balance, name))
 
 
 def read_balance(file: h5py.File, steps: int) -> Balances | None:

@@ -275,17 +275,5 @@ def create_energy(group: h5py.Group, name: str) -> h5py.Dataset:
     return _create_growing(group, name, (), "f8")
 
 
-def append_row(dataset: h5py.Dataset, row: NDArray[Any]) -> None:
-    """Add one entry along the first axis."""
-    extend(dataset, row[None, ...])
-
-
-def extend(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
-    """Add entries along the first axis."""
-    count = dataset.shape[0]
-    dataset.resize(count + len(rows), axis=0)
-    dataset[count:] = rows
-
-
 def _text(names: Sequence[str]) -> NDArray[Any]:
     return np.array(list(names), dtype=h5py.string_dtype())

@@ -7,6 +7,7 @@ import numpy as np
 
 from pbem.mesh.mesh import Mesh
 from pbem.results.contents import Linearities
+from pbem.results.growing import append_row
 from pbem.results.opening import freeze, read_names
 from pbem.solve.problem.step import Linearity, Step
 from pbem.solve.steps.linearity import describe_nonlinearity
@@ -28,9 +29,9 @@ def create_linearity(file: h5py.File, mesh: Mesh) -> None:
 
 def append_linearity(file: h5py.File, step: Step) -> None:
     """Add a step's entries, which are not numbers where it does not tell them."""
-    for name, dataset in file["linearity"].items() if "linearity" in file else ():
-        dataset.resize(dataset.shape[0] + 1, axis=0)
-        dataset[-1] = np.nan if step.linearity is None else getattr(step.linearity, name)
+    group = file.get("linearity")
+    for name in group if group else ():
+        append_row(group, name, np.nan if step.linearity is None else getattr(step.linearity, name))
 
 
 def read_linearity(file: h5py.File, steps: int) -> Linearities | None:

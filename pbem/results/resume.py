@@ -16,6 +16,7 @@ from pbem.results.absent import fill
 from pbem.results.configuration import find_change, find_other_elements
 from pbem.results.energy import Energy
 from pbem.results.former import read_ahead
+from pbem.results.growing import extend
 from pbem.results.layout import (
     ENERGIES,
     MAY_FOLLOW,
@@ -23,7 +24,6 @@ from pbem.results.layout import (
     TIP_DATASETS,
     count_steps,
     create_energy,
-    extend,
     find_growing,
     join_pairs,
     list_pair_datasets,

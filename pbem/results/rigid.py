@@ -12,6 +12,7 @@ from pbem.arrays import Complex, Real
 from pbem.mesh.mesh import Faces
 from pbem.model.model import Model
 from pbem.model.rigid_body import FORCES, MOTIONS, RigidBody, find_reference, unit_motions
+from pbem.results.growing import append_row
 from pbem.results.opening import freeze, read_names
 
 # Unknown moments and rotations of a single point are told apart from nothing below this part.
@@ -84,9 +85,7 @@ def append_rigid(
     for name, body in model.rigid.items():
         values = measure_rigid(model, body, curve_names, faces, displacement, traction)
         for kind, row in zip(("force", "motion"), values, strict=True):
-            dataset = file["rigid"][name][kind]
-            dataset.resize(dataset.shape[0] + 1, axis=0)
-            dataset[-1] = row
+            append_row(file["rigid"][name], kind, row)
 
 
 def read_rigid(file: h5py.File, steps: int) -> dict[str, RigidMotion]:

@@ -24,15 +24,14 @@ from pbem.results.balance import append_balance
 from pbem.results.coverage import describe_sparse_contacts
 from pbem.results.energy import Energy, EnergyBalance
 from pbem.results.former import read_former, write_former
+from pbem.results.growing import append_row, extend
 from pbem.results.layout import (
     ENERGIES,
     ITERATION,
     MAY_FOLLOW,
     SHOWN,
     STEP_DATASETS,
-    append_row,
     count_steps,
-    extend,
     join_pairs,
     list_pair_datasets,
     name_stages,
@@ -225,38 +224,42 @@ class ResultWriter:
             hoop_stress = np.where(gone, np.nan, hoop_stress)
             tips = self._absence.blank_tips(step.stage, self.tip_rules.cracks, tips)
             step = self._absence.blank(step)
-        append_row(file["fields/hoop_stress"], hoop_stress)
+        fields = file["fields"]
+        append_row(fields, "hoop_stress", hoop_stress)
         if "interior" in file:
             count = len(self._model.interior_points)
             none = InteriorValues(np.full(count, complex(np.nan, np.nan)), np.full((count, 3), np.nan))
             interior = step.interior or none
-            append_row(file["interior/displacement"], to_columns(interior.displacement))
-            append_row(file["interior/stress"], interior.stress)
-        append_row(file["fields/displacement"], to_columns(step.displacement))
-        append_row(file["fields/traction"], to_columns(step.traction))
+            append_row(file["interior"], "displacement", to_columns(interior.displacement))
+            append_row(file["interior"], "stress", interior.stress)
+        append_row(fields, "displacement", to_columns(step.displacement))
+        append_row(fields, "traction", to_columns(step.traction))
         together = file["all"]
         if self._model.conditions or self._model.point_supports:
             unknown = np.full(2, np.nan)
             supports = [step.support_reactions.get(name, unknown) for name in self._model.point_supports]
             rows = [to_columns(reactions), np.array(supports).reshape(-1, 2)]
-            append_row(together["reactions"], np.concatenate(rows))
+            append_row(together, "reactions", np.concatenate(rows))
         contact = {name: getattr(step.contact, name) for name in SHOWN} | dict(step.contact.internal)
-        for quantity in list_pair_datasets(self._model) if len(self._pairs) else ():
-            append_row(together["contact"][quantity], contact[quantity][self._pairs])
+        of_pairs = together["contact"] if len(self._pairs) else None
+        for quantity in list_pair_datasets(self._model) if of_pairs else ():
+            append_row(of_pairs, quantity, contact[quantity][self._pairs])
         for kind, at_tips in tips.items():
-            append_row(together["tips"][kind], at_tips)
-        for name, dataset in file["estimates"].items():
-            unknown = np.full(dataset.shape[1:], np.nan)
-            append_row(dataset, np.asarray(self._estimates.get(name, unknown)))
+            append_row(together["tips"], kind, at_tips)
+        estimates = file["estimates"]
+        for name in estimates:
+            append_row(estimates, name, self._estimates.get(name, np.nan))
+        energies = file["energy"]
         for kind in ENERGIES:
-            append_row(file["energy"][kind], np.array(getattr(self._energy, kind)))
+            append_row(energies, kind, getattr(self._energy, kind))
         append_balance(file, step)
         append_linearity(file, step)
         append_rigid(file, self._model, self._mesh.curve_names, self._all_faces, step.displacement, step.traction)
         # The steps come last: a reader trusts their number, so that a cut in the middle of this function does no harm.
         values = (step.stage, step.factor, len(step.iterations), step.residual, step.number)
+        steps = file["steps"]
         for quantity, value in zip(STEP_DATASETS, values, strict=True):
-            append_row(file["steps"][quantity], np.array(value))
+            append_row(steps, quantity, value)
 
     def note_missing(self, reason: str) -> None:
         """Say in the file why errors are not estimated."""

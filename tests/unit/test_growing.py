@@ -1,0 +1,48 @@
+"""Entries that are added to datasets are those that h5py itself writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from pbem.results.growing import append_row, extend
+
+COLUMNS = np.dtype([("number", "i4"), ("residual", "f8")])
+
+
+@pytest.mark.parametrize(("shape", "kind", "rows"), [
+    ((), "f8", [1.5, np.nan, 3]),
+    ((), "i1", [np.int64(-2), 100]),
+    ((), "i8", [7, np.int32(8)]),
+    ((3,), "f8", [np.arange(3.0), np.nan, np.arange(3)]),
+    ((2, 3), "f4", [np.arange(6.0).reshape(3, 2).T, np.ones((2, 3))]),
+    ((0,), "f8", [np.zeros(0), np.zeros(0)]),
+    ((), COLUMNS, [np.array((1, 0.5), COLUMNS), np.array((2, 0.25), COLUMNS)]),
+])
+def test_entries_are_those_of_h5py(tmp_path: Path, shape: tuple[int, ...], kind: Any, rows: list[Any]) -> None:
+    with h5py.File(tmp_path / "grown.h5", "w") as file:
+        mine, other = (file.create_dataset(name, (0, *shape), kind, maxshape=(None,) * (1 + len(shape)), chunks=(4, *(
+            max(1, each) for each in shape))) for name in ("mine", "other"))
+        for row in rows:
+            append_row(file, "mine", row)
+            other.resize(len(other) + 1, axis=0)
+            other[-1] = row
+        assert mine.shape == (len(rows), *shape) and mine[()].tobytes() == other[()].tobytes()
+        extend(mine, mine[:2])
+        assert mine[()].tobytes() == np.concatenate([other[()], other[:2]]).tobytes()
+        extend(mine, mine[:0])
+        assert len(mine) == len(rows) + 2
+
+
+def test_entries_of_another_shape_are_refused_and_leave_the_dataset_alone(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "grown.h5", "w") as file:
+        dataset = file.create_dataset("mine", (0, 3), "f8", maxshape=(None, 3))
+        with pytest.raises(ValueError, match="found entries of the shape"):
+            extend(dataset, np.zeros((2, 4)))
+        with pytest.raises(ValueError, match="broadcast"):
+            append_row(file, "mine", np.zeros(4))
+        assert dataset.shape == (0, 3)

@@ -15,7 +15,7 @@ from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
-from pbem.results.rates import EndFinder, choose_force_divisor, choose_jump_divisors
+from pbem.results.rates import EndFinder, choose_force_divisor, choose_jump_divisors, list_force_shares
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
@@ -116,6 +116,7 @@ class Comparison:
             self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
             self._ends = EndFinder(mesh, beside)
             self._jump_divisor = choose_jump_divisors(model, beside, self._divisor)
+            self._force_shares = list_force_shares(model, beside, self._divisor)
 
     @cached_property
     def _rules(self) -> TipRules:
@@ -184,7 +185,7 @@ class Comparison:
         """What the two solutions differ by, over the divisors (theory, 77)."""
         by, of_forces = 1.0 / self._divisor, 1.0
         if self._divisor > 1:
-            of_forces = choose_force_divisor(self._model, beside, energy.sum(axis=0) / self._modulus, self._divisor)
+            of_forces = choose_force_divisor(energy.sum(axis=0) / self._modulus, self._force_shares, self._divisor)
         forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
         forces = forces / of_forces
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)

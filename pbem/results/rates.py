@@ -109,24 +109,31 @@ def find_corner_power(turn: float) -> float:
     return low
 
 
-def choose_force_divisor(model: Model, beside: Beside, square: Real, smooth: float) -> float:
+def choose_force_divisor(square: Real, shares: Real | None, smooth: float) -> float:
     """What differences of forces are to be divided by (theory, 126).
 
-    square (e,): of the difference, on the elements of the run's mesh, as its energy over the modulus; `model` is that
-    of the run. The part of it at corners falls by r^FORCE_RATE where the second solution's elements are r times as
-    long. smooth: elsewhere.
+    square (e,): of the difference, on the elements of the run's mesh, as its energy over the modulus. shares: of
+    `list_force_shares`. smooth: away from corners.
     """
     total = float(square.sum())
-    if beside.kind != "merged" or not total > 0:
-        return smooth
+    return smooth if shares is None or not total > 0 else float(total / (square @ shares))
+
+
+def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
+    """Which part of the square of the difference is error (e,), on the elements of the run's mesh, whose model is
+    `model`; None where nothing tells of corners. At them it falls by r^FORCE_RATE where the second solution's elements
+    are r times as long. smooth: what it is divided by elsewhere.
+    """
+    if beside.kind != "merged":
+        return None
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
-    by = np.full(len(square), 1 / smooth)
+    by = np.full(beside.fine.elements, 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
         for element, ratio, _ in at_corner.get(name, ()):
             at = fine[own[element]]
             by[at] = np.maximum(by[at], 1 / (ratio**FORCE_RATE - 1))
-    return float(total / (square @ by))
+    return np.asarray(by)
 
 
 def _list_merged_ends(model: Model, coarser: Model) -> dict[str, list[tuple[int, float, float]]]:

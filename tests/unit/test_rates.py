@@ -23,6 +23,7 @@ from pbem.results.rates import (
     choose_force_divisor,
     choose_jump_divisors,
     find_corner_power,
+    list_force_shares,
 )
 from pbem.solve.estimate.coarser_mesh import Beside, put_beside
 
@@ -104,16 +105,18 @@ def test_differences_at_a_corner_say_more_where_its_elements_were_much_shorter(p
 
 def test_differences_of_forces_are_divided_by_where_they_come_from(plate: Model) -> None:
     beside = put(plate)
-    square = np.zeros(beside.fine.elements)
+    square, shares = np.zeros(beside.fine.elements), list_force_shares(plate, beside, SMOOTH)
     at_corner, between = take_element(plate, beside.fine, "bottom", 0), take_element(plate, beside.fine, "leg", 3)
     square[between] = 2.0
-    assert choose_force_divisor(plate, beside, square, SMOOTH) == pytest.approx(SMOOTH)
+    assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(SMOOTH)
     square[at_corner] = 2.0
     corner = 2**FORCE_RATE - 1
-    assert choose_force_divisor(plate, beside, square, SMOOTH) == pytest.approx(2 / (1 / corner + 1 / SMOOTH))
+    assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(2 / (1 / corner + 1 / SMOOTH))
     square[between] = 0.0
-    assert choose_force_divisor(plate, beside, square, SMOOTH) == pytest.approx(corner)
-    assert choose_force_divisor(plate, beside, np.zeros_like(square), SMOOTH) == SMOOTH
+    assert choose_force_divisor(square, shares, SMOOTH) == pytest.approx(corner)
+    assert choose_force_divisor(np.zeros_like(square), shares, SMOOTH) == SMOOTH
+    assert list_force_shares(plate, replace(beside, kind="lowered"), SMOOTH) is None
+    assert choose_force_divisor(np.ones_like(square), None, SMOOTH) == SMOOTH
 
 
 def take_element(model: Model, mesh: Mesh, name: str, number: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +72,9 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
     }
     finite = [numbers[each.name] for each in model.regions
               if not (each.infinite or each.rigid or each.removed) and len(regions[numbers[each.name]])]
+    around = [(one, numbers[each.name]) for each in model.regions if each.infinite for one in finite]
+    if all(frozenset(pair) in joined for pair in itertools.chain(itertools.combinations(finite, 2), around)):
+        return []  # wherever they are: as in most models, of which this is asked after every step
     corners = [
         (complex(moved[own].real.min(), moved[own].imag.min()), complex(moved[own].real.max(), moved[own].imag.max()))
         for own in (regions[number] for number in finite)
@@ -78,8 +82,7 @@ def _pair_near(model: Model, mesh: Mesh, regions: list[Integer], moved: Complex)
     boxes = Boxes.of_corners(corners)
     at, found = boxes.find_meeting(boxes)
     pairs = {(finite[i], finite[j]) for i, j in zip(at.tolist(), found.tolist(), strict=True) if i != j}
-    pairs |= {(one, numbers[each.name]) for each in model.regions if each.infinite for one in finite}
-    return sorted(pair for pair in pairs if frozenset(pair) not in joined)
+    return sorted(pair for pair in pairs.union(around) if frozenset(pair) not in joined)
 
 
 def _measure_sagitta(mesh: Mesh, region: int) -> float:

@@ -103,6 +103,24 @@ def test_a_run_comes_to_its_limit_load_in_a_few_steps() -> None:
     assert 1 <= len(listener.rejected) <= 4
 
 
+def test_a_body_that_is_free_in_one_search_alone_is_no_limit_load(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Friction bears a push of 0.25, but the first search at half of 0.2 ends with a block that moves freely.
+    solve_step, calls = march.solve_step, []
+
+    def fail_once(*arguments: Any, **keys: Any) -> Any:
+        calls.append(keys)
+        if len(calls) == 2:  # the first is of the stage before
+            raise ConvergenceError("free motion", "as it is made to")
+        return solve_step(*arguments, **keys)
+
+    model = parse_model(write_pushed_block(0.2, {"friction": 0.25}))[1]
+    monkeypatch.setattr(march, "solve_step", fail_once)
+    listener = Listener()
+    steps = list(march.march(assemble_problem(model, generate_mesh(model), world), listener))
+    assert len(listener.rejected) == 1
+    assert {0.5, 1.0} <= {step.factor for step in steps if step.stage == 1}
+
+
 def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: pytest.MonkeyPatch) -> None:
     # What forces could balance is then the whole step, however little it is more than what was reached.
     def fail(*_: object, **__: object) -> None:

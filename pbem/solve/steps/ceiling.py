@@ -36,7 +36,7 @@ class Ceiling:
     def choose(self, reached: float, planned: float, least: float) -> float:
         """The fraction to try next: one that failed is tried again from nearer, and none above it before.
 
-        Free bodies are halved towards, as they are free from everywhere.
+        Free bodies are halved towards, as they mostly are free from everywhere.
         """
         target = min(planned, self.failed)
         if self.free <= target:
@@ -61,6 +61,13 @@ class Ceiling:
         lowest = min(self.balanced, self.free)
         near = NEAR_SLIDING if self.slides < np.inf else NEAR
         return lowest <= target and lowest - reached < max(least, near * lowest)
+
+    def is_found_free(self) -> bool:
+        """Whether the least that cannot be reached is known from a search alone, in which a body came to move freely.
+
+        From a nearer state the search may come to modes that hold it: it is tried from there before that is a limit.
+        """
+        return self.free < self.balanced
 
     def lower(self, target: float, balanced: float, error: ConvergenceError) -> Ceiling:
         """With a try that failed; balanced: up to the target, which it is if all of it may be in balance."""

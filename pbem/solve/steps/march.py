@@ -169,8 +169,10 @@ def _advance(
         attempt = replace(attempt, ceiling=ceiling)
     if attempt.target is None and ceiling.error is not None:
         if ceiling.is_reached(reached, planned, least):
-            raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
-        if course.former is not None and ceiling.is_sliding(reached, planned, least):
+            if not ceiling.is_found_free():
+                raise end_at_limit(problem, stage, reached, ceiling, ceiling.error)
+            attempt = attempt.aim(ceiling.free)  # that was found from further below
+        elif course.former is not None and ceiling.is_sliding(reached, planned, least):
             raise end_by_sliding(
                 problem, memory, course.former, stage, reached, ceiling.slides, course.traction_s)
     attempt = attempt.aim(ceiling.choose(reached, planned, least))

@@ -52,7 +52,7 @@ from pbem.mesh.generate import generate_mesh
 from pbem.parallel import abort_if_unexpected, world
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.system.assembly import assemble_problem
-from pbem.solve.system.choice import HierarchicalSystem
+from pbem.solve.system.hierarchical import HierarchicalSystem
 from pbem.solve.system import assembly
 from scripts.counted import CountedComm
 
@@ -138,6 +138,7 @@ def test_products_are_the_same_and_little_is_sent(
         received[name] = max(counted["Irecv"][1] for counted in told["counted"])
         # Bodies and the plane around them lie on several ranks: what is rigid of them is added up.
         assert name.startswith(("field", "infinite")) or all("Allreduce" in each for each in told["counted"]), name
-    # What is near to the border between ranks grows like the root of a model's size.
+    # What is near to the border between ranks grows like the root of a model's size, but that few cracks of the small
+    # model lie there.
     small, large = (received[f"field_{count}"] for count in COUNTS)
-    assert small < large < 0.75 * COUNTS[1] / COUNTS[0] * small
+    assert small < large < 0.8 * COUNTS[1] / COUNTS[0] * small

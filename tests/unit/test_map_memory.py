@@ -61,6 +61,5 @@ def test_unknowns_are_carried_over_some_pairs_at_a_time(
     whole = carry_over(state, after, SCALE)
     # What a pair's mode keeps it keeps exactly: back and forth in the same modes nothing changes.
     assert np.allclose(carry_over(state, before, SCALE), unknowns, rtol=1e-9, atol=1e-9)
-    monkeypatch.setattr(contact_modes, "SOLVED", 7)
-    assert mesh.pairs.count % 7
+    monkeypatch.setattr(contact_modes, "SOLVED", mesh.pairs.count // 2 - 1)  # the third part is small
     assert np.array_equal(carry_over(state, after, SCALE), whole)

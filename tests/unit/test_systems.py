@@ -24,9 +24,13 @@ from pbem.solve.estimate.coarser_mesh import put_beside
 from pbem.solve.problem.problem import Problem, System
 from pbem.solve.problem.tangent import TangentOperator
 from pbem.solve.system.assembly import assemble_problem
-from pbem.solve.system.choice import SYSTEMS, choose_system
+from pbem.solve.system.choice import choose_system
+from pbem.solve.system.dense import DenseSystem
+from pbem.solve.system.hierarchical import HierarchicalSystem
 
 Real = NDArray[np.float64]
+
+SYSTEMS = {"dense": DenseSystem, "hierarchical": HierarchicalSystem}
 
 # Two blocks on each other, the lower one with a crack.
 TEXT = """

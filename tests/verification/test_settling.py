@@ -212,7 +212,7 @@ cohesion_lost = {str(lost).lower()}
 
 
 def test_cohesion_without_admissible_modes_is_named_and_the_advice_works() -> None:
-    with pytest.raises(ConvergenceError, match=r"of these 5: on crack_1 at .*cohesion_lost = true") as caught:
+    with pytest.raises(ConvergenceError, match=r"of these 6: on crack_1 at .*cohesion_lost = true") as caught:
         run(write_cohesive_field(False))
     assert caught.value.reason == "no admissible modes"
     (step,) = run(write_cohesive_field(True))

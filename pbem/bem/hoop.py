@@ -156,12 +156,43 @@ def _find_smooth_joints(mesh: Mesh) -> Integer:
 
 
 def _difference_neighbours(mesh: Mesh, values: Complex) -> Complex:
-    """Differences along chains of elements of the same curve, of second order inside of them."""
-    follows = (mesh.start[1:] == mesh.end[:-1]) & (mesh.region[1:] == mesh.region[:-1])
-    follows &= mesh.curve[1:] == mesh.curve[:-1]
+    """Differences along chains of elements that go on smoothly, of second order inside of them; an element that is
+    alone between two corners has those to its neighbours on the same curve."""
+    connected = (mesh.start[1:] == mesh.end[:-1]) & (mesh.region[1:] == mesh.region[:-1])
+    connected &= mesh.curve[1:] == mesh.curve[:-1]
+    length = mesh.geometry.lengths
     result = np.zeros_like(values)
-    for chain in np.split(np.arange(mesh.elements), np.flatnonzero(~follows) + 1):
+    for chain in np.split(np.arange(mesh.elements), np.flatnonzero(~connected) + 1):
         if len(chain) > 1:
-            length = mesh.weight[chain]
-            result[chain] = np.gradient(values[chain], np.cumsum(length) - 0.5 * length)
+            result[chain] = _difference_chain(length[chain], values[chain])
+    for chain, closed in _chain_up(_find_smooth_joints(mesh)):
+        if closed:
+            around = np.concatenate([chain[-1:], chain, chain[:1]])
+            result[chain] = _difference_chain(length[around], values[around])[1:-1]
+        elif len(chain) > 1:
+            result[chain] = _difference_chain(length[chain], values[chain])
     return result
+
+
+def _difference_chain(length: Real, values: Complex) -> Complex:
+    """Derivatives at the middles of elements in a row, two at least: of parabolas through three, outside of straight
+    lines."""
+    return np.asarray(np.gradient(values, np.cumsum(length) - 0.5 * length))
+
+
+def _chain_up(following: Integer) -> list[tuple[Integer, bool]]:
+    """Chains of elements that follow each other, and whether the last one is followed by the first. following (e,): the
+    next one of each, or -1."""
+    first = np.ones(len(following), dtype=bool)
+    first[following[following >= 0]] = False
+    seen = np.zeros(len(following), dtype=bool)
+    chains = []
+    for begin in np.concatenate([np.flatnonzero(first), np.arange(len(following))]):
+        chain, at = [], int(begin)
+        while at >= 0 and not seen[at]:
+            seen[at] = True
+            chain.append(at)
+            at = int(following[at])
+        if chain:
+            chains.append((np.array(chain), at == begin))
+    return chains

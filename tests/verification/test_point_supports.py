@@ -195,3 +195,41 @@ def test_what_fluid_in_a_gap_does_as_supports_move_a_block(tmp_path: Path) -> No
     energy = pbem.run(case, tmp_path / "fluid.h5").energy
     np.testing.assert_allclose(energy.external, energy.elastic, rtol=1e-3)
     np.testing.assert_allclose(energy.elastic, energy.elastic[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 77.0])
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_supports_move_a_body_along_the_face_that_it_touches(degrees: float, unit: float, tmp_path: Path) -> None:
+    """Lifted off and put back further along: nothing but rounding is left of the opening, which is no overlap."""
+    turn = complex(np.exp(1j * np.radians(degrees))) * unit
+
+    def place(*corners: complex) -> dict[str, Any]:
+        points = [[float((turn * each).real), float((turn * each).imag)] for each in corners]
+        return {"points": points, "elements": [4] * (len(corners) - 1)}
+
+    away = 0.05 + 0.02j
+    held = {"one": ("ux", "uy"), "other": ("uy" if degrees < 45 else "ux",)}
+    places = {"one": turn * (1 + 2j), "other": turn * (2 + 2j)}
+    results = pbem.run({
+        "materials": {"m": {"young": YOUNG, "poisson": POISSON}},
+        "curves": {
+            "bottom": place(0, 3), "right": place(3, 3 + 1j, 2 + 1j), "seat": place(1 + 1j, 2 + 1j),
+            "left": place(1 + 1j, 1j, 0), "around": place(2 + 1j, 2 + 2j, 1 + 2j, 1 + 1j),
+        },
+        "regions": {"base": {"material": "m", "boundary": ["bottom", "right", "seat", "left"]},
+                    "block": {"material": "m", "boundary": ["seat", "around"]}},
+        "interfaces": {"seat": {"law": "coulomb", "friction": 0.4}},
+        "boundary": {"bottom": {"ux": 0.0, "uy": 0.0}},
+        "point_supports": {name: {"at": [places[name].real, places[name].imag], **dict.fromkeys(axes, 0.0)}
+                           for name, axes in held.items()},
+        "stages": [
+            {"steps": 1, **more, "point_supports": {
+                name: {axis: (turn * z).real if axis == "ux" else (turn * z).imag for axis in axes}
+                for name, axes in held.items()}}
+            for z, more in ((away, {"open": ["seat"]}), (away.real, {"release": ["seat"]}))
+        ],
+    }, tmp_path / "along.h5")  # fmt: skip
+    seat = results.contact["seat"]
+    np.testing.assert_allclose(seat.opening, np.outer([0.02 * unit, 0.0], np.ones(seat.opening.shape[1])),
+                               atol=1e-12 * unit)
+    np.testing.assert_allclose(np.abs(seat.slip), 0.05 * unit, rtol=1e-9)

@@ -49,9 +49,9 @@ def describe_step(
     reactions: dict[str, Real] = {}
     settled = settle(problem, load, everywhere, traction, stage, factor, free.motions if free.unheld is None else ())
     if settled is not None:
-        everywhere, reactions = everywhere + settled.displacement, settled.reactions
         pairs = replace(pairs, g_n=pairs.g_n + settled.opening, g_s=pairs.g_s + settled.slip)
-        refuse_overlap(problem, solution.modes, pairs.g_n, settled.opening, stage)
+        refuse_overlap(problem, solution.modes, pairs.g_n, settled, float(np.abs(everywhere).max()), stage)
+        everywhere, reactions = everywhere + settled.displacement, settled.reactions
         memory = commit(problem.laws, solution.memory, solution.modes, pairs, solution.pressure)
     shown = pairs if problem.arrangement is None else problem.arrangement.blank(pairs)
     step = Step(

@@ -33,7 +33,7 @@ from pbem.model.support_motions import (
 from pbem.parallel import do_on_first
 from pbem.solve.problem.problem import Problem
 
-# Faces that lie in each other by less than this part of the way that bodies were moved touch.
+# Faces that lie in each other by less than this part of the largest displacement touch.
 ROUNDING = 1e-9
 
 
@@ -93,19 +93,24 @@ def settle(problem: Problem, load: Load, displacement: Complex, traction: Comple
     return Settled(moved, *_move_pairs(problem, motions, parts), reactions)
 
 
-def refuse_overlap(problem: Problem, modes: ModeState, opening: Real, moved: Real, stage: int) -> None:
+def refuse_overlap(problem: Problem, modes: ModeState, opening: Real, settled: Settled, largest: float,
+                   stage: int) -> None:
     """Raise ConvergenceError ("overlap") where bodies have been moved into each other as a whole.
 
-    opening (m,): of the pairs; moved (m,): what of it the motion has added. Told by the first rank for all. Contact has
-    been found without the motion: where it is to hold the body, other motions are free (theory, 102).
+    opening (m,): of the pairs, with what the motion has added; largest: displacement without it. Told by the first rank
+    for all. Contact has been found without the motion: where it is to hold the body, other motions are free (theory,
+    102).
     """
+    moved = settled.opening
+
     def refuse() -> None:
         apart = (modes.mode == OPEN) & ~problem.laws.parted & (moved < 0)
         if problem.arrangement is not None:
             apart &= ~problem.arrangement.bared
         depth = np.where(apart, np.minimum(-opening, -moved), 0.0)
         worst = int(np.argmax(depth)) if len(depth) else 0
-        if not len(depth) or depth[worst] <= ROUNDING * np.abs(moved).max():
+        # Bodies may also move along each other: of their openings only the rounding of that changes.
+        if not len(depth) or depth[worst] <= ROUNDING * max(largest, float(np.abs(settled.displacement).max())):
             return
         pairs, mesh, model = problem.mesh.pairs, problem.mesh, problem.model
         moves, ends = "the motion of bodies that nothing holds, none in the mean, moves", "hold them by point supports"

@@ -48,7 +48,7 @@ SHARP, LEAST_AT_TURN = math.radians(60.0) * (1 - TIE), 4
 SHARP_BESIDE_WING, WING = math.radians(10.0) * (1 - TIE), 0.2 * (1 - TIE)
 # The angle between its legs (radians) below which lengths fall more slowly, and to a shorter last bit: K of a wing that
 # the other leg shields was off by 0.3 % at order 3 and 34 to 45 degrees with that of other corners (0.1 % with this).
-SHARPER, SHARPER_BIT = math.radians(80.0), 0.2
+SHARPER, SHARPER_BIT = math.radians(80.0) * (1 - TIE), 0.2
 # Constant and linear elements fall with this power of the angle there, in place of 1: K was off by 0.5 to 1 % on any
 # number of elements elsewhere. LEAST_GROWTH bounds their number.
 LINEAR_FOLD, LEAST_GROWTH = 4, 0.06

@@ -23,10 +23,12 @@ plane = {{ material = "rock", infinite = true, cracks = [{names}] }}
 [remote]
 syy = -1.0
 sxy = 0.5
+[analysis]
+order = {order}
 """
 
 
-def build(scale: float = 1.0, **curves: str) -> Model:
+def build(scale: float = 1.0, order: int = 2, **curves: str) -> Model:
     """A plane with cracks: points as text, multiplied by a scale, with further keys."""
     lines = []
     for name, text in curves.items():
@@ -34,7 +36,7 @@ def build(scale: float = 1.0, **curves: str) -> Model:
         scaled = [[float(part) * scale for part in point.split(",")] for point in points.split()]
         lines.append(f"{name} = {{ points = {scaled}, {keys} }}")
     names = ", ".join(f'"{name}"' for name in curves)
-    return parse_model(PLANE.format(curves="\n".join(lines), names=names))[1]
+    return parse_model(PLANE.format(curves="\n".join(lines), names=names, order=order))[1]
 
 
 def lengths(model: Model, name: str) -> np.ndarray:
@@ -196,6 +198,23 @@ def test_lengths_fall_geometrically_where_a_crack_turns_sharply(scale: float) ->
     assert (long[1:] <= 2 * from_corner).all() and len(long) > 8
     # Three elements a leg are too coarse for that to matter.
     assert len(measure(turn("0.1,0.3", "elements = [3, 3]"))[1]) == 3
+
+
+@pytest.mark.parametrize("enclosed", [80.0, 120.0])
+@pytest.mark.parametrize("order", [1, 2])
+def test_meshes_of_cracks_that_turn_by_round_angles_do_not_depend_on_their_direction(
+    enclosed: float, order: int
+) -> None:
+    """The angle between legs is known but for rounding, which is another one as the crack is turned and moved."""
+    legs = np.array([-1.0, 0.0, 0.3 * np.exp(1j * math.radians(180 - enclosed))]) + 3 + 2j
+    found = []
+    for turn in np.exp(1j * np.radians(np.arange(0, 360, 15))):
+        points = " ".join(f"{point.real!r},{point.imag!r}" for point in (legs * turn).tolist())
+        text = f"{points}; elements = [8, 8]"
+        found.append(lengths(build(order=order, crack=text), "crack"))
+    assert len({len(each) for each in found}) == 1
+    for each in found:
+        np.testing.assert_allclose(each, found[0], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("last", "refined"), [

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.solve.estimate import second_solution
 
 YOUNG, POISSON = 3e3, 0.2
 PULL = 100.0
@@ -233,3 +234,19 @@ def test_supports_move_a_body_along_the_face_that_it_touches(degrees: float, uni
     np.testing.assert_allclose(seat.opening, np.outer([0.02 * unit, 0.0], np.ones(seat.opening.shape[1])),
                                atol=1e-12 * unit)
     np.testing.assert_allclose(np.abs(seat.slip), 0.05 * unit, rtol=1e-9)
+
+
+def test_a_second_solution_that_overlaps_goes_on_from_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The faces that are closed next are closed where the run has them, so that nothing differs."""
+    describe_step = second_solution.describe_step
+
+    def refuse(*arguments: Any) -> Any:
+        if arguments[3] == 2:  # the last step before the faces are closed
+            raise pbem.ConvergenceError("overlap", "as it is made to")
+        return describe_step(*arguments)
+
+    monkeypatch.setattr(second_solution, "describe_step", refuse)
+    results = pbem.run(make_hovering_block(1.0, {"close": ["seat"]}), tmp_path / "weld.h5")
+    assert "overlap" in results.errors.missing
+    assert np.isnan(results.errors.relative["displacement"][1])
+    assert results.errors.relative["displacement"][2] < 1e-9

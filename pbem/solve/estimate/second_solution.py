@@ -93,15 +93,13 @@ class SecondSolution:
         load = self.problem.evaluate_load(step.stage, step.factor)
         try:
             solution = self._solve(step, load)
+            memory = commit(self.problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
+            self._watch.check()
+            found, self.memory = describe_step(self.problem, solution, memory, step.number, step.stage, step.factor)
         except ConvergenceError:
             self._watch.check()  # a law that failed has answered with no strength
             self._take_over(step.contact)
             raise
-        self.memory = commit(
-            self.problem.laws, solution.memory, solution.modes, solution.pairs, solution.pressure)
-        self._watch.check()
-        found, self.memory = describe_step(
-            self.problem, solution, self.memory, step.number, step.stage, step.factor)
         self._contact = found.contact
         return found
 

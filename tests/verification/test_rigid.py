@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+import pbem
 from pbem.contact.approach import approach_pairs
 from pbem.contact.laws import collect_laws
 from pbem.mesh.mesh import list_faces
@@ -192,3 +195,25 @@ def test_pressures_of_a_pin_in_its_clearance(
     assert error.max() < 8e-2
     assert np.abs(pressure.found_mean - pressure.exact_mean).max() < 1e-2
     assert pressure.at_end.sum() <= 6 and pressure.exact_mean.max() > 0.95
+
+
+def test_parts_of_a_force_grow_each_by_itself(tmp_path: Path) -> None:
+    """A part by an expression of t has its own value at every time, numbers grow linearly: statics at every step."""
+    points = [[0, 0], [1, 0], [1, 1], [0, 1]]
+    names = ["bottom", "right", "top", "left"]
+    curves = {name: {"points": [points[k], points[(k + 1) % 4]], "elements": 8} for k, name in enumerate(names)}
+
+    def react(force: dict[str, Any], stages: list[dict[str, Any]]) -> Real:
+        boundary = {"bottom": {"ux": 0.0, "uy": 0.0}, "top": {"force": {"how": "linear", **force}}}
+        return np.asarray(pbem.run({
+            "materials": {"m": {"young": 1000.0, "poisson": 0.2}}, "curves": curves,
+            "regions": {"block": {"material": "m", "boundary": names}}, "boundary": boundary,
+            "stages": [{"steps": 2, "boundary": {"top": {"force": each}}} if each else {"steps": 2} for each in stages],
+        }, tmp_path / "block.h5", force=True).reactions["bottom"])
+
+    push = {"expression": "4*t**2"}
+    found = react({"fx": push, "fy": -1.0, "moment": 0.3}, [{}, {"fy": -3.0}, {"fx": 10.0}])
+    along, up = [1.0, 4.0, 9.0, 16.0, 13.0, 10.0], [-0.5, -1.0, -2.0, -3.0, -3.0, -3.0]
+    np.testing.assert_allclose(found, -np.stack([along, up], axis=1), atol=2e-3 * 16)
+    found = react({"fx": 1.0, "fy": -1.0}, [{}, {"fx": push, "fy": -3.0}])
+    np.testing.assert_allclose(found, -np.array([[0.5, -0.5], [1, -1], [9, -2], [16, -3]]), atol=2e-3 * 16)

@@ -1,21 +1,24 @@
-"""Forces that no value is given for, on curves and at points, checked on the file's own tables."""
+"""Forces that no value is given for, on curves and at points, and resultants of several curves at once, checked on the
+file's own tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from pbem.description.families import find_families
 from pbem.description.finding import Finding
 from pbem.errors import KeyPath
+from pbem.wording import list_names
 
 # What a table of a force says besides its values.
 BESIDES = {"about", "how", "at"}
 
 
 def check_resultants(raw: Mapping[str, Any]) -> list[Finding]:
-    """A fault for every force, on a curve or at a point, without a value in its table and in all stages; and for a
-    point that nothing is about."""
-    findings: list[Finding] = []
+    """A fault for every force, on a curve or at a point, without a value in its table and in all stages; for a point
+    that nothing is about; and for a resultant by the name of a line, which is several curves."""
+    findings = [*_check_lines(raw)]
     for loc, table in _list_forces(raw):
         uniform = table.get("how", "uniform") == "uniform"
         point = loc[0] == "point_loads"
@@ -27,6 +30,27 @@ def check_resultants(raw: Mapping[str, Any]) -> list[Finding]:
             findings.append(Finding((*loc, "about"), 'a point of the moment with how = "uniform"', 'how = "linear", or '
                                     "no such point: a uniform traction has the moment of its force"))
     return findings
+
+
+def _check_lines(raw: Mapping[str, Any]) -> Iterator[Finding]:
+    """Conditions by the name of a line hold for each of its curves, which would have the whole of a force each."""
+    stages = raw.get("stages")
+    tables: list[tuple[KeyPath, Mapping[str, Any]]] = [(("boundary",), _read(raw, "boundary"))]
+    tables += [(("stages", number, "boundary"), _read(stage, "boundary"))
+               for number, stage in enumerate(stages if isinstance(stages, list) else [])]
+    for loc, conditions in tables:
+        wanted = [name for name, table in conditions.items() if isinstance(table, dict)
+                  and any(key in table for key in ("force", "rigid"))]
+        for name, curves in find_families(wanted, _read(raw, "curves")).items():
+            for key in ("force", "rigid") if len(curves) > 1 else ():
+                if key in conditions[name]:
+                    quoted = [f"'{curve}'" for curve in curves]
+                    expected = {
+                        "force": f"a force on each of {list_names(quoted)}, or tractions (tx, ty), which are per area",
+                        "rigid": f"rigid on {quoted[0]}, which has the others in its key `curves`",
+                    }[key]
+                    found = f"{key} on '{name}', a line of {len(curves)} curves"
+                    yield Finding((*loc, name, key), found, expected)
 
 
 def _list_forces(raw: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Mapping[str, Any]]]:

@@ -141,3 +141,24 @@ point_supports.left = { at = [-0.25, 0.0], ux = 0.0, uy = 0.0 }
 """
     faults = find_faults(text)
     assert len(faults) == 1 and "'pin'" in str(faults[0])
+
+
+@pytest.mark.parametrize("stage", [False, True], ids=["at once", "in a stage"])
+@pytest.mark.parametrize(("key", "table"), [("force", "{ fy = -1.0 }"), ("rigid", "{ fy = -1.0, ux = 0.0 }")])
+def test_a_resultant_of_a_line_of_several_curves_is_refused(key: str, table: str, stage: bool) -> None:
+    """Each of its curves had the whole force, and moved by itself where it was rigid."""
+    line = """
+"left1.1" = { points = [[0, 2], [0, 1.5]], elements = 2 }
+"left1.2" = { points = [[0, 1.5], [0, 1]], elements = 2 }
+"""
+    case = BLOCKS.replace("left1 = { points = [[0, 2], [0, 1]], elements = 3 }", line)
+    case = case.replace('"head", "left1"]', '"head", "left1.1", "left1.2"]')
+    parse_model(case + '[boundary.left1]\nty = -1.0')
+    parse_model(case + f'[boundary."left1.1"]\n{key} = {table}')
+    own = "".join(f'[boundary."left1.{number}"]\n{key} = {table}\n' for number in (1, 2)) if stage else ""
+    place = "stages.boundary.left1" if stage else "boundary.left1"
+    with pytest.raises(CaseError) as raised:
+        parse_model(case + own + ("[[stages]]\n" if stage else "") + f"[{place}]\n{key} = {table}")
+    (fault,) = raised.value.faults
+    assert str(fault).startswith(("stages[1]." if stage else "") + f"boundary.left1.{key} (line")
+    assert f"{key} on 'left1', a line of 2 curves" in str(fault)

@@ -40,7 +40,7 @@ WITHOUT_EFFECT: dict[Kind, tuple[str, ...]] = {
                *_FURTHER),
     "open": (*_FRICTION, "tensile_strength", "cohesion_lost", *_WEAKENING, *_DILATION, *_JOINT, *_FILE, *_FURTHER),
     "coulomb": (*_FILE, *_FURTHER),
-    "frictionless": (*_DILATION, *_FILE, *_FURTHER),
+    "frictionless": (*_FRICTION, *_WEAKENING, *_DILATION, *_FILE, *_FURTHER),
     "rate_and_state": (
         "cohesion", "tensile_strength", "cohesion_lost", "friction_dynamic", *_DILATION, *_FILE, *_COHESIVE, *_ROUGH,
     ),
@@ -63,8 +63,7 @@ def combine_laws(family: LawTable, own: LawTable) -> LawTable:
     keys: dict[str, Any] = {key: getattr(family, key) for key in fields if key in family.model_fields_set}
     named = {key: getattr(own, key) for key in fields if key in own.model_fields_set}
     if own.law is not None and "law" in named:
-        smooth = (*_FRICTION, *_WEAKENING, *_DILATION) if own.law == "frictionless" else ()
-        for key in (*WITHOUT_EFFECT[own.law], *smooth):
+        for key in WITHOUT_EFFECT[own.law]:
             keys.pop(key, None)
         if own.law != family.law and (own.law in NEEDED or family.law in NEEDED):
             keys.pop("slip_distance", None)  # of another law it is another one

@@ -41,6 +41,20 @@ def test_a_fault_of_a_piece_is_told_where_it_stands() -> None:
     assert {fault.place for fault in caught.value.faults} == {"interfaces.t12.tensile_strength"}
 
 
+@pytest.mark.parametrize("own", [{"friction": 0.6}, {"friction_angle": 31.0}, {"cohesion": 0.5},
+                                 {"friction": {"expression": "0.1 + s"}}])  # fmt: skip
+def test_friction_of_a_piece_of_a_frictionless_trace_is_refused(own: dict[str, Any]) -> None:
+    """The piece kept the law of the trace, and its friction had no effect."""
+    (key,) = own
+    with pytest.raises(CaseError) as caught:
+        build_model(make(interfaces={"t12": {"law": "frictionless"}, "t12.2": own}))
+    assert [fault.place for fault in caught.value.faults] == [f'interfaces."t12.2".{key}']
+    law = build_model(make(interfaces={"t12": {"law": "frictionless"}, "t12.2": {"law": "coulomb", **own}}))
+    assert law.interfaces["t12.2"].law.friction or law.interfaces["t12.2"].law.cohesion
+    smooth = build_model(make(interfaces={"t12": {"law": "coulomb", **own}, "t12.2": {"law": "frictionless"}}))
+    assert smooth.interfaces["t12.2"].law.friction == smooth.interfaces["t12.2"].law.cohesion == 0.0
+
+
 def test_a_trace_without_pieces_is_unknown() -> None:
     with pytest.raises(CaseError, match=r"interfaces\.t13: found unknown interface or crack 't13'"):
         build_model(make(interfaces={"t13": {"friction": 0.5}}))

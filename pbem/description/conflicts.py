@@ -35,7 +35,7 @@ def find_conflicts(raw: Mapping[str, Any]) -> list[Finding]:
         findings += _check_condition(loc, table)
     for name in ("interfaces", "contacts"):
         for loc, table in _tables(raw, (name,)):
-            findings += _check_law(loc, table)
+            findings += _check_law(loc, table, _find_shared_law(raw, str(loc[-1])) if name == "interfaces" else {})
     for loc, table in _tables(raw, ("tools",)):
         findings += _check_rigid(loc, table)
     findings += check_resultants(raw)
@@ -200,15 +200,35 @@ def _check_spring(loc: KeyPath, table: Mapping[str, Any], in_axes: Sequence[str]
     return findings
 
 
-def _check_law(loc: KeyPath, table: Mapping[str, Any]) -> list[Finding]:
+def _find_shared_law(raw: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """The table of the law of all pieces of a trace, or of all that a table [[generate]] makes, of which a name is one:
+    its own table changes single keys of it."""
+    trace, _, number = name.rpartition(".")
+    table = raw["interfaces"].get(trace)
+    if number.isdecimal() and isinstance(table, dict):
+        return table
+    group, _, number = name.rpartition("_")
+    made = raw.get("generate")
+    for table in made if number.isdecimal() and isinstance(made, list) else ():
+        if isinstance(table, dict) and table.get("name") == group:
+            return table
+    return {}
+
+
+def _check_law(loc: KeyPath, table: Mapping[str, Any], shared: Mapping[str, Any] | None = None) -> list[Finding]:
+    """shared: the law that the table changes single keys of."""
     findings = []
     if "friction" in table and "friction_angle" in table:
         findings.append(Finding((*loc, "friction_angle"), "both friction and friction_angle", "only one of them"))
-    further = table.get("law") in list(NEEDED) or any(key in table for keys in OWN_KEYS.values() for key in keys)
-    weakens = table.get("law") != "frictionless" and not further
-    if weakens and ("friction_dynamic" in table) != ("slip_distance" in table):
-        given = "friction_dynamic" if "friction_dynamic" in table else "slip_distance"
-        findings.append(Finding((*loc, given), f"only {given}", "friction_dynamic and slip_distance together"))
+    whole = {**(shared or {}), **table}
+    laws = [each.get("law") for each in (shared or {}, table)]
+    if "law" in table and laws[0] != laws[1] and any(law in list(NEEDED) for law in laws):
+        whole = dict(table)  # nothing of another law weakens this one
+    further = whole.get("law") in list(NEEDED) or any(key in whole for keys in OWN_KEYS.values() for key in keys)
+    weakens = whole.get("law") != "frictionless" and not further
+    given = [key for key in ("friction_dynamic", "slip_distance") if key in table]
+    if weakens and given and ("friction_dynamic" in whole) != ("slip_distance" in whole):
+        findings.append(Finding((*loc, given[0]), f"only {given[0]}", "friction_dynamic and slip_distance together"))
     if table.get("law") == "frictionless":
         findings += [
             Finding((*loc, key), f"{key} = {show(table[key])} with law \"frictionless\"", 'law = "coulomb", or 0')

@@ -55,6 +55,24 @@ def test_friction_of_a_piece_of_a_frictionless_trace_is_refused(own: dict[str, A
     assert smooth.interfaces["t12.2"].law.friction == smooth.interfaces["t12.2"].law.cohesion == 0.0
 
 
+def test_a_piece_may_change_one_of_two_keys_that_go_together() -> None:
+    """Its table was refused as one that has one of them alone."""
+    weak = {"friction": 0.6, "friction_dynamic": 0.3, "slip_distance": 1e-3}
+    laws = build_model(make(interfaces={
+        "t12": weak, "t12.1": {"friction_dynamic": 0.2}, "t12.2": {"slip_distance": 2e-3}})).interfaces
+    found = [(laws[f"t12.{k}"].law.friction_dynamic, laws[f"t12.{k}"].law.slip_distance) for k in (1, 2, 10)]
+    assert found == [(0.2, 1e-3), (0.3, 2e-3), (0.3, 1e-3)]
+    with pytest.raises(CaseError, match=r'interfaces\."t12\.1"\.friction_dynamic: found only friction_dynamic'):
+        build_model(make(interfaces={"t12": {"friction": 0.6}, "t12.1": {"friction_dynamic": 0.2}}))
+    case = Case(
+        materials={"rock": {"young": 100.0, "poisson": 0.2}}, regions={"plane": {"material": "rock", "infinite": True}},
+        generate=[{"kind": "cracks", "name": "slip", "region": "plane", "count": 2, "elements": 4, "half_length": 1.0,
+                   "density": 0.01, "distance": 0.5, **weak}],
+        interfaces={"slip_2": {"friction_dynamic": 0.1}}, remote={"syy": -1.0},
+    )  # fmt: skip
+    assert [build_model(case).interfaces[f"slip_{k}"].law.friction_dynamic for k in (1, 2)] == [0.3, 0.1]
+
+
 def test_a_trace_without_pieces_is_unknown() -> None:
     with pytest.raises(CaseError, match=r"interfaces\.t13: found unknown interface or crack 't13'"):
         build_model(make(interfaces={"t13": {"friction": 0.5}}))

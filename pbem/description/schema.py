@@ -95,7 +95,8 @@ class CurveTable(Table):
     )
     grading: Literal["auto", "start", "end", "both", "none"] = Field(
         "auto",
-        description='refinement towards one end, both ends or none of each leg; `"auto"`: towards corners, changes of '
+        description='refinement towards the start or the end of the curve, towards both ends of each leg, or none; '
+        '`"auto"`: towards corners, changes of '
         "condition or load, ends of contact and junctions, with elements as short as nearby faces require; any other "
         "value is kept, except next to crack tips and where a crack turns",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.rigid_body import find_reference
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
+from pbem.model.sight import OVERLAP, REACH, Obstacles
 from pbem.model.varying import Places, Value, Varying, evaluate, negate
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
@@ -101,6 +102,7 @@ def _sum_tractions(
     Fluid between two regions presses on both; where they are tied along the normal its power cancels.
     """
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
+    touching = {curve for contact in model.contacts.values() for curve in (contact.first, contact.second)}
     for push, turn, about, name in _list_pushes(model, moving, stage, time):
         a, spin = motion.velocities[name]
         drive = (np.conj(push) * (a + 1j * spin * about)).real, turn * spin
@@ -125,8 +127,8 @@ def _sum_tractions(
         scale += float(np.abs(weight) * (np.abs(a) + np.abs(spin * lever)))
         gone = region.name in stage.construction.removed
         for side in (side for loop in region.loops for side in loop.sides):
-            if gone and side.curve in stage.walls:
-                continue  # what acts there acts on the side that is left
+            if side.curve in touching or (gone and side.curve in stage.walls):
+                continue  # fluids in contacts: see below; what acts on walls acts on the side that is left
             condition, values = _find_load(model, stage, side.curve)
             for piece in _divide_side(model.curves, side, values):
                 points = piece.places.point
@@ -137,7 +139,38 @@ def _sum_tractions(
                 moment += float((np.conj(points) * tractions).imag.sum())
                 power += float(rates.sum())
                 scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
+    for name, points, pushes in _list_fluids(model, {region.name for region in moving}, stage, time):
+        a, spin = motion.velocities[name]
+        force += complex(pushes.sum())
+        moment += float((np.conj(points) * pushes).imag.sum())
+        power += float((np.conj(pushes) * (a + 1j * spin * points)).real.sum())
+        scale += float((np.abs(pushes) * np.abs(a + 1j * spin * points)).sum())
     return force, moment, power, scale
+
+
+def _list_fluids(
+    model: Model, moving: Collection[str], stage: Stage, time: float
+) -> Iterator[tuple[str, Complex, Complex]]:
+    """Moving region, points (k,) and forces (k,) of the fluid in its contacts, which presses alike on the parts of both
+    curves that face each other, and on nothing beside."""
+    bounded = find_bounded(model)
+    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
+    for name, contact in model.contacts.items():
+        pressure, owners = stage.pressure.get(name, 0.0), (bounded[contact.first], bounded[contact.second])
+        if not pressure or not set(owners) & set(moving):
+            continue
+        shorter = min(model.curves[contact.first].length, model.curves[contact.second].length)
+        opposite = Obstacles(side_legs(model.curves, sides[contact.second]))
+        for piece in _divide_side(model.curves, sides[contact.first], (pressure, 0.0)):
+            points, normals = piece.places.point, piece.normals
+            seen = opposite.look_along(points, normals, -max(OVERLAP * shorter, REACH * contact.overlap))
+            met = (seen.leg >= 0) & (seen.product < 0)
+            places = replace(piece.places, point=points + model.origin)
+            pushes = (-evaluate(pressure, places, time) * normals * piece.weights)[met]
+            feet = points[met] + seen.distance[met] * normals[met]
+            for owner, at, own in ((owners[0], points[met], pushes), (owners[1], feet, -pushes)):
+                if owner in moving:
+                    yield owner, at, own
 
 
 @dataclass(frozen=True)
@@ -192,8 +225,7 @@ def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple
     wall = stage.walls.get(curve)
     if wall is not None and any(wall.values):
         return Condition(curve, wall.frame), wall.values
-    name = next((name for name, one in model.contacts.items() if curve in (one.first, one.second)), curve)
-    return Condition(curve, "local"), (negate(stage.pressure[name]), 0.0)
+    return Condition(curve, "local"), (negate(stage.pressure[curve]), 0.0)
 
 
 def _tractions(

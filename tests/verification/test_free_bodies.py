@@ -77,3 +77,39 @@ def test_a_point_support_moves_a_body_of_two_regions_without_stress(tmp_path: Pa
     spin = (moved[1:] - moved[0]) / (places[1:] - places[0])
     assert np.ptp(spin.imag) + np.ptp(spin.real) < 1e-9 and abs(spin.real).max() < 1e-9
     np.testing.assert_allclose(held.evaluate([[-6, -6]]).displacement[-1], [[0.0, 0.0]], atol=1e-9)
+
+
+@pytest.mark.parametrize("first", ["foot", "top"])
+@pytest.mark.parametrize(("law", "pressure"), [
+    ({"friction": 0.4}, 0.3), ({"friction": 0.4}, {"expression": "0.3 + 0.1*s"}), ({"law": "open"}, 1.0),
+])  # fmt: skip
+def test_fluid_presses_where_two_free_bodies_face_each_other(
+    first: str, law: dict[str, Any], pressure: Any, tmp_path: Path
+) -> None:
+    """A block on a wider one, both free: the fluid between them was taken to press on all of the wider one's face.
+
+    Closed faces see no fluid; with faces that never touch it carries the load alone, and the upper block has -1.
+    """
+    def make(fluid: Any, push: float) -> dict[str, Any]:
+        low = {"base": [[0, 0], [3, 0]], "right": [[3, 0], [3, 1]], "top": [[3, 1], [0, 1]], "left": [[0, 1], [0, 0]]}
+        up = {"foot": [[0.9, 1], [2.1, 1]], "east": [[2.1, 1], [2.1, 2]], "head": [[2.1, 2], [0.9, 2]],
+              "west": [[0.9, 2], [0.9, 1]]}  # fmt: skip
+        second = "top" if first == "foot" else "foot"
+        return {
+            "materials": {"m": {"young": 1000.0, "poisson": 0.2}},
+            "curves": {name: {"points": points, "elements": 6} for name, points in (low | up).items()},
+            "regions": {"low": {"material": "m", "boundary": list(low)}, "up": {"material": "m", "boundary": list(up)}},
+            "boundary": {"base": {"ty": push}, "head": {"ty": -1.0}},
+            "contacts": {"seat": {"between": [first, second], "pressure": fluid, **law}},
+            "analysis": {"steps": 1}, "output": {"points": [[1.5, 0.5], [1.5, 1.5]]},
+        }  # fmt: skip
+
+    found = pbem.run(make(pressure, 0.4), tmp_path / "wet.h5").interior.stress[-1]
+    if law == {"law": "open"}:
+        np.testing.assert_allclose(found[1], [0.0, -1.0, 0.0], atol=1e-6)
+    else:
+        dry = pbem.run(make(0.0, 0.4), tmp_path / "dry.h5").interior.stress[-1]
+        np.testing.assert_allclose(found, dry, atol=1e-9)
+    # Forces that would balance if the fluid pressed on all of both faces.
+    with pytest.raises(pbem.CaseError, match=r"free rigid motion \(translation along y"):
+        pbem.run(make(0.3, 0.58), tmp_path / "wrong.h5")

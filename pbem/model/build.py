@@ -36,7 +36,7 @@ from pbem.model.load_notes import note_jumps, note_loads
 from pbem.model.loading import Loading, list_held, read_loading
 from pbem.model.loads_along import check_loads
 from pbem.model.material import Material
-from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage, find_time
+from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps, list_apart
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
@@ -44,7 +44,6 @@ from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.pulled import check_pulled
 from pbem.model.recall import Recall
 from pbem.model.resultants import describe_unbalance, find_unbalanced_force
-from pbem.model.rigid_body import find_tractions, set_in_time
 from pbem.model.rigid_body_modes import (
     RigidBodyMode,
     find_least_stiffness,
@@ -55,6 +54,7 @@ from pbem.model.rigid_body_modes import (
 from pbem.model.roles import Roles, resolve_roles
 from pbem.model.shaping import shape_curves
 from pbem.model.sight import check_facing, split_opposite_ends
+from pbem.model.spread_forces import spread_forces
 from pbem.model.steep_loads import shorten_under_loads
 from pbem.model.support_motions import check_independent
 from pbem.model.thin_bodies import list_bonded
@@ -210,25 +210,9 @@ def _find_topology(cut: Cut, loading: Loading) -> _Topology:
     )
 
 
-def _spread_forces(loading: Loading, curves: Mapping[str, Curve]) -> Loading:
-    """The loading with the tractions that have given resultants."""
-    stages = []
-    histories = {
-        name: set_in_time([each[name] for each in loading.rigid.stages],
-                          lambda number, factor: find_time(loading.stages, number, factor))
-        for name in loading.rigid.spreads
-    }
-    for number, stage in enumerate(loading.stages):
-        tractions = {
-            name: find_tractions(each, curves, histories[name][number]) for name, each in loading.rigid.spreads.items()
-        }
-        stages.append(replace(stage, boundary={**stage.boundary, **tractions}))
-    return replace(loading, stages=tuple(stages))
-
-
 def _compose(case: Case, roles: Roles, loading: Loading, topology: _Topology, recall: Recall
              ) -> tuple[Model, list[Fault]]:
-    loading = _spread_forces(loading, topology.curves)
+    loading = spread_forces(loading, topology.curves)
     behaviour: dict[str, Hashable] = {
         # A load that jumps is a change of condition, too.
         name: (roles.outer[name], condition.frame, condition.known, condition.stiffness,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -17,7 +17,7 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.expression import list_names
 from pbem.model.given import read_value
 from pbem.model.roles import Roles, unknown_name
-from pbem.model.varying import Places, Value, Varying, evaluate
+from pbem.model.varying import Value, Varying
 
 Given = Literal["force", "motion"]
 Values = tuple[Value, Value, Value]
@@ -231,38 +231,6 @@ def sample_curves(curves: Iterable[Curve]) -> tuple[Complex, Real]:
 def unit_motions(points: Complex, about: complex) -> Complex:
     """Displacements (k, 3) of points by the unit motions along x, along y, and about a point (radians)."""
     return np.stack([np.ones_like(points), np.full_like(points, 1j), 1j * (points - about)], axis=1)
-
-
-def set_in_time(history: Sequence[Values], find_time: Callable[[int, float], float]) -> list[Values]:
-    """The values of all stages with numbers as expressions of the time in stages where another of the three is one.
-
-    The traction that they make together is one value, which depends on time where one of them does; numbers, which are
-    those at the end of a stage, are reached linearly all the same. find_time: of a stage and a fraction of it.
-    """
-    found: list[Values] = []
-    before: Values = NOTHING
-    for number, values in enumerate(history):
-        start, end = find_time(number, 0.0), find_time(number, 1.0)
-        if any(isinstance(value, Varying) for value in values):
-            values = tuple(  # type: ignore[assignment]
-                value if isinstance(value, Varying) and value.timed else
-                _grow(_evaluate_at(old, start), _evaluate_at(value, end), start, end)
-                for old, value in zip(before, values, strict=True)
-            )
-        found.append(values)
-        before = values
-    return found
-
-
-def _grow(first: float, last: float, start: float, end: float) -> Value:
-    """What grows linearly from one number to another between two times."""
-    if first == last:
-        return last
-    return Varying(f"{first!r} + ({last - first!r})*((t - ({start!r}))/({end - start!r}))")
-
-
-def _evaluate_at(value: Value, time: float) -> float:
-    return float(evaluate(value, Places(np.zeros(1, dtype=complex), np.zeros(1)), time)[0])
 
 
 def find_tractions(spread: Spread, curves: Mapping[str, Curve], values: Values) -> tuple[Value, Value]:

@@ -214,3 +214,14 @@ def test_a_search_that_fails_begins_anew_in_full(
     monkeypatch.setattr(forcing.Forcing, "tighten", lambda self: None)
     monkeypatch.setattr(forcing.Forcing, "end", lambda self: False)
     expect_same(run(text + "[solver]\nnewton_max_iterations = 12\n", tmp_path, 0.999), exact)
+
+
+def test_residuals_are_left_smaller_once_few_pairs_change() -> None:
+    loose = forcing.Forcing(True)
+    assert loose.choose(False) == loose.choose(False, 0.01) == forcing.FORCING
+    assert loose.choose(False, 1e-4) == loose.choose(False, 0.0) == pytest.approx(forcing.NEARLY * forcing.FORCING)
+    assert loose.choose(True, 1e-4) == 0
+    loose.tighten()
+    assert loose.choose(False, 1e-4) == pytest.approx(forcing.NEARLY * forcing.TIGHTER * forcing.FORCING)
+    loose.end()
+    assert loose.choose(False, 1e-4) == 0

@@ -130,7 +130,8 @@ def _divide(field: LengthField) -> tuple[Cells, Real, Excess | None]:
     while len(cells.leg):
         measured = field.measure(cells, near)
         allowed = np.minimum(measured.allowed, cells.wanted)
-        total += float((cells.lengths(field.length) / allowed)[measured.final].sum())
+        with np.errstate(divide="ignore"):  # none is allowed where curves touch: endlessly many elements
+            total += float((cells.lengths(field.length) / allowed)[measured.final].sum())
         if total + np.count_nonzero(~measured.final) > most:
             worst = int(np.argmin(np.where(measured.final | (measured.nearest < 0), np.inf, measured.distance)))
             names = field.surroundings.curve

@@ -230,3 +230,26 @@ regions.plane = {{ material = "rock", infinite = true, cracks = ["one", "other"]
 remote = {{ syy = -1.0 }}
 """
     assert (generate_mesh(parse_model(text)[1]).elements > 40) == refined
+
+
+def test_circles_that_touch_at_the_start_of_one_are_refused_without_a_warning() -> None:
+    """Nothing is allowed at the point itself: endlessly many elements, by a division by zero."""
+    with pytest.raises(CaseError, match=r"would need elements of 0 and far more of them than requested"):
+        parse_model("""
+[materials]
+rock = { young = 1.0, poisson = 0.25 }
+[curves]
+upper = { center = [0, 0], radius = 1.0, angles = [0, 180], elements = 4 }
+lower = { center = [0, 0], radius = 1.0, angles = [180, 360], elements = 4 }
+joint = { center = [1, 0], radius = 2.0, elements = 8 }
+outer = { center = [1, 0], radius = 5.0, elements = 8 }
+[regions]
+core = { material = "rock", boundary = ["upper", "lower", "joint"] }
+ring = { material = "rock", boundary = ["joint", "outer"] }
+[boundary]
+upper = { ux = 0.0, uy = 0.0 }
+lower = { ux = 0.0, uy = 0.0 }
+outer = { un = -1e-3, us = 0.0 }
+[interfaces]
+joint = { law = "coulomb", friction = 0.6 }
+""")

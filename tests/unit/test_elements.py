@@ -279,3 +279,16 @@ def test_carriers_meet_on_both(seed: int) -> None:
 def test_a_point_that_rounds_to_the_centre_of_a_tiny_arc_has_no_normal() -> None:
     arc = Leg(-8j + 5e-9, -8j + 5e-9j, 1, center=-8j, sweep=math.pi / 2)
     assert Elements.collect([arc]).normals_at(np.array([[-8j]])) == 0
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_places_do_not_hang_on_where_arrays_lie_in_memory(count: int) -> None:
+    """NumPy rounds complex products in one of two ways where operands are less than 64 bytes apart."""
+    arcs, rng, kept = make_elements(1, "arcs").select(np.arange(count)), np.random.default_rng(7), {}
+    found = set()
+    for _ in range(3000):
+        # Blocks of the sizes of the operands are given back in another order.
+        kept[int(rng.integers(50))] = np.empty(int(rng.integers(1, 8)), dtype=complex)
+        middles = arcs.cut(np.full(count, 0.25), np.full(count, 0.5)).start
+        found.add(b"".join(each.tobytes() for each in (arcs.normals(np.array([0.3])), middles, *arcs.directions())))
+    assert len(found) == 1

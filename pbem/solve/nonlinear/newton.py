@@ -225,7 +225,7 @@ class _Run:
             search.globalisation.frozen, self.jump,
         ), self.modes)
         constraints = self.hold.release(problem.constrain(law, load), self.modes)
-        part = forcing.choose(search.level > 0, search.counts[-1] / self.laws.count if search.counts else 1.0)
+        part = forcing.choose(search.level > 0, search.counts[-1] / max(self.laws.count, 1) if search.counts else 1.0)
         try:
             solved = self.tangent.solve(constraints, load, law, min(part, CLOSELIEST) if search.smoothed else part)
             loosely = solved.loosely

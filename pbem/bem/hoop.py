@@ -27,7 +27,7 @@ def evaluate_hoop_stress(
     several times as much at its outer nodes. On a crack's faces it is that of their mean displacement, and plus or
     minus half that of the jump, which at a tip has the square-root shape: the hoop stress then grows like
     1/sqrt(distance) in mode II, as it should; jumps keep to their own element. Elements of order 0 have no stretch of
-    their own: there it is the difference between neighbours on the same curve.
+    their own: there it is the difference between neighbours on the same curve, up to its corners.
     """
     second = second_face_nodes(mesh)
     of_points = sample_points(mesh, initial)

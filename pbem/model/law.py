@@ -261,6 +261,10 @@ def _check_strengths(loc: KeyPath, table: LawTable, kind: Kind) -> Iterator[Faul
     friction = _find_friction(table) if kind == "coulomb" else 0.0
     dynamic, tension, cohesion = table.friction_dynamic, table.tensile_strength, table.cohesion
     plain = not isinstance(table.friction, VaryingTable)
+    # Of the law as it came together: a table of its own may have one of both from that of its family.
+    if kind == "coulomb" and (dynamic is None) != (table.slip_distance is None):
+        given = "slip_distance" if dynamic is None else "friction_dynamic"
+        yield Fault.at((*loc, given), f"only {given}", "friction_dynamic and slip_distance together")
     if kind == "coulomb" and isinstance(dynamic, float) and plain and dynamic > friction * (1 + 1e-12):
         found = f"friction_dynamic = {dynamic:g} above the static friction of {friction:g}"
         expected = "friction that decreases with slip: friction_dynamic <= friction"

@@ -23,7 +23,7 @@ from pbem.model.roles import Roles, unknown_name
 from pbem.model.shaping import find_corners
 from pbem.model.stress_fields import StressFields, read_stress_fields
 from pbem.model.swelling import read_swellings
-from pbem.model.varying import Value, negate
+from pbem.model.varying import Value, Varying, negate
 from pbem.model.walls import Wall, check_wall, update_wall
 
 # Key to frame, direction and quantity.
@@ -104,7 +104,7 @@ def read_loading(case: Case, roles: Roles) -> Loading:
             support_values, stress_fields.remote, rigid.stages, construction, strict=True,
         )
     )
-    faults += _check_durations(case, joints, stages)
+    faults += _check_durations(case, joints, stages, rigid)
     return Loading(conditions, interfaces, contacts, stages, rigid, stress_fields.initial_stress,
                    stress_fields.rest_gravity, tuple(faults))
 
@@ -309,11 +309,15 @@ def _find_stages(
     return tuple(stages)
 
 
-def _check_durations(case: Case, laws: Mapping[str, Law], stages: Sequence[Stage]) -> Iterator[Fault]:
+def _check_durations(
+    case: Case, laws: Mapping[str, Law], stages: Sequence[Stage], rigid: RigidLoading
+) -> Iterator[Fault]:
     """Laws that depend on time need the duration of every stage, loads that do need that of all stages or of none;
     without either, durations have no effect."""
     timed = next(((name, law.kind) for name, law in laws.items() if law.kind in TIMED), None)
-    loads = any(list_timed(stage) for stage in stages)
+    resultants = [value for stage in rigid.stages for values in stage.values() for value in values]
+    loads = any(list_timed(stage) for stage in stages) or any(
+        isinstance(value, Varying) and value.timed for value in resultants)
     if timed is not None and not case.stages:
         found = f"no [[stages]], but the law of '{timed[0]}' is {timed[1]}, which depends on time"
         yield Fault.at(("analysis", "steps"), found, "[[stages]] with the duration of each")

@@ -113,3 +113,17 @@ def test_inclusions_of_one_table_are_heated_by_its_name() -> None:
     assert [fault.path for fault in caught.value.faults] == [("temperature", "grain")]
     with pytest.raises(CaseError, match=r"unknown region 'grains'"):
         build_model(make_grains(temperature={"grains": 1.0}))
+
+
+def test_a_curve_beside_another_one_shares_no_law_by_its_name() -> None:
+    curves = {"t": [[0, 0], [1, 0]], "t.1": [[0, 3], [1, 3]]}
+    case = Case(
+        materials={"rock": {"young": 100.0, "poisson": 0.2}},
+        curves={name: {"points": points, "elements": 4} for name, points in curves.items()},
+        regions={"plane": {"material": "rock", "infinite": True, "cracks": list(curves)}},
+        interfaces={"t": {"friction": 0.6, "friction_dynamic": 0.3, "slip_distance": 1e-3},
+                    "t.1": {"friction": 0.5, "friction_dynamic": 0.1}},
+        remote={"syy": -1.0},
+    )  # fmt: skip
+    with pytest.raises(CaseError, match=r'interfaces\."t\.1"\.friction_dynamic: found only friction_dynamic'):
+        build_model(case)

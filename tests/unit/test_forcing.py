@@ -225,3 +225,22 @@ def test_residuals_are_left_smaller_once_few_pairs_change() -> None:
     assert loose.choose(False, 1e-4) == pytest.approx(forcing.NEARLY * forcing.TIGHTER * forcing.FORCING)
     loose.end()
     assert loose.choose(False, 1e-4) == 0
+
+
+def test_the_share_that_changed_is_that_of_the_last_iteration(
+    many_groups: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    shares: list[float] = []
+    choose = forcing.Forcing.choose
+
+    def watch(self: forcing.Forcing, exactly: bool, changed: float = 1.0) -> float:
+        shares.append(changed)
+        return choose(self, exactly, changed)
+
+    monkeypatch.setattr(forcing.Forcing, "choose", watch)
+    found = run(FIELD.format(seed=1, sxx=3.0), tmp_path, None)
+    pairs = sum(len(contact.mode[-1]) for contact in found.contact.values())
+    changed = found.convergence["changed"]
+    assert len(changed) > 2
+    # After these come those of the second solution, for the estimates.
+    np.testing.assert_allclose(shares[: len(changed)], [1.0, *changed[:-1] / pairs], rtol=1e-12)

@@ -151,3 +151,7 @@ def test_durations_go_with_loads_that_depend_on_time() -> None:
     assert (model.timed, model.find_time(1, 0.5)) == (True, 7.5)
     with pytest.raises(CaseError, match="a stage without duration"):
         build(stage + timed + "[[stages]]\n")
+    # A force of a curve is a load like any other, spread over it or on a rigid body.
+    for kind in ('how = "uniform"', 'how = "linear"'):
+        force = f'boundary.top.force = {{ {kind}, fy = {{ expression = "t" }} }}\n'
+        assert build("[boundary]\n" + force.replace("boundary.", "") + stage + stage)[0].find_time(1, 0.5) == 7.5

@@ -13,10 +13,11 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point, format_vector
 from pbem.geometry.loop import Side, loop_legs, side_legs
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
-from pbem.model.rigid_body import find_reference
+from pbem.model.rigid_body import NOTHING, find_reference
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
 from pbem.model.sight import OVERLAP, REACH, Obstacles
-from pbem.model.varying import Places, Value, Varying, evaluate, negate
+from pbem.model.varying import Moment, Places, Value, Varying, blend, negate
+from pbem.model.walls import Wall
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
 BALANCED = 1e-9
@@ -39,8 +40,7 @@ def describe_unbalance(
         fractions = FRACTIONS if list_timed(stage) else (1.0,)
         least = BALANCED_EXPRESSION if _has_expressions(stage) else BALANCED
         for fraction in fractions:
-            time = model.find_time(number, fraction)
-            force, moment, power, scale = _sum_tractions(model, motion, moving, stage, time)
+            force, moment, power, scale = _sum_tractions(model, motion, moving, number, fraction)
             if abs(power) <= least * scale:
                 continue
             about = format_point(model.origin)
@@ -57,8 +57,8 @@ def describe_unbalance(
 
 def find_unbalanced_force(model: Model, motion: RigidBodyMode, moving: Sequence[Region]) -> complex:
     """The resultant of the loads on what moves at the end of the first stage in which they drive it."""
-    for number, stage in enumerate(model.stages):
-        force, _, power, scale = _sum_tractions(model, motion, moving, stage, model.find_time(number, 1.0))
+    for number in range(len(model.stages)):
+        force, _, power, scale = _sum_tractions(model, motion, moving, number, 1.0)
         if abs(power) > BALANCED * scale:
             return force
     return 0j
@@ -68,12 +68,12 @@ def measure_power(model: Model, motion: RigidBodyMode, number: int) -> float:
     """What the loads at the end of a stage do on a motion per unit of it; 0 where they balance."""
     stage, names = model.stages[number], set(motion.regions)
     moving = [region for region in model.regions if region.name in names]
-    _, _, power, scale = _sum_tractions(model, motion, moving, stage, model.find_time(number, 1.0))
+    _, _, power, scale = _sum_tractions(model, motion, moving, number, 1.0)
     return power if abs(power) > (BALANCED_EXPRESSION if _has_expressions(stage) else BALANCED) * scale else 0.0
 
 
 def _list_pushes(
-    model: Model, moving: Sequence[Region], stage: Stage, time: float
+    model: Model, moving: Sequence[Region], before: Stage, stage: Stage, now: Moment
 ) -> Iterator[tuple[complex, float, complex, str]]:
     """Force and moment of the rigid bodies of moving regions, the point of it, and the region."""
     bounded = find_bounded(model)
@@ -82,8 +82,9 @@ def _list_pushes(
     for name, body in model.rigid.items():
         own = [bounded[curve] for curve in body.curves if bounded[curve] in names]
         if own:
-            values = [float(evaluate(value, nowhere, time)[0]) if kind == "force" else 0.0
-                      for value, kind in zip(stage.rigid[name], body.known, strict=True)]
+            given = zip(before.rigid.get(name, NOTHING), stage.rigid[name], body.known, strict=True)
+            values = [float(blend(old, value, nowhere, now)[0]) if kind == "force" else 0.0
+                      for old, value, kind in given]
             about = find_reference(body, model.curves, model.origin)
             yield complex(values[0], values[1]), values[2], about, own[0]
 
@@ -95,15 +96,18 @@ def _has_expressions(stage: Stage) -> bool:
 
 
 def _sum_tractions(
-    model: Model, motion: RigidBodyMode, moving: Sequence[Region], stage: Stage, time: float
+    model: Model, motion: RigidBodyMode, moving: Sequence[Region], number: int, fraction: float
 ) -> tuple[complex, float, float, float]:
     """Force and moment on the moving regions; power on the motion, and the sum of its parts without their signs.
 
     Fluid between two regions presses on both; where they are tied along the normal its power cancels.
     """
     force, moment, power, scale = 0j, 0.0, 0.0, 0.0
+    stage = model.stages[number]
+    before = model.stages[number - 1] if number else Stage("rest", 1, {}, {})
+    now = Moment(model.find_time(number, 0.0), model.find_time(number, fraction), fraction)
     touching = {curve for contact in model.contacts.values() for curve in (contact.first, contact.second)}
-    for push, turn, about, name in _list_pushes(model, moving, stage, time):
+    for push, turn, about, name in _list_pushes(model, moving, before, stage, now):
         a, spin = motion.velocities[name]
         drive = (np.conj(push) * (a + 1j * spin * about)).real, turn * spin
         force += push
@@ -114,13 +118,14 @@ def _sum_tractions(
     for region in moving:
         a, spin = motion.velocities[region.name]
         for load in model.point_loads_by_region.get(region.name, ()):
-            x, y, own_moment = stage.point_forces[load.name]
+            x, y, own_moment = (old + fraction * (new - old) for old, new in zip(
+                before.point_forces.get(load.name, (0.0, 0.0, 0.0)), stage.point_forces[load.name], strict=True))
             own, moved = complex(x, y), a + 1j * spin * load.place
             force += own
             moment += float((np.conj(load.place) * own).imag) + own_moment
             power += float((np.conj(own) * moved).real) + own_moment * spin
             scale += abs(own) * (abs(a) + abs(spin * load.place)) + abs(own_moment * spin)
-        weight, lever = _weigh(model, region, stage)
+        weight, lever = _weigh(model, region, number, fraction)
         force += weight
         moment += float((np.conj(lever) * weight).imag)
         power += float((np.conj(weight) * (a + 1j * spin * lever)).real)
@@ -130,16 +135,19 @@ def _sum_tractions(
             if side.curve in touching or (gone and side.curve in stage.walls):
                 continue  # fluids in contacts: see below; what acts on walls acts on the side that is left
             condition, values = _find_load(model, stage, side.curve)
-            for piece in _divide_side(model.curves, side, values):
+            wall = stage.walls.get(side.curve)  # tractions on what is left begin from none
+            first = (before.walls.get(side.curve, Wall(wall.frame)).values if wall is not None and any(wall.values)
+                     else _find_load(model, before, side.curve)[1])
+            for piece in _divide_side(model.curves, side, (*first, *values)):
                 points = piece.places.point
                 shifted = replace(piece.places, point=points + model.origin)
-                tractions = _tractions(condition, values, piece.normals, shifted, time) * piece.weights
+                tractions = _tractions(condition, first, values, piece.normals, shifted, now) * piece.weights
                 rates = (np.conj(tractions) * (a + 1j * spin * points)).real
                 force += complex(tractions.sum())
                 moment += float((np.conj(points) * tractions).imag.sum())
                 power += float(rates.sum())
                 scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
-    for name, points, pushes in _list_fluids(model, {region.name for region in moving}, stage, time):
+    for name, points, pushes in _list_fluids(model, {region.name for region in moving}, before, stage, now):
         a, spin = motion.velocities[name]
         force += complex(pushes.sum())
         moment += float((np.conj(points) * pushes).imag.sum())
@@ -149,24 +157,25 @@ def _sum_tractions(
 
 
 def _list_fluids(
-    model: Model, moving: Collection[str], stage: Stage, time: float
+    model: Model, moving: Collection[str], before: Stage, stage: Stage, now: Moment
 ) -> Iterator[tuple[str, Complex, Complex]]:
     """Moving region, points (k,) and forces (k,) of the fluid in its contacts, which presses alike on the parts of both
     curves that face each other, and on nothing beside."""
     bounded = find_bounded(model)
     sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
     for name, contact in model.contacts.items():
-        pressure, owners = stage.pressure.get(name, 0.0), (bounded[contact.first], bounded[contact.second])
-        if not pressure or not set(owners) & set(moving):
+        pressures = before.pressure.get(name, 0.0), stage.pressure.get(name, 0.0)
+        owners = (bounded[contact.first], bounded[contact.second])
+        if not any(pressures) or not set(owners) & set(moving):
             continue
         shorter = min(model.curves[contact.first].length, model.curves[contact.second].length)
         opposite = Obstacles(side_legs(model.curves, sides[contact.second]))
-        for piece in _divide_side(model.curves, sides[contact.first], (pressure, 0.0)):
+        for piece in _divide_side(model.curves, sides[contact.first], pressures):
             points, normals = piece.places.point, piece.normals
             seen = opposite.look_along(points, normals, -max(OVERLAP * shorter, REACH * contact.overlap))
             met = (seen.leg >= 0) & (seen.product < 0)
             places = replace(piece.places, point=points + model.origin)
-            pushes = (-evaluate(pressure, places, time) * normals * piece.weights)[met]
+            pushes = (-blend(*pressures, places, now) * normals * piece.weights)[met]
             feet = points[met] + seen.distance[met] * normals[met]
             for owner, at, own in ((owners[0], points[met], pushes), (owners[1], feet, -pushes)):
                 if owner in moving:
@@ -182,7 +191,7 @@ class _Piece:
     weights: Real
 
 
-def _divide_side(curves: Mapping[str, Curve], side: Side, values: tuple[Value, Value]) -> Iterator[_Piece]:
+def _divide_side(curves: Mapping[str, Curve], side: Side, values: Sequence[Value]) -> Iterator[_Piece]:
     """The parts of a side on which the values are smooth: its legs, cut where a table has a kink."""
     kinks = [value.breaks for value in values if isinstance(value, Varying)]
     total, passed = curves[side.curve].length, 0.0
@@ -199,15 +208,21 @@ def _divide_side(curves: Mapping[str, Curve], side: Side, values: tuple[Value, V
         passed += leg.length
 
 
-def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex]:
-    """Weight of a region and its centre: integrals over the area, by the divergence theorem over its loops.
+def _weigh(model: Model, region: Region, number: int, fraction: float) -> tuple[complex, complex]:
+    """Weight of a region at a fraction of a stage and its centre: integrals over the area, by the divergence theorem
+    over its loops.
 
     Of an infinite region, which stress far away carries, minus the weight that its holes would have.
     """
     if region.rigid:
         return 0j, 0j
     legs = loop_legs(model.curves, region.loops)
-    if not any(stage.gravity) or not legs:
+    # What in-situ stress is in balance with is there from the beginning.
+    initial = model.initial_stress.get(region.material.name)
+    at_rest = 0j if initial is None or initial.is_uniform else model.rest_gravity
+    start = complex(*model.stages[number - 1].gravity) if number else at_rest
+    gravity = start + fraction * (complex(*model.stages[number].gravity) - start)
+    if not gravity or not legs:
         return 0j, 0j
     origin = legs[0].start
     area, first_moment = 0.0, 0j
@@ -216,25 +231,26 @@ def _weigh(model: Model, region: Region, stage: Stage) -> tuple[complex, complex
         outward = leg.normals(points + origin) * 0.5 * _WEIGHTS * leg.length
         area += 0.5 * float((np.conj(points) * outward).real.sum())
         first_moment += 0.5 * complex((np.abs(points) ** 2 * outward).sum())
-    return region.material.density * complex(*stage.gravity) * area, origin + first_moment / area
+    return region.material.density * gravity * area, origin + first_moment / area
 
 
 def _find_load(model: Model, stage: Stage, curve: str) -> tuple[Condition, tuple[Value, Value]]:
     if curve in model.conditions:
-        return model.conditions[curve], stage.boundary[curve]
+        return model.conditions[curve], stage.boundary.get(curve, (0.0, 0.0))
     wall = stage.walls.get(curve)
     if wall is not None and any(wall.values):
         return Condition(curve, wall.frame), wall.values
-    return Condition(curve, "local"), (negate(stage.pressure[curve]), 0.0)
+    return Condition(curve, "local"), (negate(stage.pressure.get(curve, 0.0)), 0.0)
 
 
 def _tractions(
-    condition: Condition, values: tuple[Value, Value], normals: Complex, places: Places, time: float
+    condition: Condition, before: Sequence[Value], values: Sequence[Value], normals: Complex, places: Places,
+    now: Moment,
 ) -> Complex:
     """Known tractions at points with these outward normals; what is unknown counts as zero."""
     first, second = (
-        evaluate(value, places, time) if quantity == "traction" else np.zeros(places.point.shape)
-        for value, quantity in zip(values, condition.known, strict=True)
+        blend(old, value, places, now) if quantity == "traction" else np.zeros(places.point.shape)
+        for old, value, quantity in zip(before, values, condition.known, strict=True)
     )
     frame = normals if condition.value_frame == "local" else np.ones_like(normals)
     return np.asarray((first + 1j * second) * frame)

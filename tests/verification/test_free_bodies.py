@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 import pbem
 from pbem.arrays import Complex
+from pbem.errors import CaseError
 from pbem.results.reader import Results
 
 
@@ -113,3 +115,37 @@ def test_fluid_presses_where_two_free_bodies_face_each_other(
     # Forces that would balance if the fluid pressed on all of both faces.
     with pytest.raises(pbem.CaseError, match=r"free rigid motion \(translation along y"):
         pbem.run(make(0.3, 0.58), tmp_path / "wrong.h5")
+
+
+def load_bar(top: dict[str, Any], bottom: dict[str, Any], stages: list[dict[str, Any]]) -> dict[str, Any]:
+    """A bar that nothing holds, its ends loaded."""
+    corners = [[5, 7], [6, 7], [6, 9], [5, 9], [5, 7]]
+    curves = dict(zip(("bottom", "right", "top", "left"), itertools.pairwise(corners), strict=True))
+    return {
+        "materials": {"m": {"young": 1000.0, "poisson": 0.2}},
+        "curves": {name: {"points": list(ends), "elements": 6} for name, ends in curves.items()},
+        "regions": {"bar": {"material": "m", "boundary": list(curves)}},
+        "boundary": {"top": top, "bottom": bottom}, "stages": stages,
+    }
+
+
+@pytest.mark.parametrize(("top", "bottom"), [
+    ({"ty": 3.0}, {"ty": {"expression": "-3*t"}}),
+    ({"force": {"fy": 3.0}}, {"ty": {"expression": "-3*t"}}),
+    ({"force": {"fy": 3.0, "moment": {"expression": "0.2*t"}, "how": "linear"}},
+     {"force": {"fy": -3.0, "moment": -0.2, "how": "linear"}}),
+])  # fmt: skip
+def test_loads_in_time_are_balanced_by_those_that_grow_linearly(
+    top: dict[str, Any], bottom: dict[str, Any], tmp_path: Path
+) -> None:
+    """Numbers are reached at the end of a stage, expressions of t have their own value at all times."""
+    case = load_bar(top, bottom, [{"steps": 3}])
+    results = pbem.run(case, tmp_path / "bar.h5")
+    stress = results.evaluate(np.array([[5.5, 8.0]])).stress[:, 0]
+    np.testing.assert_allclose(stress[:, 1], [1.0, 2.0, 3.0], rtol=1e-3)
+
+
+def test_loads_in_time_that_are_balanced_at_the_end_alone_are_refused(tmp_path: Path) -> None:
+    case = load_bar({"ty": 3.0}, {"ty": {"expression": "-3 + 0*t"}}, [{"steps": 2}])
+    with pytest.raises(CaseError, match="resultant"):
+        pbem.run(case, tmp_path / "bar.h5")

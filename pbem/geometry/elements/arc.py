@@ -12,6 +12,8 @@ from pbem.geometry.elements.straight import Straight
 CHORD = Straight()
 # An arc that turns by more is seen in halves, as its chord comes near to nothing.
 WIDEST = 0.9 * np.pi
+# So many complex numbers are more than 64 bytes.
+MANY = 8
 
 
 class Arc(Kind):
@@ -178,10 +180,13 @@ def _apex(e: Shape) -> Any:
 
 
 def _turn(z: Any, angle: Any) -> Any:
-    """Vectors turned by an angle (radians), in real numbers.
+    """Vectors turned by an angle (radians).
 
-    NumPy rounds products of few complex numbers in one of two ways, by where they lie in memory: two equal runs would
-    differ in their last bits. Those of real numbers it rounds in one.
+    NumPy rounds products of complex arrays in one of two ways where operands begin less than 64 bytes apart in memory,
+    which those of few numbers may or may not do: two equal runs would differ in their last bits. They are repeated.
     """
-    x, y, cosine, sine = np.real(z), np.imag(z), np.cos(angle), np.sin(angle)
-    return (x * cosine - y * sine) + 1j * (x * sine + y * cosine)
+    turn = np.exp(1j * angle)
+    if np.ndim(z) == np.ndim(turn) == 0 or np.size(z) >= MANY or np.size(turn) >= MANY:
+        return z * turn
+    z, turn = np.broadcast_arrays(z, turn)
+    return (np.resize(z, MANY) * np.resize(turn, MANY))[: z.size].reshape(z.shape)

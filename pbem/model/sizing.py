@@ -80,7 +80,7 @@ def fit_lengths(
         curves, [[side.curve for side in sides] for sides in regions], [(slot.first, slot.second) for slot in slots],
         frozenset(side.curve for sides in regions for side in sides if side.forward is None),
     )
-    wedges = find_wedges(surroundings, kept, order < 2)
+    wedges = find_wedges(surroundings, kept, order)
     inside = [(frozenset(side.curve for side in sides), np.array(places, dtype=complex))
               for sides, places in zip(regions, loads, strict=False) if len(places)]
     field = LengthField(surroundings, wedges, tips, kept, order, inside)

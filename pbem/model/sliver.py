@@ -52,8 +52,9 @@ SHARPER, SHARPER_BIT = math.radians(80.0) * (1 - TIE), 0.2
 # Constant and linear elements fall with this power of the angle there, in place of 1: K was off by 0.5 to 1 % on any
 # number of elements elsewhere. LEAST_GROWTH bounds their number.
 LINEAR_FOLD, LEAST_GROWTH = 4, 0.06
-# Degrees: below, the last bit follows its neighbour.
-TIED = 25.0 * (1 - TIE)
+# Degrees, by the order of the elements, the last one for all higher ones: below, the last bit follows its neighbour. In
+# wedges of up to 48, 31 and less than 20 degrees the compliance of pairs there had the wrong sign.
+TIED = (50.0 * (1 - TIE), 35.0 * (1 - TIE), 25.0 * (1 - TIE))
 # Most growth of lengths per distance from the corner, for wedges that are not very narrow.
 MOST_GROWTH = 1.0
 
@@ -158,10 +159,10 @@ def _count_asked(leg: Leg) -> float:
 
 
 def find_wedges(
-    surroundings: Surroundings, kept: frozenset[str] = frozenset(), linear: bool = False
+    surroundings: Surroundings, kept: frozenset[str] = frozenset(), order: int = 2
 ) -> Wedges:
-    """The wedges of a model and what is tied in their corners. kept: curves whose grading is the user's; linear:
-    elements are of order 1 or 0."""
+    """The wedges of a model and what is tied in their corners. kept: curves whose grading is the user's; order: of the
+    elements."""
     legs, names = surroundings.legs, surroundings.curve
     before = [0.0]
     for number in range(1, len(legs)):
@@ -175,10 +176,10 @@ def find_wedges(
         given = any(names[number] in kept for number in numbers)
         asked = float(np.mean([legs[number].elements if given else _count_asked(legs[number]) for number in numbers]))
         branching = corner.branching and asked >= LEAST_ASKED
-        narrow = math.degrees(corner.angle) < TIED
+        narrow = math.degrees(corner.angle) < TIED[-1]
         turning = corner.turning and not narrow and asked >= LEAST_AT_TURN
         lengths = [legs[number].length for number in numbers]
-        sharp = SHARP_BESIDE_WING if linear and min(lengths) < WING * max(lengths) else SHARP
+        sharp = SHARP_BESIDE_WING if order < 2 and min(lengths) < WING * max(lengths) else SHARP
         turning = turning and (given or math.pi - corner.angle >= sharp)
         if not (branching or turning or corner.ends):
             continue
@@ -188,7 +189,7 @@ def find_wedges(
         if turning and corner.angle < SHARPER:
             bit *= SHARPER_BIT
         bits.append(bit)
-        if not narrow:
+        if math.degrees(corner.angle) >= TIED[min(order, 2)]:
             continue
         for number, at_end in corner.ends:
             first = before[number] + (legs[number].length - bit if at_end else 0.0)

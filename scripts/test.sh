@@ -17,9 +17,9 @@ if .venv/bin/python -c 'import sys, numpy; sys.exit(numpy.__version__ >= "2")'; 
 else
     echo "mypy: left out. NumPy 2 describes arrays by their number of axes, the code does not; types are checked with NumPy 1."
 fi
-workers=$(nproc)
-# One thread for each process: those of BLAS would wait for each other on cores that other processes use. (After nproc,
-# which counts no more than that.)
+# nproc counts no more cores than OpenMP may use threads, which says nothing of how many processes there is room for.
+workers=$(env -u OMP_NUM_THREADS -u OMP_THREAD_LIMIT nproc)
+# One thread for each process: those of BLAS would wait for each other on cores that other processes use.
 export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
 # The tests start hundreds of processes: where Python may not keep what it compiles, that is a third of their time.
 unset PYTHONDONTWRITEBYTECODE

@@ -7,7 +7,7 @@ the finer one; the largest difference of the slips from those of the finer mesh,
 to a last bit, from those with half that bit, both as parts of the largest slip; what did not settle.
 
 usage: .venv/bin/python -m scripts.study_junctions [--kinds crossing,t,edge] [--angles 90,5] [--friction 0.2,0.6]
-    [--elements 8] [--finer 2] [--seed 1]
+    [--elements 8] [--order 2] [--finer 2] [--seed 1]
 
 With a seed the directions, lengths, stresses and units are drawn anew for each kind and angle, and so is the friction
 where none is given.
@@ -259,6 +259,7 @@ def main() -> None:
     parser.add_argument("--angles", default=",".join(f"{angle:g}" for angle in ANGLES))
     parser.add_argument("--friction", help="default 0.2,0.6, or drawn")
     parser.add_argument("--elements", type=int, default=8, help="on each branch (default 8)")
+    parser.add_argument("--order", type=int, default=2, help="of the elements (default 2)")
     parser.add_argument("--finer", type=int, default=2, help="times as many elements for comparison (default 2)")
     parser.add_argument("--seed", type=int, help="draw all but kinds and angles")
     options = parser.parse_args()
@@ -271,7 +272,7 @@ def main() -> None:
             setting = Setting() if options.seed is None else draw_setting(options.seed, kind, angle)
             if options.friction:
                 setting = replace(setting, frictions=tuple(map(float, options.friction.split(","))))
-            study(Junction(kind, angle, options.elements, setting=setting), options.finer)
+            study(Junction(kind, angle, options.elements, options.order, setting=setting), options.finer)
 
 
 if __name__ == "__main__":

@@ -100,6 +100,7 @@ def build_constraints(
     offset = np.zeros((2, mesh.nodes), dtype=complex)
     _constrain_outer_nodes(entries, offset, outer, load, traction_scale)
     _constrain_pairs(entries, offset, mesh, gap, law, load.carried)
+    offset[TRACTION] += evaluate_fluid(mesh, load.pressure)
     constant = np.stack([offset.real, offset.imag], axis=2).ravel()
     for rigid in outer.rigid:
         own = constrain_rigid_nodes(rigid, mesh.nodes, load.rigid[rigid.number], traction_scale)
@@ -180,6 +181,14 @@ def _constrain_pairs(
     offset[DISPLACEMENT, pairs.slave] += constant_jump
     offset[TRACTION, pairs.slave] += constant_traction
     np.subtract.at(offset[TRACTION], links.traction_node, links.traction_weight * constant_traction[givers])
+
+
+def evaluate_fluid(mesh: Mesh, pressure: Real) -> Complex:
+    """Tractions (nodes,) by which the fluid between different curves, of a pressure (m,) in the pairs, presses on them
+    besides what they exchange, whether or not it parts them there (theory, 133)."""
+    links, result = mesh.links, np.zeros(mesh.nodes, dtype=complex)
+    np.add.at(result, links.fluid_node, links.fluid_traction * pressure[links.fluid_pair])
+    return result
 
 
 def read_pair_unknowns(mesh: Mesh, unknowns: Real) -> Real:

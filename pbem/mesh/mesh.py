@@ -50,6 +50,7 @@ class Links:
     carrier (k,): nodes whose displacement is their own unknown. The displacement of a pair's slave node is the jump
     plus the sum of displacement_weight times the displacement of displacement_node over displacement_pair (l,);
     traction_node carries minus the sum of traction_weight times the slave node's traction over traction_pair (r,).
+    Besides, fluid_node carries fluid_traction (complex) times the pressure of fluid_pair (f,).
     """
 
     carrier: Integer
@@ -59,6 +60,9 @@ class Links:
     traction_pair: Integer
     traction_node: Integer
     traction_weight: Real
+    fluid_pair: Integer
+    fluid_node: Integer
+    fluid_traction: Complex
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Complex, Integer, Real
 from pbem.geometry.carrier import measure_distances
 from pbem.geometry.elements import Elements
 from pbem.geometry.tolerance import TIE
@@ -43,7 +43,8 @@ class Coupling:
     """Weights between the nodes of the slave (n1) and the master (n2), both in their chain's order of nodes.
 
     cover (n1,): part of a node's weight that faces the master. distance (n1,): mean distance along the normal.
-    slave, master, product (l,): for every two nodes that see each other, the integral of the product of their shapes.
+    slave, master, product (l,): for every two nodes that see each other, the integral of the product of their shapes;
+    turn (l,): the same times the sum (complex) of both outward normals there, none where faces are parallel.
     slave_element, master_element, shared (q,): elements that see each other, and the length over which they do.
     """
 
@@ -52,6 +53,7 @@ class Coupling:
     slave: Integer
     master: Integer
     product: Real
+    turn: Complex
     slave_element: Integer
     master_element: Integer
     shared: Real
@@ -71,6 +73,7 @@ def couple_curves(one: Chain, other: Chain, others: Elements, overlap: float = 0
     nodes: list[Integer] = []
     faces: list[Integer] = []
     product: list[Real] = []
+    turn: list[Complex] = []
     met: list[tuple[int, int, float]] = []
     for element in range(slave.count):
         single = slave.select(np.array([element]))
@@ -92,11 +95,13 @@ def couple_curves(one: Chain, other: Chain, others: Elements, overlap: float = 0
         cover[own] = mine.sum(axis=0) / own_weight[element]
         distance[own] = (mine * apart[:, None]).sum(axis=0) / own_weight[element]
         theirs = seen.local[hit][:, None] ** np.arange(count) @ shapes
+        both = n[hit] + master.select(seen.element[hit]).normals(seen.local[hit, None])[:, 0]
         for facing in np.unique(seen.element[hit]):
             at = seen.element[hit] == facing
             nodes.append(np.repeat(own, count))
             faces.append(np.tile(facing * count + np.arange(count), count))
             product.append((mine[at].T @ theirs[at]).ravel())
+            turn.append(((mine[at].T * both[at]) @ theirs[at]).ravel())
             met.append((element, int(facing), float(stretched[hit][at].sum())))
     none = np.zeros(0)
     return Coupling(
@@ -105,6 +110,7 @@ def couple_curves(one: Chain, other: Chain, others: Elements, overlap: float = 0
         slave=np.concatenate([none, *nodes]).astype(np.int64),
         master=np.concatenate([none, *faces]).astype(np.int64),
         product=np.concatenate([none, *product]),
+        turn=np.concatenate([none, *turn]).astype(complex),
         slave_element=np.array([each[0] for each in met], dtype=np.int64),
         master_element=np.array([each[1] for each in met], dtype=np.int64),
         shared=np.array([each[2] for each in met], dtype=float),

@@ -10,6 +10,7 @@ from pbem.arrays import Integer
 from pbem.geometry.elements import Elements
 from pbem.mesh.chain import Chain
 from pbem.mesh.elements import weigh_nodes
+from pbem.mesh.fluid import press_faces
 from pbem.mesh.mortar import LEAST_COVER, OVERLAP, Coupling, couple_curves, measure_contrast
 from pbem.mesh.projection import project_nodes
 from pbem.model.model import Contact
@@ -45,14 +46,15 @@ def place_pairs(chain: Chain) -> Columns:
 
 
 def pair_contact(
-    joint: Contact, chains: Mapping[str, Chain], order: Sequence[str], count: int
+    joint: Contact, chains: Mapping[str, Chain], order: Sequence[str], count: int, wet: bool
 ) -> tuple[Columns, Columns]:
     """Pairs and links by averages over the parts that face each other; the pairs' numbers begin at count (theory, 65).
 
     Each pair belongs to a node of the slave, whose displacement follows the master; the master carries the slave's
     tractions. Nodes of the slave that face nothing are no pairs and free of traction. Whichever curve is the slave, the
     pairs lie on the contact's first curve and have its normal. order: names of the curves; of equally fine ones of one
-    length the first in it is the slave, so that the results do not depend on which curve the contact names first.
+    length the first in it is the slave, so that the results do not depend on which curve the contact names first. wet:
+    whether there is ever a fluid in the contact.
     """
     both = sorted((chains[joint.first], chains[joint.second]), key=lambda chain: order.index(chain.curve))
     others = Elements.join([chain.elements for chain in chains.values()])
@@ -90,6 +92,11 @@ def pair_contact(
     nearest[pair_of_node[own[by_weight]] - count] = master.first_node + other[by_weight]
     slave_node = slave.first_node + nodes
     follows = slave.curve == joint.second
+    if wet:
+        normal = np.zeros(len(met), dtype=complex)
+        normal[nodes] = -made["normal"] if follows else made["normal"]
+        pressed = press_faces(slave, master, others, behind, seen, pair_of_node, normal)
+        links |= dict(zip(("fluid_pair", "fluid_node", "fluid_traction"), pressed, strict=True))
     made |= {
         "first": nearest if follows else slave_node,
         "second": slave_node if follows else nearest,

@@ -19,10 +19,11 @@ def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:
     pairs: list[Columns] = []
     links: list[Columns] = []
     count = 0
+    wet = {name for stage in model.stages for name, pressure in stage.pressure.items() if pressure}
     joints: list[Interface | Contact] = [*model.interfaces.values(), *model.contacts.values()]
     for number, joint in enumerate(joints):
         if isinstance(joint, Contact):
-            made, linked = pair_contact(joint, by_curve, list(model.curves), count)
+            made, linked = pair_contact(joint, by_curve, list(model.curves), count, joint.name in wet)
         elif joint.second is None:
             made, linked = _pair_crack(sides[joint.name, joint.first]), _no_links()
         else:
@@ -42,13 +43,13 @@ _PAIR_TYPES: Mapping[str, type] = {
 _LINK_TYPES: Mapping[str, type] = {
     "carrier": np.int64, "displacement_pair": np.int64, "displacement_node": np.int64,
     "displacement_weight": np.float64, "traction_pair": np.int64, "traction_node": np.int64,
-    "traction_weight": np.float64,
+    "traction_weight": np.float64, "fluid_pair": np.int64, "fluid_node": np.int64, "fluid_traction": np.complex128,
 }  # fmt: skip
 
 
 def _join(parts: Sequence[Columns], types: Mapping[str, type]) -> Columns:
     return {
-        name: np.concatenate([np.zeros(0, dtype=kind), *(part[name] for part in parts)]).astype(kind)
+        name: np.concatenate([np.zeros(0, dtype=kind), *(part[name] for part in parts if name in part)]).astype(kind)
         for name, kind in types.items()
     }
 

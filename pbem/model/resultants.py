@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pbem.arrays import Complex, Real
-from pbem.geometry.curve import Curve
+from pbem.arrays import Complex
 from pbem.geometry.junction import format_point, format_vector
-from pbem.geometry.loop import Side, loop_legs, side_legs
+from pbem.geometry.loop import loop_legs
+from pbem.model.fluids import list_fluids
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
+from pbem.model.quadrature import NODES, WEIGHTS, divide_side
 from pbem.model.rigid_body import NOTHING, find_reference
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
-from pbem.model.sight import OVERLAP, REACH, Obstacles
-from pbem.model.varying import Moment, Places, Value, Varying, blend, negate
+from pbem.model.varying import Moment, Places, Value, Varying, blend, find_kinks, negate
 from pbem.model.walls import Wall
 
 # Tractions balance if what they do on a rigid motion is less than this part of what they would do all in one sense.
@@ -25,7 +24,6 @@ BALANCED = 1e-9
 BALANCED_EXPRESSION = 1e-5
 # Fractions of a stage at which loads that depend on time are looked at.
 FRACTIONS = (0.1, 0.35, 0.6, 0.85, 1.0)
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
 def describe_unbalance(
@@ -138,7 +136,7 @@ def _sum_tractions(
             wall = stage.walls.get(side.curve)  # tractions on what is left begin from none
             first = (before.walls.get(side.curve, Wall(wall.frame)).values if wall is not None and any(wall.values)
                      else _find_load(model, before, side.curve)[1])
-            for piece in _divide_side(model.curves, side, (*first, *values)):
+            for piece in divide_side(model.curves, side, find_kinks((*first, *values))):
                 points = piece.places.point
                 shifted = replace(piece.places, point=points + model.origin)
                 tractions = _tractions(condition, first, values, piece.normals, shifted, now) * piece.weights
@@ -147,65 +145,13 @@ def _sum_tractions(
                 moment += float((np.conj(points) * tractions).imag.sum())
                 power += float(rates.sum())
                 scale += float((np.abs(tractions) * np.abs(a + 1j * spin * points)).sum())
-    for name, points, pushes in _list_fluids(model, {region.name for region in moving}, before, stage, now):
+    for name, points, pushes in list_fluids(model, {region.name for region in moving}, before, stage, now):
         a, spin = motion.velocities[name]
         force += complex(pushes.sum())
         moment += float((np.conj(points) * pushes).imag.sum())
         power += float((np.conj(pushes) * (a + 1j * spin * points)).real.sum())
         scale += float((np.abs(pushes) * np.abs(a + 1j * spin * points)).sum())
     return force, moment, power, scale
-
-
-def _list_fluids(
-    model: Model, moving: Collection[str], before: Stage, stage: Stage, now: Moment
-) -> Iterator[tuple[str, Complex, Complex]]:
-    """Moving region, points (k,) and forces (k,) of the fluid in its contacts, which presses alike on the parts of both
-    curves that face each other, and on nothing beside."""
-    bounded = find_bounded(model)
-    sides = {side.curve: side for region in model.regions for loop in region.loops for side in loop.sides}
-    for name, contact in model.contacts.items():
-        pressures = before.pressure.get(name, 0.0), stage.pressure.get(name, 0.0)
-        owners = (bounded[contact.first], bounded[contact.second])
-        if not any(pressures) or not set(owners) & set(moving):
-            continue
-        shorter = min(model.curves[contact.first].length, model.curves[contact.second].length)
-        opposite = Obstacles(side_legs(model.curves, sides[contact.second]))
-        for piece in _divide_side(model.curves, sides[contact.first], pressures):
-            points, normals = piece.places.point, piece.normals
-            seen = opposite.look_along(points, normals, -max(OVERLAP * shorter, REACH * contact.overlap))
-            met = (seen.leg >= 0) & (seen.product < 0)
-            places = replace(piece.places, point=points + model.origin)
-            pushes = (-blend(*pressures, places, now) * normals * piece.weights)[met]
-            feet = points[met] + seen.distance[met] * normals[met]
-            for owner, at, own in ((owners[0], points[met], pushes), (owners[1], feet, -pushes)):
-                if owner in moving:
-                    yield owner, at, own
-
-
-@dataclass(frozen=True)
-class _Piece:
-    """Points of integration on a part of a side, about the model's origin, with outward normals and weights."""
-
-    places: Places
-    normals: Complex
-    weights: Real
-
-
-def _divide_side(curves: Mapping[str, Curve], side: Side, values: Sequence[Value]) -> Iterator[_Piece]:
-    """The parts of a side on which the values are smooth: its legs, cut where a table has a kink."""
-    kinks = [value.breaks for value in values if isinstance(value, Varying)]
-    total, passed = curves[side.curve].length, 0.0
-    for leg in side_legs(curves, side):
-        # Lengths from where the side begins to be travelled; the curve may be written the other way.
-        at = np.concatenate([np.zeros(0), *kinks])
-        inner = ((at if side.forward else total - at) - passed) / leg.length
-        ends = np.unique(np.concatenate([[0.0, 1.0], inner[(inner > 0) & (inner < 1)]]))
-        for low, high in itertools.pairwise(ends):
-            fractions = 0.5 * (low + high) + 0.5 * (high - low) * _NODES
-            points, travelled = leg.point(fractions), passed + leg.length * fractions
-            along = travelled if side.forward else total - travelled
-            yield _Piece(Places(points, along), leg.normals(points), 0.5 * (high - low) * _WEIGHTS * leg.length)
-        passed += leg.length
 
 
 def _weigh(model: Model, region: Region, number: int, fraction: float) -> tuple[complex, complex]:
@@ -227,8 +173,8 @@ def _weigh(model: Model, region: Region, number: int, fraction: float) -> tuple[
     origin = legs[0].start
     area, first_moment = 0.0, 0j
     for leg in legs:
-        points = leg.point(0.5 * (_NODES + 1)) - origin
-        outward = leg.normals(points + origin) * 0.5 * _WEIGHTS * leg.length
+        points = leg.point(0.5 * (NODES + 1)) - origin
+        outward = leg.normals(points + origin) * 0.5 * WEIGHTS * leg.length
         area += 0.5 * float((np.conj(points) * outward).real.sum())
         first_moment += 0.5 * complex((np.abs(points) ** 2 * outward).sum())
     return region.material.density * gravity * area, origin + first_moment / area

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -74,6 +75,11 @@ class Places:
 def evaluate(value: Value, places: Places, time: float = 0.0) -> Real:
     """The value at places (k,)."""
     return value.evaluate(places, time) if isinstance(value, Varying) else np.full(places.point.shape, float(value))
+
+
+def find_kinks(values: Sequence[Value]) -> Real:
+    """The lengths along a curve at which tables of values on it have kinks."""
+    return np.concatenate([np.zeros(0), *(value.breaks for value in values if isinstance(value, Varying))])
 
 
 def to_plain(value: Value | None) -> Any:

@@ -30,6 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pbem.arrays import Complex, Real
+from pbem.contact.constraints import evaluate_fluid
 from pbem.contact.laws import PairLaws
 from pbem.mesh.mesh import Faces, Mesh
 from pbem.model.model import Model
@@ -106,8 +107,9 @@ class EnergyBalance:
         opened = None if self._stored.there is None else self._stored.there.opened
         pairs = measure_work(self.laws, self._stored.pair_weight, old.pairs, new.pairs, opened)
         fluid, bared = self._measure_bared(old, new)
+        fluid += pairs.fluid + self._press(0.5 * (old.pairs.pressure + new.pairs.pressure), change)
         # What springs take from the boundary they store, and what fluid does is work of its own.
-        work += new.springs - old.springs + pairs.fluid + fluid
+        work += new.springs - old.springs + fluid
         self._state = new
         self.runaway = self._find_runaway(old, new, moved, pairs, abs(before.elastic) + abs(work))
         dissipated, released = pairs.dissipated, 0.0
@@ -165,6 +167,7 @@ class EnergyBalance:
         total += float(self._stored.pair_weight @ np.abs(pressure * opened))
         # Tools push where they touch; what swells works against the stress; what a stage releases is a load as well.
         change, moved = new.traction - old.traction, new.displacement - old.displacement
+        total += abs(self._press(pressure, moved))
         total += _add_sizes(self._stored.tools, change, moved)
         total += _add_sizes(self._stored.weight, change, new.swollen - old.swollen)
         if self._stored.there is not None:
@@ -174,6 +177,16 @@ class EnergyBalance:
             work = np.abs(fallen * opened) + np.abs((new.pairs.p_s - old.pairs.p_s) * slid)
             total += float(self._stored.pair_weight @ np.where(self._stored.there.opening, work, 0.0))
         return 0.5 * total
+
+    def _press(self, pressure: Real, moved: Complex) -> float:
+        """What the fluid between different curves does as faces move besides what it does as pairs open; that on faces
+        whose other side is gone is told apart."""
+        there, mesh = self._stored.there, self._mesh
+        at = np.unique(mesh.links.fluid_node)
+        if not len(at):
+            return 0.0
+        pushed = evaluate_fluid(mesh, pressure if there is None else np.where(there.bared, 0.0, pressure))
+        return sum_work(self._stored.weight[at], pushed[at], moved[at])
 
     def _measure_bared(self, old: EnergyState, new: EnergyState) -> tuple[float, float]:
         """On faces whose other side is gone: work of the fluid and of given tractions, and what those take that are
@@ -189,6 +202,7 @@ class EnergyBalance:
         pressed[pairs.slave] = pairs.sense * np.where(there.bared, pressure - along, 0.0) * pairs.normal
         given = links.traction_weight * pressed[pairs.slave[links.traction_pair]]
         np.subtract.at(pressed, links.traction_node, given)
+        pressed += evaluate_fluid(mesh, pressure)
         at = there.bare
         moved = (new.displacement - old.displacement)[at]
         fluid = sum_work(self._stored.weight[at], pressed[at], moved)

@@ -81,7 +81,7 @@ def _build_mesh(
         tip=elements.tip[:count].astype(np.int8), position=position,
         normal=(nodes.normal @ np.array([1, 1j]))[each], weight=weigh_nodes(inner, local).ravel(),
         traction_equation=np.zeros(len(position), dtype=bool), pairs=pairs,
-        links=Links(none, none, none, real, none, none, real),
+        links=Links(none, none, none, real, none, none, real, none, none, places),
         region_names=nodes.region_names, curve_names=nodes.curve_names, interface_names=(),
     )  # fmt: skip
 

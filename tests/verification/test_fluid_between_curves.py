@@ -1,0 +1,112 @@
+"""Fluid between two curves of different lengths presses on each of them along its own normals, on its own length."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pbem
+
+Tables = dict[str, Any]
+
+
+def draw_circle(radius: float, elements: int, polygon: bool) -> Tables:
+    if not polygon:
+        return {"center": [0.0, 0.0], "radius": radius, "elements": elements}
+    corners = [[radius * math.cos(angle), radius * math.sin(angle)] for angle in np.linspace(0, 2 * math.pi, 33)]
+    return {"points": [*corners[:-1], corners[0]], "elements": elements}
+
+
+def fill_clearance(
+    first: str, elements: tuple[int, int], unit: float, stress: float, order: int = 2, polygon: bool = False
+) -> Tables:
+    """A disc of radius 1 in a ring from 1.05 to 2, fluid of the pressure 1 in between; nothing holds either."""
+    curves = {"disc": draw_circle(unit, elements[0], polygon), "hole": draw_circle(1.05 * unit, elements[1], polygon),
+              "rim": {"center": [0.0, 0.0], "radius": 2 * unit, "elements": 16}}
+    second = "hole" if first == "disc" else "disc"
+    return {
+        "materials": {"m": {"young": 1000.0 * stress, "poisson": 0.3}}, "curves": curves,
+        "regions": {"disc": {"material": "m", "boundary": ["disc"]},
+                    "ring": {"material": "m", "boundary": ["rim", "hole"]}},
+        "contacts": {"clearance": {"between": [first, second], "law": "open", "pressure": stress}},
+        "analysis": {"steps": 1, "order": order},
+        "output": {"points": [[0.3 * unit, 0.2 * unit], [0.0, 1.5 * unit]]},
+    }
+
+
+@pytest.mark.parametrize(("unit", "stress"), [(1.0, 1.0), (1e3, 1e6)])
+@pytest.mark.parametrize("elements", [(12, 12), (12, 20), (20, 12)])
+@pytest.mark.parametrize("first", ["disc", "hole"])
+def test_a_disc_and_a_ring_under_fluid_in_a_wide_clearance(
+    first: str, elements: tuple[int, int], unit: float, stress: float, tmp_path: Path
+) -> None:
+    """Lame: the longer or the shorter one was pressed by what presses on the other one, 5 % more or less."""
+    results = pbem.run(fill_clearance(first, elements, unit, stress), tmp_path / "ring.h5")
+    inner, outer, at = 1.05, 2.0, 1.5
+    mean = inner**2 / (outer**2 - inner**2)
+    found = results.interior.stress[-1] / stress
+    np.testing.assert_allclose(found[0], [-1.0, -1.0, 0.0], atol=2e-5)
+    expected = [mean * (1 + (outer / at) ** 2), mean * (1 - (outer / at) ** 2), 0.0]
+    np.testing.assert_allclose(found[1], expected, atol=1e-3)
+    hoop = results.hoop_stress[-1][np.isclose(np.abs(results.nodes.position @ [1, 1j]), inner * unit)] / stress
+    np.testing.assert_allclose(hoop, (outer**2 + inner**2) / (outer**2 - inner**2), rtol=5e-3)
+    # What the fluid does: p times the areas that both give way, in plane strain.
+    give = (1 + 0.3) / 1000 * np.array([1 - 2 * 0.3, inner**2 * mean * (1 - 2 * 0.3 + (outer / inner) ** 2)])
+    work = 0.5 * 2 * math.pi * give.sum() * stress * unit**2
+    assert results.energy.external[-1] == pytest.approx(work, rel=2e-3)
+    assert results.energy.elastic[-1] == pytest.approx(results.energy.external[-1], rel=1e-9)
+
+
+@pytest.mark.parametrize("elements", [(32, 64), (64, 32)])
+@pytest.mark.parametrize("first", ["disc", "hole"])
+def test_polygons_under_fluid_in_a_wide_clearance(first: str, elements: tuple[int, int], tmp_path: Path) -> None:
+    """The normals of one face's legs do not meet all of the other's: each is pressed where its own meet the other."""
+    found = pbem.run(fill_clearance(first, elements, 1.0, 1.0, polygon=True), tmp_path / "polygons.h5").interior.stress
+    area = 0.5 * 32 * math.sin(2 * math.pi / 32) / math.pi  # of the polygon over that of its circle
+    np.testing.assert_allclose(found[-1][0], [-1.0, -1.0, 0.0], atol=1e-6)
+    mean = 1.05**2 * area / (4 - 1.05**2 * area)
+    np.testing.assert_allclose(found[-1][1, :2], [mean * (1 + 16 / 9), mean * (1 - 16 / 9)], rtol=1e-2)
+
+
+def seat_arc(first: str, head: Tables, base: Tables, elements: tuple[int, int] = (8, 8), order: int = 2) -> Tables:
+    """A body that ends in an arc of radius 1, in a seat of radius 1.2 about the same centre: 90 degrees of both."""
+    s, wide = math.sqrt(0.5), 1.2 * math.sqrt(0.5)
+    low = {"seat": {"center": [0, 0], "radius": 1.2, "angles": [315, 225], "elements": elements[1]},
+           "left": [[-wide, -wide], [-wide, -3]], "base": [[-wide, -3], [wide, -3]],
+           "right": [[wide, -3], [wide, -wide]]}
+    up = {"foot": {"center": [0, 0], "radius": 1.0, "angles": [225, 315], "elements": elements[0]},
+          "east": [[s, -s], [s, 0.5]], "head": [[s, 0.5], [-s, 0.5]], "west": [[-s, 0.5], [-s, -s]]}
+    return {
+        "materials": {"m": {"young": 1000.0, "poisson": 0.3}},
+        "curves": {name: each if isinstance(each, dict) else {"points": each, "elements": 8}
+                   for name, each in (low | up).items()},
+        "regions": {"up": {"material": "m", "boundary": list(up)}, "low": {"material": "m", "boundary": list(low)}},
+        "contacts": {"k": {"between": [first, "seat" if first == "foot" else "foot"], "law": "open", "pressure": 1.0}},
+        "analysis": {"steps": 1, "order": order}, "boundary": {"head": head, "base": base},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("elements", [(8, 8), (8, 13), (13, 8)])
+@pytest.mark.parametrize("first", ["foot", "seat"])
+def test_each_face_bears_the_fluid_on_its_own_chord(first: str, elements: tuple[int, int], tmp_path: Path) -> None:
+    held = {"ux": 0.0, "uy": 0.0}
+    results = pbem.run(seat_arc(first, held, held, elements), tmp_path / "arcs.h5")
+    np.testing.assert_allclose(results.reactions["head"][-1][:2], [0.0, -math.sqrt(2)], atol=1e-4)
+    np.testing.assert_allclose(results.reactions["base"][-1][:2], [0.0, 1.2 * math.sqrt(2)], atol=1e-4)
+    assert results.energy.external[-1] == pytest.approx(results.energy.elastic[-1], rel=1e-9)
+
+
+@pytest.mark.parametrize("first", ["foot", "seat"])
+def test_free_bodies_are_balanced_by_the_fluid_on_their_own_faces(first: str, tmp_path: Path) -> None:
+    """Each of both bears the fluid on its chord; that of the other one was taken for both."""
+    held = {"ux": 0.0, "uy": 0.0}
+    results = pbem.run(seat_arc(first, {"ty": -1.0}, held), tmp_path / "up.h5")
+    np.testing.assert_allclose(results.reactions["base"][-1][:2], [0.0, 1.2 * math.sqrt(2)], atol=1e-4)
+    pbem.run(seat_arc(first, {"ty": -1.0}, {"ty": 1.0}), tmp_path / "both.h5")
+    for head, base in (({"ty": -1.2}, held), (held, {"ty": 1 / 1.2})):
+        with pytest.raises(pbem.CaseError, match=r"free rigid motion \(translation along y"):
+            pbem.run(seat_arc(first, head, base), tmp_path / "wrong.h5")

@@ -16,9 +16,9 @@ from scipy.linalg import qr
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.mesh.mesh import Mesh
 from pbem.mesh.numbering import number_components, split_components
-from pbem.model.model import Model, Stage
-from pbem.model.rigid_body import NOTHING, RigidBody, find_reference, unit_motions
-from pbem.model.varying import Moment, Places, blend
+from pbem.model.model import Model
+from pbem.model.rigid_body import RigidBody, find_reference, unit_motions
+from pbem.model.rigid_values import blend_rigid
 
 
 @dataclass(frozen=True)
@@ -109,14 +109,9 @@ def constrain_rigid_nodes(rigid: RigidNodes, nodes: int, given: Real, traction_s
 
 def evaluate_rigid(model: Model, stage: int, factor: float) -> Real:
     """Forces and motions (bodies, 3) of all rigid bodies at the fraction of a stage: rotations in radians."""
-    before = model.stages[stage - 1] if stage > 0 else Stage("rest", 1, {}, {})
-    after = model.stages[stage]
-    moment = Moment(model.find_time(stage, 0.0), model.find_time(stage, factor), factor)
-    nowhere = Places(np.zeros(1, dtype=complex), np.zeros(1))
     values = np.zeros((len(model.rigid), 3))
     for number, (name, body) in enumerate(model.rigid.items()):
-        old, new = before.rigid.get(name, NOTHING), after.rigid.get(name, NOTHING)
-        values[number] = [blend(old[k], new[k], nowhere, moment)[0] for k in range(3)]
+        values[number] = blend_rigid(model, name, stage, factor)
         if body.known[2] == "motion":
             values[number, 2] = np.radians(values[number, 2])
     return values

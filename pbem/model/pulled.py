@@ -14,13 +14,12 @@ from pbem.geometry.loop import side_legs
 from pbem.model.model import Model, list_timed
 from pbem.model.resultants import BALANCED, FRACTIONS
 from pbem.model.rigid_body import RigidBody
-from pbem.model.varying import Places, evaluate
+from pbem.model.rigid_values import list_forces
 from pbem.wording import list_names
 
 # A face is flat if its normals differ by less than this.
 FLAT = 1e-6
 _FRACTIONS = np.linspace(0.0, 1.0, 5)
-_NOWHERE = Places(np.zeros(1, dtype=complex), np.zeros(1))
 
 
 def check_pulled(model: Model) -> Iterator[Fault]:
@@ -40,7 +39,7 @@ def check_pulled(model: Model) -> Iterator[Fault]:
             if any(contact in joints for contact in touched):
                 continue
             fractions = FRACTIONS if list_timed(stage) else (1.0,)
-            forces = [_evaluate_force(model, name, number, fraction) for fraction in fractions]
+            forces = [complex(*list_forces(model, name, number, fraction)[:2]) for fraction in fractions]
             pulls = [force for force in forces if (np.conj(force) * normal).real < -BALANCED * abs(force)]
             if pulls:
                 where = list_names([f"'{contact}'" for contact in touched])
@@ -63,10 +62,3 @@ def _find_normal(model: Model, name: str) -> complex | None:
     legs: list[Leg] = [leg for loop in region.loops for side in loop.sides for leg in side_legs(model.curves, side)]
     normals: Complex = np.concatenate([leg.normals(leg.point(_FRACTIONS)) for leg in legs])
     return complex(normals[0]) if np.abs(normals - normals[0]).max() <= FLAT else None
-
-
-def _evaluate_force(model: Model, name: str, number: int, fraction: float) -> complex:
-    time = model.find_time(number, fraction)
-    parts = [float(evaluate(value, _NOWHERE, time)[0]) if known == "force" else 0.0
-             for value, known in zip(model.stages[number].rigid[name][:2], model.rigid[name].known, strict=False)]
-    return complex(parts[0], parts[1])

@@ -13,8 +13,9 @@ from pbem.geometry.loop import loop_legs
 from pbem.model.fluids import list_fluids
 from pbem.model.model import Condition, Model, Region, Stage, list_timed
 from pbem.model.quadrature import NODES, WEIGHTS, divide_side
-from pbem.model.rigid_body import NOTHING, find_reference
+from pbem.model.rigid_body import find_reference
 from pbem.model.rigid_body_modes import RigidBodyMode, find_bounded
+from pbem.model.rigid_values import list_forces
 from pbem.model.varying import Moment, Places, Value, Varying, blend, find_kinks, negate
 from pbem.model.walls import Wall
 
@@ -71,20 +72,17 @@ def measure_power(model: Model, motion: RigidBodyMode, number: int) -> float:
 
 
 def _list_pushes(
-    model: Model, moving: Sequence[Region], before: Stage, stage: Stage, now: Moment
+    model: Model, moving: Sequence[Region], number: int, fraction: float
 ) -> Iterator[tuple[complex, float, complex, str]]:
     """Force and moment of the rigid bodies of moving regions, the point of it, and the region."""
     bounded = find_bounded(model)
     names = {region.name for region in moving}
-    nowhere = Places(np.zeros(1, dtype=complex), np.zeros(1))
     for name, body in model.rigid.items():
         own = [bounded[curve] for curve in body.curves if bounded[curve] in names]
         if own:
-            given = zip(before.rigid.get(name, NOTHING), stage.rigid[name], body.known, strict=True)
-            values = [float(blend(old, value, nowhere, now)[0]) if kind == "force" else 0.0
-                      for old, value, kind in given]
             about = find_reference(body, model.curves, model.origin)
-            yield complex(values[0], values[1]), values[2], about, own[0]
+            x, y, turn = list_forces(model, name, number, fraction)
+            yield complex(x, y), turn, about, own[0]
 
 
 def _has_expressions(stage: Stage) -> bool:
@@ -105,7 +103,7 @@ def _sum_tractions(
     before = model.stages[number - 1] if number else Stage("rest", 1, {}, {})
     now = Moment(model.find_time(number, 0.0), model.find_time(number, fraction), fraction)
     touching = {curve for contact in model.contacts.values() for curve in (contact.first, contact.second)}
-    for push, turn, about, name in _list_pushes(model, moving, before, stage, now):
+    for push, turn, about, name in _list_pushes(model, moving, number, fraction):
         a, spin = motion.velocities[name]
         drive = (np.conj(push) * (a + 1j * spin * about)).real, turn * spin
         force += push

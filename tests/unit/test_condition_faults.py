@@ -128,6 +128,29 @@ def test_a_flat_tool_that_is_pulled_off_is_refused(tool: str, text: str, stage: 
     parse_model(BLOCKS.replace("uy = -0.01", "uy = 0.01"))
 
 
+@pytest.mark.parametrize(("along", "across", "pulled"), [(-1.0, "-2*t", False), (1.0, "3*t*(1 - t)", True)])
+def test_a_tool_is_pulled_by_what_its_forces_are_by_then(along: float, across: str, pulled: bool) -> None:
+    """On a face with the normal (-1, 1): a number grows within its stage, beside an expression of t."""
+    text = f"""
+materials.rock = {{ young = 1e3, poisson = 0.2 }}
+regions.block = {{ material = "rock", boundary = ["low", "right", "top", "left"] }}
+tools.punch = {{ fx = {along}, fy = {{ expression = "{across}" }}, rotation = 0.0 }}
+contacts.seat = {{ between = ["top", "punch"], friction = 0.3 }}
+boundary.low = {{ ux = 0.0, uy = 0.0 }}
+[curves]
+low = {{ points = [[0, 0], [1, 1]], elements = 4 }}
+right = {{ points = [[1, 1], [0, 2]], elements = 4 }}
+top = {{ points = [[0, 2], [-1, 1]], elements = 4 }}
+left = {{ points = [[-1, 1], [0, 0]], elements = 4 }}
+punch = {{ points = [[-0.8, 1.2], [-0.2, 1.8]], elements = 4 }}
+"""
+    if not pulled:
+        parse_model(text)
+        return
+    with pytest.raises(CaseError, match=r"tools.punch .* pulls it off 'seat'"):
+        parse_model(text)
+
+
 def test_a_force_at_the_boundary_of_a_region_at_fault() -> None:
     """The fault of the region alone is told; the point, whose region has no boundary then, was a traceback."""
     text = """

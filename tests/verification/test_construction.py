@@ -327,3 +327,38 @@ def test_the_gap_around_what_was_removed_is_no_jump(gap: float, tmp_path: Path) 
     largest = max(np.abs(each).max() for each in (joint.slip, joint.opening, fit.opening[0] - gap, fit.slip[0]))
     expected = max(errors.slip["joint"][-1], errors.opening["joint"][-1]) / largest
     assert errors.relative["jumps"][-1] == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("turn", [0.0, 30.0])
+@pytest.mark.parametrize("tractions_first", [False, True])
+def test_a_wall_whose_load_comes_to_be_along_other_axes(tractions_first: bool, turn: float, tmp_path: Path) -> None:
+    """A free block under 1 from below: on its wall above a number falls off as what depends on time rises."""
+    along = complex(np.exp(1j * np.radians(turn)))
+    across = 1j * along
+
+    def place(*points: complex) -> list[list[float]]:
+        return [[(along * each).real, (along * each).imag] for each in points]
+
+    def press(tractions: bool, text: str) -> dict[str, Any]:
+        """The pressure of an expression of t (or a number) on what is above, as such or as tractions along x and y."""
+        parts = {"tx": -across.real, "ty": -across.imag} if tractions else {"pressure": 1.0}
+        if "t" in text:
+            return {key: {"expression": f"{part}*({text})"} for key, part in parts.items()}
+        return {key: part * float(text) for key, part in parts.items()}
+
+    case = {
+        "materials": {"m": {"young": 1000.0, "poisson": 0.2}},
+        "curves": {name: {"points": place(*points), "elements": 6} for name, points in {
+            "foot": (0j, 1 + 0j), "east": (1 + 0j, 1 + 1j), "wall": (1 + 1j, 1j), "west": (1j, 0j)}.items()}
+        | {"rim": {"points": place(1 + 1j, 1 + 2j, 2j, 1j), "elements": 12}},
+        "regions": {"low": {"material": "m", "boundary": ["foot", "east", "wall", "west"]},
+                    "high": {"material": "m", "boundary": ["wall", "rim"]}},
+        "stages": [{"steps": 1, "remove": ["high"], "boundary": {
+                       "wall": press(tractions_first, "1"), "foot": {"tx": across.real, "ty": across.imag}}},
+                   {"steps": 4, "boundary": {"wall": press(not tractions_first, "t - 1")}}],
+        "output": {"points": place(0.5 + 0.5j)},
+    }  # fmt: skip
+    stress = pbem.run(case, tmp_path / "wall.h5").interior.stress[1:, 0]
+    sxx, syy, sxy = stress.T
+    tractions = sxx * across.real + sxy * across.imag + 1j * (sxy * across.real + syy * across.imag)
+    np.testing.assert_allclose(tractions, -across, atol=1e-6)

@@ -24,6 +24,7 @@ FUNCTIONS_OF_TWO: Mapping[str, Callable[[Real, Real], Real]] = {
 _OPERATORS: Mapping[type[ast.operator], Callable[[Real, Real], Real]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Pow: np.power,
 }
+# Characters that users may write; what the program composes from several texts may be longer.
 LONGEST = 2000
 _UNREADABLE = ("a text that cannot be read", 'an expression such as "0.1*sin(2*pi*t)"')
 
@@ -52,6 +53,13 @@ def evaluate_expression(text: str, **variables: ArrayLike) -> Real:
     except RecursionError:
         raise ExpressionError(*_UNREADABLE) from None
     return np.array(np.broadcast_to(value, shape))
+
+
+def read_expression(text: str, **variables: ArrayLike) -> Real:
+    """The values of an expression as a user wrote it, which may have LONGEST characters; see `evaluate_expression`."""
+    if len(text) > LONGEST:
+        raise ExpressionError(f"a text of {len(text)} characters", f"at most {LONGEST}")
+    return evaluate_expression(text, **variables)
 
 
 def list_names(text: str) -> set[str]:
@@ -99,8 +107,6 @@ def _find_degree(node: ast.expr, names: tuple[str, ...]) -> float:
 
 
 def _parse(text: str) -> ast.expr:
-    if len(text) > LONGEST:
-        raise ExpressionError(f"a text of {len(text)} characters", f"at most {LONGEST}")
     if "\0" in text:  # Python 3.13 tells it otherwise than 3.11
         raise ExpressionError(*_UNREADABLE)
     try:

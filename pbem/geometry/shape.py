@@ -13,7 +13,7 @@ import numpy as np
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
-from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.expression import ExpressionError, read_expression
 from pbem.geometry.tolerance import Tolerance, join_points
 
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
@@ -80,7 +80,7 @@ def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Cu
     count = sum(division.count([1.0]))
     t = Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
     try:
-        x, y = (evaluate_expression(text, t=t) for text in texts)
+        x, y = (read_expression(text, t=t) for text in texts)
     except ExpressionError as error:
         return Fault.at(path, error.found, error.expected)
     for axis, values in (("x", x), ("y", y)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pbem.description.varying import VaryingTable
 from pbem.errors import Fault, KeyPath
-from pbem.geometry.expression import ExpressionError, evaluate_expression
+from pbem.geometry.expression import ExpressionError, read_expression
 from pbem.model.varying import Value, Varying
 
 
@@ -21,7 +21,7 @@ def read_value(
         return Varying(table=given.table or ()), []
     try:
         time = {"t": 0.0} if timed else {}
-        evaluate_expression(given.expression, x=0.0, y=0.0, s=0.0, **time)
+        read_expression(given.expression, x=0.0, y=0.0, s=0.0, **time)
     except ExpressionError as error:
         return 0.0, [Fault.at(loc, error.found, error.expected)]
     return Varying(given.expression), []

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 
 from pbem.arrays import Complex
-from pbem.geometry.expression import ExpressionError, evaluate_expression, is_linear
+from pbem.geometry.expression import ExpressionError, is_linear, read_expression
 
 # An expression is linear to this part of its largest value.
 EXACT = 1e-9
@@ -18,7 +18,7 @@ def fit_linear(text: str, corners: Complex) -> tuple[float, float, float]:
     and where it has no finite value."""
     across, up = corners[1] - corners[0], corners[2] - corners[0]
     points = corners[0] + np.array([0, 1, 0, 1, 0.37, 0.81]) * across + np.array([0, 0, 1, 1, 0.64, 0.23]) * up
-    values = evaluate_expression(text, x=points.real, y=points.imag)
+    values = read_expression(text, x=points.real, y=points.imag)
     wrong = values[~np.isfinite(values)]
     if len(wrong):
         raise ExpressionError(f'"{text}", which is {wrong[0]:g} somewhere', "an expression with finite values")

@@ -7,7 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from pbem.geometry.expression import CONSTANTS, FUNCTIONS, FUNCTIONS_OF_TWO, ExpressionError, evaluate_expression
+from pbem.geometry.expression import (
+    CONSTANTS,
+    FUNCTIONS,
+    FUNCTIONS_OF_TWO,
+    ExpressionError,
+    evaluate_expression,
+    read_expression,
+)
 
 VALUES = {
     "2*t": 1.4,
@@ -107,7 +114,7 @@ WRONG = {
 @pytest.mark.parametrize("text", WRONG, ids=range(len(WRONG)))
 def test_what_is_no_expression_is_told_with_its_place(text: str) -> None:
     with pytest.raises(ExpressionError) as caught:
-        evaluate_expression(text, t=0.5)
+        read_expression(text, t=0.5)
     assert WRONG[text] in str(caught.value)
 
 

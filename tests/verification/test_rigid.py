@@ -217,3 +217,9 @@ def test_parts_of_a_force_grow_each_by_itself(tmp_path: Path) -> None:
     np.testing.assert_allclose(found, -np.stack([along, up], axis=1), atol=2e-3 * 16)
     found = react({"fx": 1.0, "fy": -1.0}, [{}, {"fx": push, "fy": -3.0}])
     np.testing.assert_allclose(found, -np.array([[0.5, -0.5], [1, -1], [9, -2], [16, -3]]), atol=2e-3 * 16)
+    # Texts as long as may be, of which the traction is composed.
+    long = {key: {"expression": " + ".ljust(11).join([f"{part}e-2*t"] * 100)}
+            for key, part in [("fx", 4.0), ("fy", -3.0)]}
+    assert all(len(each["expression"]) > 1850 for each in long.values())
+    found = react({**long, "moment": {"expression": "0*t"}}, [{}])
+    np.testing.assert_allclose(found, -np.array([[2.0, -1.5], [4.0, -3.0]]), atol=2e-3 * 4)

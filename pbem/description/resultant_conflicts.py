@@ -11,6 +11,8 @@ from pbem.description.finding import Finding
 from pbem.errors import KeyPath
 from pbem.wording import list_names
 
+# What all of a rigid motion is given by.
+MOTIONS = ("ux", "uy", "rotation")
 # What a table of a force says besides its values.
 BESIDES = {"about", "how", "at"}
 
@@ -19,7 +21,10 @@ def check_resultants(raw: Mapping[str, Any]) -> list[Finding]:
     """A fault for every force, on a curve or at a point, without a value in its table and in all stages; for a point
     that nothing is about; and for a resultant by the name of a line, which is several curves."""
     findings = [*_check_lines(raw)]
+    told = {finding.loc for finding in findings}
     for loc, table in _list_forces(raw):
+        if loc in told:
+            continue
         uniform = table.get("how", "uniform") == "uniform"
         point = loc[0] == "point_loads"
         if not any(set(each) - BESIDES for each in (table, *_list_changes(raw, loc))):
@@ -33,7 +38,8 @@ def check_resultants(raw: Mapping[str, Any]) -> list[Finding]:
 
 
 def _check_lines(raw: Mapping[str, Any]) -> Iterator[Finding]:
-    """Conditions by the name of a line hold for each of its curves, which would have the whole of a force each."""
+    """Conditions by the name of a line hold for each of its curves, which would have the whole of a force each, or move
+    by itself."""
     stages = raw.get("stages")
     tables: list[tuple[KeyPath, Mapping[str, Any]]] = [(("boundary",), _read(raw, "boundary"))]
     tables += [(("stages", number, "boundary"), _read(stage, "boundary"))
@@ -45,12 +51,24 @@ def _check_lines(raw: Mapping[str, Any]) -> Iterator[Finding]:
             for key in ("force", "rigid") if len(curves) > 1 else ():
                 if key in conditions[name]:
                     quoted = [f"'{curve}'" for curve in curves]
-                    expected = {
-                        "force": f"a force on each of {list_names(quoted)}, or tractions (tx, ty), which are per area",
-                        "rigid": f"rigid on {quoted[0]}, which has the others in its key `curves`",
-                    }[key]
-                    found = f"{key} on '{name}', a line of {len(curves)} curves"
-                    yield Finding((*loc, name, key), found, expected)
+                    expected = _expect_motion(raw, name, quoted) if key == "rigid" else (
+                        f"a force on each of {list_names(quoted)}, or tractions (tx, ty), which are per area")
+                    if expected:
+                        found = f"{key} on '{name}', a line of {len(curves)} curves"
+                        yield Finding((*loc, name, key), found, expected)
+
+
+def _expect_motion(raw: Mapping[str, Any], name: str, quoted: list[str]) -> str:
+    """What is expected in the place of `rigid` on a line; nothing if all of its curves have one motion, which is given.
+    """
+    base = _read(_read(_read(raw, "boundary"), name), "rigid")
+    tables = [base, *_list_changes(raw, ("boundary", name, "rigid"))]
+    given = {key for table in tables for key in table} - {"about"}
+    if given != set(MOTIONS):
+        return f"rigid on {quoted[0]}, which has the others in its key `curves`"
+    turned = any(table.get("rotation", 0) != 0 for table in tables)
+    return "about = [x, y], about which all of them turn: each one would about its own middle" if (
+        turned and "about" not in base) else ""
 
 
 def _list_forces(raw: Mapping[str, Any]) -> Iterator[tuple[KeyPath, Mapping[str, Any]]]:

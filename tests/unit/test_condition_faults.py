@@ -167,9 +167,12 @@ point_supports.left = { at = [-0.25, 0.0], ux = 0.0, uy = 0.0 }
 
 
 @pytest.mark.parametrize("stage", [False, True], ids=["at once", "in a stage"])
-@pytest.mark.parametrize(("key", "table"), [("force", "{ fy = -1.0 }"), ("rigid", "{ fy = -1.0, ux = 0.0 }")])
+@pytest.mark.parametrize(("key", "table"), [
+    ("force", "{ fy = -1.0 }"), ("rigid", "{ fy = -1.0, ux = 0.0 }"),
+    ("rigid", "{ ux = 0.0, uy = 1e-3, rotation = 0.1 }"),
+])  # fmt: skip
 def test_a_resultant_of_a_line_of_several_curves_is_refused(key: str, table: str, stage: bool) -> None:
-    """Each of its curves had the whole force, and moved by itself where it was rigid."""
+    """Each of its curves had the whole force, and moved by itself where it was rigid, or about its own middle."""
     line = """
 "left1.1" = { points = [[0, 2], [0, 1.5]], elements = 2 }
 "left1.2" = { points = [[0, 1.5], [0, 1]], elements = 2 }
@@ -185,3 +188,6 @@ def test_a_resultant_of_a_line_of_several_curves_is_refused(key: str, table: str
     (fault,) = raised.value.faults
     assert str(fault).startswith(("stages[1]." if stage else "") + f"boundary.left1.{key} (line")
     assert f"{key} on 'left1', a line of 2 curves" in str(fault)
+    if key == "force" and not stage:  # one cause, one fault
+        with pytest.raises(CaseError, match=r"1 fault\n.*a line of 2 curves"):
+            parse_model(case + "[boundary.left1]\nforce = {}")

@@ -223,3 +223,28 @@ def test_parts_of_a_force_grow_each_by_itself(tmp_path: Path) -> None:
     assert all(len(each["expression"]) > 1850 for each in long.values())
     found = react({**long, "moment": {"expression": "0*t"}}, [{}])
     np.testing.assert_allclose(found, -np.array([[2.0, -1.5], [4.0, -3.0]]), atol=2e-3 * 4)
+
+
+@pytest.mark.parametrize("motion", [
+    {"ux": 2e-3, "uy": -1e-3, "rotation": 0.0}, {"ux": 2e-3, "uy": -1e-3, "rotation": 0.2, "about": [0.3, 1.5]},
+])  # fmt: skip
+def test_a_line_of_two_curves_moves_as_one_where_its_motion_is_given(motion: dict[str, Any], tmp_path: Path) -> None:
+    """As the one rigid body of both curves, without any value in the first table and by stages too."""
+    curves = {"low": [[0, 0], [1, 0]], "east": [[1, 0], [1, 1]], "top.1": [[1, 1], [0.4, 1]],
+              "top.2": [[0.4, 1], [0, 1]], "west": [[0, 1], [0, 0]]}
+
+    def react(boundary: dict[str, Any], **more: Any) -> Real:
+        results = pbem.run({
+            "materials": {"m": {"young": 1000.0, "poisson": 0.2}},
+            "curves": {name: {"points": points, "elements": 6} for name, points in curves.items()},
+            "regions": {"block": {"material": "m", "boundary": list(curves)}}, "analysis": {"steps": 1},
+            "boundary": {"low": {"ux": 0.0, "uy": 0.0}, **boundary}, **more,
+        }, tmp_path / "block.h5", force=True)
+        return np.array([results.reactions[name][-1] for name in ("low", "top.1", "top.2")])
+
+    expected = react({"top.1": {"rigid": {**motion, "curves": ["top.2"]}}})
+    np.testing.assert_allclose(react({"top": {"rigid": motion}}), expected, atol=1e-9)
+    values = {key: value for key, value in motion.items() if key != "about"}
+    first = {key: value for key, value in motion.items() if key == "about"}
+    staged = react({"top": {"rigid": first}}, stages=[{"steps": 1, "boundary": {"top": {"rigid": values}}}])
+    np.testing.assert_allclose(staged, expected, atol=1e-9)

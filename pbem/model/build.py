@@ -15,7 +15,7 @@ from pbem.geometry.junction import find_crossings, format_vector, split_at_junct
 from pbem.geometry.loop import Loops, find_loops
 from pbem.model.approach import find_closing
 from pbem.model.coincidence import find_coincidences
-from pbem.model.construction import arrange_model, group_stages
+from pbem.model.construction import arrange_model, check_gone_points, group_stages
 from pbem.model.crack import (
     check_inside,
     check_near_misses,
@@ -131,7 +131,8 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     drawn = (*shown, cut.notes, cut.faults, case.curves, pointed, case.tools, overlaps)
     topology = recall.find("topology", drawn, lambda: _find_topology(cut, loading))
     interior, wrong = list_interior_points(case)
-    faults = [*roles.faults, *check_tools(case, roles), *topology.faults, *loading.faults, *wrong]
+    faults = [*roles.faults, *check_tools(case, roles), *topology.faults, *loading.faults, *wrong,
+              *check_gone_points(case, topology.points.loads, topology.supports)]
     if faults:
         return None, case, faults
     model, faults = _compose(case, roles, loading, topology, recall)

@@ -9,10 +9,14 @@ from pbem.description.case import Case
 from pbem.description.schema import StageTable
 from pbem.errors import Fault, KeyPath
 from pbem.model.model import Construction, Contact, Hold, Interface, Law, Model, Stage
+from pbem.model.point_loads import PointLoad
+from pbem.model.point_supports import PointSupport
 from pbem.model.roles import Roles, describe_name, unknown_name
 
 # What a stage says of interfaces, cracks and contacts, with what they are from then on (None: what their law says).
 KEYS: Mapping[str, Hold | None] = {"open": "open", "close": "closed", "release": None}
+
+NO_VALUES = "no values for a removed object, in the stage that removes it and in later ones"
 
 
 def read_construction(
@@ -95,15 +99,30 @@ def _check_gone(roles: Roles, number: int, table: StageTable, removed: Collectio
     gone |= {("temperature", name): ("a temperature", name) for name in table.temperature if name in removed}
     gone |= {("eigenstrain", name): ("an eigenstrain", name) for name in table.eigenstrain if name in removed}
     for loc, (found, region) in gone.items():
-        yield Fault.at(("stages", number, *loc), f"{found} of region '{region}', which is gone",
-                       "no values for a removed object, in the stage that removes it and in later ones")
+        yield Fault.at(("stages", number, *loc), f"{found} of region '{region}', which is gone", NO_VALUES)
     for name in table.interfaces:
         sides = roles.shared[name] if name in roles.shared else [roles.cracks.get(name)]
         if not set(removed).isdisjoint(sides):
             expected = (f"its pressure in [stages.boundary.{name}]" if name in list_bared(roles, removed) else
-                        "no values for a removed object, in the stage that removes it and in later ones")
+                        NO_VALUES)
             yield Fault.at(("stages", number, "interfaces", name), f"a pressure of '{name}', where a region is gone",
                            expected)
+
+
+def check_gone_points(
+    case: Case, loads: Mapping[str, PointLoad], supports: Mapping[str, PointSupport]
+) -> Iterator[Fault]:
+    """The same of points, which belong to regions by where they lie."""
+    owners = {("point_loads", name): ("a point load", {load.region}) for name, load in loads.items()}
+    owners |= {("point_supports", name): ("a point support", {region for region, _ in support.owners})
+               for name, support in supports.items()}
+    for number, stage in enumerate(case.stages):
+        removed = list_removed(case, number)
+        given = [(key, name) for key in ("point_loads", "point_supports") for name in getattr(stage, key)]
+        for loc in given:
+            kind, regions = owners.get(loc, ("", set()))
+            if regions and regions <= removed:
+                yield Fault.at(("stages", number, *loc), f"{kind} on region '{min(regions)}', which is gone", NO_VALUES)
 
 
 def _check_joints(

@@ -67,6 +67,14 @@ WRONG = {
                                "stages[1].eigenstrain.up", ["region 'up', which is gone"]),
     "conditions of what is gone": ('[[stages]]\nremove = ["up"]\n[[stages]]\n[stages.boundary.left1]\ntx = 5.0',
                                    "stages[2].boundary.left1", ["region 'up', which is gone"]),
+    "a point load on what is gone": (
+        '[point_loads.p]\nat = [1.0, 1.5]\nfx = 1.0\n[[stages]]\n[[stages]]\nremove = ["up"]\n[[stages]]\n'
+        "[stages.point_loads.p]\nfx = 2.0", "stages[3].point_loads.p", ["a point load on region 'up', which is gone"]),
+    "a point load on what goes": ('[point_loads.p]\nat = [0.0, 1.5]\nfx = 1.0\n[[stages]]\nremove = ["up"]\n'
+                                  "[stages.point_loads.p]\nfx = 2.0", "stages[1].point_loads.p", ["which is gone"]),
+    "a support of what is gone": ('[point_supports.p]\nat = [2.0, 1.5]\nux = 0.0\n[[stages]]\nremove = ["up"]\n'
+                                  "[[stages]]\n[stages.point_supports.p]\nux = 0.1", "stages[2].point_supports.p",
+                                  ["a point support on region 'up', which is gone"]),
     "pressure of faces that are gone": (
         '[interfaces.seam]\nlaw = "coulomb"\nfriction = 0.3\n[[stages]]\nremove = ["up"]\n[[stages]]\n'
         "[stages.interfaces.seam]\npressure = 5.0", "stages[2].interfaces.seam", ["[stages.boundary.seam]"]),

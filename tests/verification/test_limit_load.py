@@ -121,6 +121,33 @@ def test_a_body_that_is_free_in_one_search_alone_is_no_limit_load(monkeypatch: p
     assert {0.5, 1.0} <= {step.factor for step in steps if step.stage == 1}
 
 
+def test_what_fails_from_nearer_for_another_reason_is_no_limit_load(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Friction bears a push of 0.25; from half of 0.2 on a search ends with a block that moves freely, others cycle.
+    class Told(Listener):
+        target, failed = 0.0, 0
+
+        def start_step(self, stage: int, reached: float, target: float) -> None:
+            self.target = target if stage == 1 else 0.0
+
+    solve, listener = march.solve_step, Told()
+
+    def fail(*arguments: Any, **keys: Any) -> Any:
+        if listener.target < 0.5:
+            return solve(*arguments, **keys)
+        listener.failed += 1
+        raise ConvergenceError("free motion" if listener.failed == 1 else "mode cycle", "as it is made to")
+
+    model = parse_model(write_pushed_block(0.2, {"friction": 0.25}))[1]
+    for searches in (march, softly):
+        monkeypatch.setattr(searches, "solve_step", fail)
+    reached = 0.0
+    with pytest.raises(ConvergenceError) as caught:
+        for step in march.march(assemble_problem(model, generate_mesh(model), world), listener):
+            reached = step.factor
+    assert listener.failed > 1 and 0.49 < reached < 0.5
+    assert caught.value.reason == "mode cycle" and "smallest allowed" in str(caught.value)
+
+
 def test_small_steps_that_fail_for_other_reasons_are_no_limit_load(monkeypatch: pytest.MonkeyPatch) -> None:
     # What forces could balance is then the whole step, however little it is more than what was reached.
     def fail(*_: object, **__: object) -> None:

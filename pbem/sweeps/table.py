@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import html
 import io
@@ -219,19 +220,22 @@ class TableFile:
             raise StorageError(str(self.path), f"cannot be sorted ({error.strerror or error})") from error
 
     def _replace(self, rows: Sequence[Row]) -> None:
-        """Another file in its place, at once."""
+        """Another file in its place, at once; if that fails, the file stays as it is, with its lock."""
         target = Path(os.path.realpath(self.path))
         part = target.with_name(f".{target.name}.part")
-        with part.open("w", encoding="utf-8", newline="") as file:
-            file.write(_write_lines([self.header, *(row.write(self._mark) for row in rows)]))
-            file.flush()
-            os.fsync(file.fileno())
-            former, self._lock = self._lock, os.dup(file.fileno())
-        try:
-            lock(self._lock)
+        with contextlib.ExitStack() as undo:
+            undo.callback(part.unlink, missing_ok=True)
+            with part.open("w", encoding="utf-8", newline="") as file:
+                file.write(_write_lines([self.header, *(row.write(self._mark) for row in rows)]))
+                file.flush()
+                os.fsync(file.fileno())
+                own = os.dup(file.fileno())
+            undo.callback(os.close, own)
+            lock(own)
             part.replace(target)
-        finally:
-            os.close(former)
+            undo.pop_all()
+        former, self._lock = self._lock, own
+        os.close(former)
 
 
 def _write_lines(lines: Sequence[Sequence[str]]) -> str:

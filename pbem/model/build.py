@@ -39,6 +39,7 @@ from pbem.model.material import Material
 from pbem.model.model import Analysis, Model, Region, SolverOptions, Stage
 from pbem.model.origin import move_to_own_origin
 from pbem.model.overlap import check_contacts, find_overlaps, list_apart
+from pbem.model.piece_faults import check_interface_along
 from pbem.model.point_loads import PointLoads, place_point_loads, split_at_points
 from pbem.model.point_supports import PointSupport, place_point_supports
 from pbem.model.pulled import check_pulled
@@ -141,7 +142,7 @@ def _examine(case: Case, conditions_known: bool, recall: Recall) -> tuple[Model 
     faults += [*turning, *check_facing(model), *check_interior_points(case, model)]
     varying = [
         fault for name, interface in model.interfaces.items()
-        for fault in check_along(("interfaces", name), interface.law, model.curves[name])
+        for fault in check_interface_along(case, name, interface, model.curves[name])
     ]
     varying += [
         fault for name, contact in model.contacts.items()

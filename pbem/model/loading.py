@@ -16,6 +16,7 @@ from pbem.model.given import read_value
 from pbem.model.in_situ import LinearStress
 from pbem.model.law import read_law
 from pbem.model.model import Condition, Contact, Interface, Law, Quantity, Stage, list_timed
+from pbem.model.piece_faults import read_interface_law
 from pbem.model.point_loads import read_point_forces
 from pbem.model.point_supports import read_support_values
 from pbem.model.rigid_body import RigidLoading, read_rigid_loading
@@ -77,7 +78,7 @@ def read_loading(case: Case, roles: Roles) -> Loading:
         # One table may stand for many interfaces that were generated together, and its faults for theirs.
         key = (id(table), default) if name in generated else name
         if key not in laws:
-            laws[key], wrong = read_law(case, ("interfaces", name), table, default)
+            laws[key], wrong = read_interface_law(case, name, table, default)
             faults += wrong
         interfaces[name] = Interface(name, sides[0], sides[1], laws[key])
     contacts: dict[str, Contact] = {}

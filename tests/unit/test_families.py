@@ -127,3 +127,35 @@ def test_a_curve_beside_another_one_shares_no_law_by_its_name() -> None:
     )  # fmt: skip
     with pytest.raises(CaseError, match=r'interfaces\."t\.1"\.friction_dynamic: found only friction_dynamic'):
         build_model(case)
+
+
+WEAK = {"friction": 0.6, "friction_dynamic": 0.3, "slip_distance": 1e-3}
+
+
+@pytest.mark.parametrize(("trace", "own", "key", "what"), [
+    (WEAK, {"friction": 0.2}, "friction", "friction_dynamic = 0.3 above the static friction of 0.2"),
+    (WEAK, {"friction": 0.2, "gap": 0.1}, "", "friction_dynamic = 0.3 above the static friction of 0.2"),
+    (WEAK, {"friction": {"expression": "0.2 + 0*s"}}, "friction", "friction_dynamic above the static friction at"),
+    ({"friction": 0.5, "dilation_angle": 20.0}, {"friction_angle": 5.0}, "friction_angle", "dilation_angle = 20 on"),
+    ({"friction": 0.5, "cohesion": 2.0, "tensile_strength": 2.0}, {"cohesion": 0.1}, "cohesion", "tensile_strength ="),
+    ({"cohesion": 1.0, "cohesion_lost": True}, {"cohesion": 0.0}, "cohesion", "cohesion_lost on faces without"),
+])  # fmt: skip
+def test_a_fault_that_a_piece_causes_is_told_at_its_own_key(
+    trace: dict[str, Any], own: dict[str, Any], key: str, what: str
+) -> None:
+    """The keys of the trace, which are right by themselves, were said to be wrong, without the name of the piece."""
+    build_model(make(interfaces={"t12": trace}))
+    with pytest.raises(CaseError) as caught:
+        build_model(make(interfaces={"t12": trace, "t12.2": own, "t12.10": {"gap": 0.05}}))
+    (fault,) = caught.value.faults
+    assert fault.place == 'interfaces."t12.2"' + (f".{key}" if key else "")
+    assert what in fault.found and "with what is said of 't12'" in fault.found
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_a_fault_of_a_trace_is_told_there_whatever_its_pieces_say(every: bool) -> None:
+    wrong = {"friction": 0.3, "friction_dynamic": 0.4, "slip_distance": 1e-3}
+    pieces = {f"t12.{k}": {"gap": 0.1} for k in ((1, 2, 10) if every else (2,))}
+    with pytest.raises(CaseError) as caught:
+        build_model(make(interfaces={"t12": wrong, **pieces}))
+    assert {fault.place for fault in caught.value.faults} == {"interfaces.t12.friction_dynamic"}

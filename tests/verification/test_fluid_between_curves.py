@@ -110,3 +110,44 @@ def test_free_bodies_are_balanced_by_the_fluid_on_their_own_faces(first: str, tm
     for head, base in (({"ty": -1.2}, held), (held, {"ty": 1 / 1.2})):
         with pytest.raises(pbem.CaseError, match=r"free rigid motion \(translation along y"):
             pbem.run(seat_arc(first, head, base), tmp_path / "wrong.h5")
+
+
+@pytest.mark.parametrize("first", ["foot", "seat"])
+def test_a_rigid_tool_bears_the_fluid_on_its_own_chord(first: str, tmp_path: Path) -> None:
+    case = seat_arc(first, {}, {"ux": 0.0, "uy": 0.0})
+    for name in ("east", "head", "west"):
+        del case["curves"][name]
+    del case["regions"]["up"], case["boundary"]["head"]
+    results = pbem.run(case | {"tools": {"foot": {"ux": 0.0, "uy": 0.0, "rotation": 0.0}}}, tmp_path / "tool.h5")
+    np.testing.assert_allclose(results.rigid["foot"].force[-1], [0.0, -math.sqrt(2), 0.0], atol=1e-6)
+    np.testing.assert_allclose(results.reactions["base"][-1][:2], [0.0, 1.2 * math.sqrt(2)], atol=1e-4)
+    with pytest.raises(pbem.CaseError, match=r"tools\.foot: found a free rigid motion \(translation along y"):
+        push = {"ux": 0.0, "fy": -1.2 * math.sqrt(2), "rotation": 0.0}
+        pbem.run(case | {"tools": {"foot": push}}, tmp_path / "wrong.h5")
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.3])
+@pytest.mark.parametrize("first", ["foot", "top"])
+def test_kinks_of_the_pressure_lie_opposite_on_the_other_curve(first: str, gap: float, tmp_path: Path) -> None:
+    """A free block over a wider free one: loads that balance are seen to, though the table is along the first curve."""
+    low = {"base": [[0, 0], [3, 0]], "right": [[3, 0], [3, 1]], "top": [[3, 1], [0, 1]], "left": [[0, 1], [0, 0]]}
+    y = 1 + gap
+    up = {"foot": [[0.9, y], [2.1, y]], "east": [[2.1, y], [2.1, 3]], "head": [[2.1, 3], [0.9, 3]],
+          "west": [[0.9, 3], [0.9, y]]}
+    start = 0.0 if first == "foot" else 0.9
+    table = [[start + s, value] for s, value in ((0.0, 0.0), (0.37, 1.0), (0.6, 0.2), (0.83, 1.0), (1.2, 0.0))]
+    force = 0.37 * 1.0 + 0.23 * 1.2
+
+    def make(force: float) -> Tables:
+        return {
+            "materials": {"m": {"young": 1000.0, "poisson": 0.2}},
+            "curves": {name: {"points": points, "elements": 6} for name, points in (low | up).items()},
+            "regions": {"low": {"material": "m", "boundary": list(low)}, "up": {"material": "m", "boundary": list(up)}},
+            "boundary": {"base": {"ty": force / 3}, "head": {"ty": -force / 1.2}}, "analysis": {"steps": 1},
+            "contacts": {"seat": {"between": [first, "top" if first == "foot" else "foot"], "law": "open",
+                                  "pressure": {"table": table}}},
+        }
+
+    pbem.run(make(force), tmp_path / "blocks.h5")
+    with pytest.raises(pbem.CaseError, match=r"free rigid motion \(translation along y"):
+        pbem.run(make(1.001 * force), tmp_path / "wrong.h5")

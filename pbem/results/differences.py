@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbem.arrays import Complex, Real
+from pbem.arrays import Complex, Integer, Real
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -14,12 +14,25 @@ from pbem.solve.problem.step import Step
 
 def sum_reactions(model: Model, mesh: Mesh, step: Step) -> Complex:
     """Integral (c,) of the traction over every outer curve, complex."""
+    nodes, curve = _list_outer_nodes(model, mesh)
+    force, count = mesh.weight[nodes] * step.traction[nodes], len(model.conditions)
+    return np.bincount(curve, force.real, count) + 1j * np.bincount(curve, force.imag, count)
+
+
+def sum_sizes(model: Model, mesh: Mesh, step: Step) -> Real:
+    """Integral (c,) of the size of the traction over every outer curve: forces that balance each other count as well.
+    """
+    nodes, curve = _list_outer_nodes(model, mesh)
+    size: Real = mesh.weight[nodes] * np.abs(step.traction[nodes])
+    return np.bincount(curve, size, len(model.conditions)).astype(float)
+
+
+def _list_outer_nodes(model: Model, mesh: Mesh) -> tuple[Integer, Integer]:
+    """The nodes (k,) of outer curves, and the numbers (k,) of these curves."""
     numbers = {name: number for number, name in enumerate(model.conditions)}
-    of = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)[mesh.node_curve]
-    outer = of >= 0
-    force = (mesh.weight * step.traction[: mesh.nodes])[outer]
-    count = len(numbers)
-    return np.bincount(of[outer], force.real, count) + 1j * np.bincount(of[outer], force.imag, count)
+    curve = np.array([numbers.get(name, -1) for name in mesh.curve_names], dtype=np.int64)[mesh.node_curve]
+    nodes = np.flatnonzero(curve >= 0)
+    return nodes, curve[nodes]
 
 
 def subtract_displacements(mesh: Mesh, beside: Beside, step: Step, second: Step) -> Complex:

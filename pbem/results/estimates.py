@@ -14,7 +14,7 @@ from pbem.mesh.mesh import Mesh, sort_pairs
 from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.between import Violations
-from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions
+from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions, sum_sizes
 from pbem.results.rates import EndFinder, choose_force_divisor, choose_jump_divisors, list_force_shares
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
@@ -33,6 +33,9 @@ LEAST_FACTOR_ERROR = 0.005
 # Jumps below this part of what the tractions strain over an interface are none: where faces stay together as they are
 # by symmetry, all of a jump is error.
 LEAST_JUMP = 1e-2
+# Reactions below this part of the forces without signs on a curve are none: where loads balance each other along it,
+# all of its reaction is error. Slender beams have less than that of the forces at their ends from 1:600 on.
+LEAST_REACTION = 1e-3
 
 JUMPS = ("opening", "slip")
 
@@ -61,9 +64,9 @@ class Estimates:
 class Scales:
     """The largest values so far.
 
-    reactions: magnitude; jumps: on any interface, at least LEAST_JUMP; tractions: root of their mean square on an
-    interface; peak: traction of a pair; factors: K; displacement; strained: modulus times strain of a region, or what
-    counts as much (see _measure_strained), of which a part ROUNDING is rounding.
+    reactions: magnitude, at least LEAST_REACTION; jumps: on any interface, at least LEAST_JUMP; tractions: root of
+    their mean square on an interface; peak: traction of a pair; factors: K; displacement; strained: modulus times
+    strain of a region, or what counts as much (see _measure_strained), of which a part ROUNDING is rounding.
     """
 
     reactions: float = 0.0
@@ -138,7 +141,8 @@ class Comparison:
         longest = max((float(weight[p].sum()) for p in self._interfaces), default=0.0)
         least = LEAST_JUMP * tractions / max(region.material.plane_modulus for region in self._model.regions) * longest
         return Scales(
-            reactions=_largest(np.abs(sum_reactions(self._model, mesh, step))),
+            reactions=max(_largest(np.abs(sum_reactions(self._model, mesh, step))),
+                          LEAST_REACTION * _largest(sum_sizes(self._model, mesh, step))),
             jumps=max(_largest(contact.opening - self._gap), _largest(contact.slip), least),
             tractions=tractions,
             peak=float(np.sqrt(_largest(contact.traction_n**2 + contact.traction_s**2))),

@@ -161,6 +161,26 @@ def test_the_accuracy_asked_for_is_met_by_a_reaction(tmp_path: Path) -> None:
     assert abs(forces[1] / forces[2] - 1) < 1e-3
 
 
+@pytest.mark.parametrize("accuracy, most", [(1e-2, 100), (1e-4, 300)])
+def test_a_reaction_that_balances_itself_asks_for_no_elements(accuracy: float, most: int, tmp_path: Path) -> None:
+    # A frame that holds a plate whose hole is pressed: what it bears adds up to nothing, and all of that is error.
+    (tmp_path / "frame.toml").write_text(f"""
+    materials.m = {{ young = 1000.0, poisson = 0.3 }}
+    curves.frame = {{ points = [[-2, -2], [3, -2], [3, 2], [-2, 2], [-2, -2]], elements = 16 }}
+    curves.hole = {{ center = [0.4, 0.1], radius = 1.0, angles = [0.0, 360.0], elements = 12 }}
+    regions.plate = {{ material = "m", boundary = ["frame", "hole"] }}
+    boundary.frame = {{ ux = 0.0, uy = 0.0 }}
+    boundary.hole = {{ tn = -1.0 }}
+    analysis = {{ accuracy = {accuracy} }}
+    """)
+    results = pbem.run(tmp_path / "frame.toml", tmp_path / "frame.h5")
+    error = results.errors.relative["reactions"][-1]
+    borne = float(np.hypot(*np.asarray(results.reactions["frame"][-1])))  # of some 2 pi on the hole
+    assert borne < 1e-3 * 2 * np.pi * accuracy
+    assert len(results.displacement_at(-1)) < most
+    assert 0 < error < accuracy / limits.SAFETY
+
+
 def test_a_refined_run_is_gone_on_with_and_drawn(tmp_path: Path) -> None:
     case, whole, part = tmp_path / "block.toml", tmp_path / "whole.h5", tmp_path / "part.h5"
     case.write_text(BLOCK.format(accuracy=1e-3))

@@ -17,7 +17,6 @@ from pbem.contact.free_motions import (
     close_all,
     close_nearest_beside,
     close_nearest_pairs,
-    find_contacts_of,
     open_unequal_neighbours,
     stick_calmest_pairs,
 )
@@ -31,7 +30,7 @@ from pbem.parallel import broadcast
 from pbem.solve.nonlinear.balance import measure_balance, measure_friction
 from pbem.solve.nonlinear.blocks import describe_cut, list_undriven, open_floating, place_block
 from pbem.solve.nonlinear.imbalance import are_driven
-from pbem.solve.nonlinear.resting import describe_lying, find_idle, find_pairs_around, let_lie, rest_bodies
+from pbem.solve.nonlinear.resting import describe_lying, find_idle, find_pairs_around, let_lie, pulls_aside, rest_bodies
 from pbem.solve.nonlinear.rolling import roll
 from pbem.solve.nonlinear.unsettled import Unsettled
 from pbem.solve.problem.problem import Problem
@@ -42,9 +41,6 @@ MOST_HELD = 12
 # its sense lies between pairs, as under a symmetric load: by no more than meshes of round faces resist a turn. Once so
 # many were tried it may bear this part more than its bound.
 TRIED, BEYOND = 3, 1e-3
-# A pair that a body has rolled to until it touched may pull by this part of the largest pressure: by no more than the
-# moment of the other pairs is known to.
-SLIGHT = 1e-2
 # The same modes come back so often before pairs that hold a body are given up.
 MOST_REPEATED = 3
 SHARES = (0.0, 0.3, 1.0)
@@ -79,6 +75,7 @@ class Hold:
         self.sense = np.zeros(problem.laws.count, dtype=np.int64)
         # So often bodies were found free, and laid down where nothing drives them; their names.
         self.freed, self.laid, self.rested = 0, 0, set[str]()
+        self.aside: tuple[RigidBodyMode, ...] = ()  # motions that pairs alone prevent which carry next to nothing
         # Blocks that pairs were closed to hold; the last state of all pairs that was found; what floats in it.
         self.placed: set[int] = set()
         self.state: PairState | None = None
@@ -151,7 +148,7 @@ class Hold:
             if self.rolls:
                 modes, left = roll(mesh, laws, self.list_free(modes), self.sense, modes, before)
         # No more than hold it: a third pair beside the two on which a round body lies would pull at it.
-        for least in range(2, CLOSED_AT_LEAST + 1):
+        for least in range(1, CLOSED_AT_LEAST + 1):
             closed = close_nearest_pairs(mesh, laws, modes, opening, least, left)
             if not self.find_free(closed):
                 return closed
@@ -214,12 +211,12 @@ class Hold:
 
     def _rests(self, modes: ModeState, carried: Real, proposal: Proposal) -> bool:
         """Whether nothing changes but that pairs open which pull by next to nothing, and without which a body would be
-        free: a round one that rests on a pair, and rolled until it touches another one."""
+        free: a round one that rests on a pair, and rolled until it touched another one, or one that nothing drives."""
         opens = proposal.changed & (modes.mode != OPEN) & (proposal.modes.mode == OPEN)
-        if not opens.any() or (opens != proposal.changed).any() or not self.find_free(proposal.modes):
-            return False
-        of_body = (modes.mode != OPEN) & find_contacts_of(self.problem.mesh, self.list_free(proposal.modes))
-        return bool(carried[opens].max() <= SLIGHT * np.abs(carried[of_body]).max(initial=0.0))
+        free = self.list_free(proposal.modes) if opens.any() and (opens == proposal.changed).all() else ()
+        held = {motion.text for motion in self._find_free_motions(modes).motions}  # by anchors, then as now
+        self.aside = tuple(motion for motion in free if motion.text not in held)
+        return bool(self.aside) and pulls_aside(self.problem, self.load, modes, carried, opens, self.aside)
 
     def _stick(
         self, joint: Integer, modes: ModeState, slip: Real, overloaded: Integer, holds: Callable[[ModeState], bool]
@@ -271,7 +268,7 @@ class Hold:
     def describe(self, modes: ModeState) -> tuple[str, ...]:
         """What the user should know of what holds a body in the end."""
         pressure = np.zeros(self.problem.laws.count) if self.load is None else self.load.pressure
-        lying = describe_lying(self.problem, self.state, pressure, sorted(self.rested))
+        lying = describe_lying(self.problem, self.state, pressure, sorted(self.rested), self.aside)
         return (*self._describe_floating_blocks(), *lying, *self._describe_held(modes))
 
     def _describe_floating_blocks(self) -> tuple[str, ...]:

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.contact.free_motions import find_contacts_of
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState, PairState, follow_leaders, resists_slip
 from pbem.contact.loads import Load
 from pbem.contact.modes import Proposal
 from pbem.contact.resting import find_place
 from pbem.mesh.mesh import Mesh
+from pbem.model.rigid_body_modes import RigidBodyMode
 from pbem.solve.problem.given import is_driven
 from pbem.solve.problem.problem import Problem
 
@@ -20,6 +22,9 @@ FREE = 3
 # Loads that leave no more than this part of themselves drive nothing: a small push beside large loads that balance does
 # drive a body.
 UNDRIVEN = 1e-6
+# A pair that a body has rolled to until it touched may pull by this part of the largest pressure: by no more than the
+# moment of the other pairs is known to.
+SLIGHT = 1e-2
 # What lies carries no more than this part of what others do, or of what the jumps would make of the model's stiffness.
 IDLE = 1e-6
 
@@ -77,15 +82,39 @@ def let_lie(
     return Proposal(now, np.where(lying, 0.0, proposal.violation))
 
 
-def describe_lying(problem: Problem, state: PairState | None, pressure: Real, names: Sequence[str]) -> tuple[str, ...]:
-    """A note of bodies that were laid down and carry nothing in the end; none if there are none."""
+def pulls_aside(
+    problem: Problem, load: Load | None, modes: ModeState, carried: Real, opens: Bool, free: Sequence[RigidBodyMode]
+) -> bool:
+    """Whether pairs (m,) that would open pull by next to nothing, and the motions that they alone prevent are those of
+    a body that rolls about others, or that nothing drives. carried (m,): by the pairs."""
+    of_body = (modes.mode != OPEN) & find_contacts_of(problem.mesh, free)
+    if carried[opens].max() > SLIGHT * np.abs(carried[of_body]).max(initial=0.0):
+        return False
+    return load is None or any(map(_turns, free)) or not is_driven(problem, load, free, UNDRIVEN)
+
+
+def _turns(motion: RigidBodyMode) -> bool:
+    return any(spin != 0 for _, spin in motion.velocities.values())
+
+
+def describe_lying(
+    problem: Problem, state: PairState | None, pressure: Real, names: Sequence[str], aside: Sequence[RigidBodyMode]
+) -> tuple[str, ...]:
+    """Notes of bodies that were laid down and carry nothing in the end, and of the motions `aside` that pairs prevent
+    which carry next to nothing; none if there are none."""
     lying = [name for name in names if state is not None and find_idle(problem, state, pressure, [name])[
         find_pairs_around(problem.mesh, name)[0]].all()]
-    if not lying:
-        return ()
-    told = ", ".join(f"'{name}'" for name in lying)
-    return (f"Nothing presses on {told}: where {'it lies in its' if len(lying) == 1 else 'they lie in their'} space is "
-            "one of many places, and all else is determined.",)
+    notes = []
+    if lying:
+        told = ", ".join(f"'{name}'" for name in lying)
+        where = "it lies in its" if len(lying) == 1 else "they lie in their"
+        notes.append(f"Nothing presses on {told}: where {where} space is one of many places, and all else is "
+                     "determined.")
+    sliding = "; ".join(motion.text for motion in aside if not _turns(motion))
+    if sliding:
+        notes.append(f"Only pairs that carry next to nothing prevent a {sliding}, and no load drives it: where these "
+                     "bodies lie is one of many places, and all else is determined.")
+    return tuple(notes)
 
 
 def find_pairs_around(mesh: Mesh, name: str) -> tuple[Integer, Complex]:

@@ -1,4 +1,4 @@
-"""How fast this machine is, found in about two seconds: a kernel, a factorisation, a product, and Python itself."""
+"""How fast this machine is, found in less than two seconds: a kernel, a factorisation, a product, and Python itself."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from pbem.model.model import Model
 # Sizes of the samples: each takes some ten milliseconds, so that on a machine with other work some of them are not
 # interrupted, and the fastest of them counts.
 KERNEL_ENTRIES, FACTOR_SIZE, PRODUCT_SIZE, LOOPS = 2e5, 1200, 1500, 40_000
-LEAST_ROUNDS, MOST_ROUNDS, PATIENCE = 3, 12, 1.2
+MOST_ROUNDS, PATIENCE = 12, 1.2
+# Calls whose times differ by no more than this factor were not interrupted: forecasts are coarser than that.
+ALIKE = 1.05
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def measure_speed(model: Model, mesh: Mesh) -> Speed:
     last = min(first + rows, mesh.nodes)
     made = assemble_rows(mesh, materials, first, last, needed, model.size)
     entries = sum(block.matrix.size for block in made.blocks)
-    matrix = np.asfortranarray(np.random.default_rng(1).standard_normal((FACTOR_SIZE, FACTOR_SIZE)))
+    matrix = np.asfortranarray(np.random.default_rng(1).random((FACTOR_SIZE, FACTOR_SIZE)))
     large, vector = np.ones((PRODUCT_SIZE, PRODUCT_SIZE)), np.ones(PRODUCT_SIZE)
     entry, factor, product, loop = _time([
         lambda: assemble_rows(mesh, materials, first, last, needed, model.size), lambda: lapack.dgetrf(matrix),
@@ -65,13 +67,17 @@ def _loop() -> int:
 
 def _time(actions: Sequence[Callable[[], object]]) -> list[float]:
     """Seconds of the fastest call of each, of rounds of all of them, without time in which the processor did something
-    else."""
-    best, begun, rounds = [np.inf] * len(actions), time.perf_counter(), 0
-    while rounds < LEAST_ROUNDS or (rounds < MOST_ROUNDS and time.perf_counter() - begun < PATIENCE):
-        for number, action in enumerate(actions):
+    else. Rounds end once of each the fastest two calls are alike, or patience does."""
+    taken: list[list[float]] = [[] for _ in actions]
+    begun, alike = time.perf_counter(), False
+    for number in range(MOST_ROUNDS):
+        if alike or (number and time.perf_counter() - begun > PATIENCE):
+            break
+        for action, seconds in zip(actions, taken, strict=True):
             begin, worked = time.perf_counter(), time.process_time()
             action()
             # With threads the processors' time is the longer one.
-            best[number] = min(best[number], time.perf_counter() - begin, time.process_time() - worked)
-        rounds += 1
-    return [float(seconds) for seconds in best]
+            seconds.append(min(time.perf_counter() - begin, time.process_time() - worked))
+            seconds.sort()
+        alike = number > 0 and all(seconds[1] <= ALIKE * seconds[0] for seconds in taken)
+    return [seconds[0] for seconds in taken]

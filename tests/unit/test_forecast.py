@@ -14,6 +14,7 @@ from pbem.case.build import parse_model
 from pbem.contact.dependence import find_unknowns_of_regions
 from pbem.contact.laws import OPEN, SLIP, ModeState, collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.forecast import calibration
 from pbem.forecast.disk import count_disk, count_stored_steps
 from pbem.forecast.forecast import make_forecast
 from pbem.forecast.groups import count_groups, count_settling
@@ -273,3 +274,24 @@ def test_ranks_without_cores_take_turns() -> None:
     assert (told["seconds"], told["seconds_here"], told["cores"], told["cores_here"]) == (3.0, 6.0, 8, 4.0)
     assert "time 3 s, or 6 s on the 4 cores here" in "\n".join(describe_forecast(eight))
     assert "here" not in "\n".join(describe_forecast(two))
+
+
+@pytest.mark.parametrize(
+    ("taken", "calls", "best"), [([3.0, 3.1, 1.0], 2, 3.0), ([9.0, 3.0, 5.0, 3.1, 1.0], 4, 3.0), ([5.0], 2, 5.0)],
+    ids=["alike", "interrupted", "the same"],
+)  # fmt: skip
+def test_samples_are_repeated_until_two_of_them_are_alike(
+    monkeypatch: pytest.MonkeyPatch, taken: list[float], calls: int, best: float
+) -> None:
+    """One that was interrupted is alone with its time."""
+    now, done = [0.0], []
+
+    def act() -> None:
+        now[0] += taken[len(done) % len(taken)]
+        done.append(now[0])
+
+    monkeypatch.setattr(calibration, "PATIENCE", np.inf)
+    monkeypatch.setattr(calibration.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(calibration.time, "process_time", lambda: now[0])
+    assert calibration._time([act]) == [best]
+    assert len(done) == calls

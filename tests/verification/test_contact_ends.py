@@ -22,6 +22,7 @@ from pbem.passes import MOST_GRADED, STILL_COARSE, plan_graded
 from pbem.results import contact_ends
 from pbem.results import writer as writer_module
 from pbem.results.estimator import Estimator
+from pbem.results.reader import Results
 from pbem.results.writer import ResultWriter
 from pbem.solve.problem.step import SilentReporter
 from pbem.solve.steps import march as march_module
@@ -133,13 +134,25 @@ def write_small(path: Path, graded: bool | str = True) -> Path:
     return write(path, 1e-3, FORCE, 20.0, 32, steps=2, grade_contact_ends=graded)
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """The small pin as its elements are; computed once, as nothing disturbs that run."""
+    folder = tmp_path_factory.mktemp("plain")
+    return pbem.run(write_small(folder / "plain.toml", graded=False), folder / "plain.h5")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """The small pin with graded ends, by a run that nothing disturbs."""
+    folder = tmp_path_factory.mktemp("whole")
+    return pbem.run(write_small(folder / "whole.toml"), folder / "whole.h5")
+
+
 def test_a_run_that_was_stopped_on_the_graded_mesh_goes_on_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    case = write_small(tmp_path / "pin.toml")
-    results = pbem.run(case, tmp_path / "whole.h5")
-    whole, passes = np.asarray(results.contact["seat"].traction_n), results.fractions
-    assert passes is not None
+    case, tractions = write_small(tmp_path / "pin.toml"), np.asarray(whole.contact["seat"].traction_n)
+    assert whole.fractions is not None
     march, marches = driver.march, []
 
     def stop(*given: Any, **named: Any) -> Iterator[Any]:
@@ -156,8 +169,8 @@ def test_a_run_that_was_stopped_on_the_graded_mesh_goes_on_with_it(
     assert len(marches) == 2
     results = pbem.run(case, tmp_path / "part.h5", resume=True)
     assert results.status == "finished"
-    np.testing.assert_allclose(np.asarray(results.contact["seat"].traction_n), whole, rtol=0,
-                               atol=1e-9 * np.abs(whole).max())
+    np.testing.assert_allclose(np.asarray(results.contact["seat"].traction_n), tractions, rtol=0,
+                               atol=1e-9 * np.abs(tractions).max())
 
 
 def test_a_finished_run_is_left_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -187,10 +200,8 @@ def test_a_finished_run_is_left_as_it_is(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plain: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    results = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
-    plain = np.asarray(results.contact["seat"].traction_n)
     march, marches = driver.march, []
 
     def fail(*given: Any, **named: Any) -> Iterator[Any]:
@@ -202,7 +213,7 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
     monkeypatch.setattr(driver, "march", fail)
     results = pbem.run(write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5")
     assert len(marches) == 2 and results.status == "finished"
-    np.testing.assert_array_equal(np.asarray(results.contact["seat"].traction_n), plain)
+    np.testing.assert_array_equal(results.contact["seat"].traction_n, plain.contact["seat"].traction_n)
     assert pbem.run(tmp_path / "pin.toml", tmp_path / "pin.h5", resume=True).status == "finished" and len(marches) == 2
     assert not list(tmp_path.glob("pin.h5?*"))
 
@@ -210,10 +221,9 @@ def test_results_before_stand_if_contacts_do_not_settle_on_the_graded_mesh(
 @pytest.mark.parametrize("ending", [StopError("SIGTERM", "stopped by SIGTERM", 143), MemoryError("no room")])
 @pytest.mark.parametrize("place", ["march", "assemble_problem", "check_memory"])
 def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
-    ending: Exception, place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ending: Exception, place: str, plain: Results, whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever ends it, and with what ended it in the file; resumed, the run goes on from them to the graded mesh."""
-    plain = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
     case, path = write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5"
     former, calls = getattr(driver, place), []
 
@@ -233,7 +243,6 @@ def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
     np.testing.assert_array_equal(kept.contact["seat"].traction_n, plain.contact["seat"].traction_n)
     assert "ended before the second solution" in kept.errors.missing and not list(tmp_path.glob("pin.h5?*"))
     again = pbem.run(case, path, resume=True)
-    whole = pbem.run(case, tmp_path / "whole.h5")
     assert again.status == "finished" and again.fractions is not None and not again.errors.missing
     np.testing.assert_allclose(again.contact["seat"].traction_n, whole.contact["seat"].traction_n, rtol=0,
                                atol=1e-6 * np.abs(whole.contact["seat"].traction_n).max())
@@ -245,12 +254,10 @@ def test_finished_steps_are_stored_when_the_graded_mesh_comes_to_no_end(
      ("estimate", 1, 2), ("estimate", 2, 2)],
 )
 def test_steps_that_wait_are_stored_when_memory_runs_out(
-    place: str, due: int, stored: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    place: str, due: int, stored: int, plain: Results, whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In that very pass, wherever it is; of those that are known no step has to be computed again."""
-    plain = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
     case, path = write_small(tmp_path / "pin.toml"), tmp_path / "pin.h5"
-    whole = pbem.run(case, tmp_path / "whole.h5")
     owner = {"solve_step": march_module, "find_ends": driver, "estimate": Estimator}.get(place, driver)
     name = {"find_ends": "_find_ends"}.get(place, place)
     former, calls = getattr(owner, name), []
@@ -295,11 +302,10 @@ def test_only_the_last_pass_is_stored_with_its_errors(tmp_path: Path, monkeypatc
 
 @pytest.mark.parametrize("most", [0, 1, 5])
 def test_steps_that_waited_are_those_of_a_run_that_did_not(
-    most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    most: int, whole: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where they are too many to wait, or a stop comes between."""
     case = write_small(tmp_path / "pin.toml")
-    whole = pbem.run(case, tmp_path / "whole.h5")
     monkeypatch.setattr("pbem.storing.MOST_WAITING", most)
     found = pbem.run(case, tmp_path / "found.h5")
     assert repr(found.fractions) == repr(whole.fractions)
@@ -432,7 +438,7 @@ def test_pressures_that_lie_on_the_root_as_they_are_are_not_solved_for_again(
 
 
 def test_a_listener_that_fails_after_a_step_was_stored_does_not_have_it_stored_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    plain: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Failing(SilentReporter):
         def note(self, text: str) -> None:
@@ -440,7 +446,6 @@ def test_a_listener_that_fails_after_a_step_was_stored_does_not_have_it_stored_a
                 raise RuntimeError("no room to tell it")
 
     case = write_small(tmp_path / "pin.toml")
-    plain = pbem.run(write_small(tmp_path / "plain.toml", graded=False), tmp_path / "plain.h5")
     monkeypatch.setattr(driver, "plan_graded", lambda *_: None)
     monkeypatch.setattr(writer_module, "describe_sparse_contacts", lambda *_: ["sparse"])
     with pytest.raises(RuntimeError, match="no room to tell it"):

@@ -15,6 +15,8 @@ from pbem.geometry.elements import Elements
 
 # Cells are at most so many times finer than the extent of all boxes.
 FINEST = 2.0**20
+# As many pairs of boxes are compared one by one in the time that it takes to sort a few of them into cells.
+FEW = 2**14
 
 
 class Boxes:
@@ -66,6 +68,12 @@ class Boxes:
 
     def find_meeting(self, others: Boxes) -> tuple[Integer, Integer]:
         """Numbers of the others and of the boxes that they meet, a pair for each meeting, in rising order."""
+        if len(self.low) * len(others.low) <= FEW:
+            meet = np.ones((len(others.low), len(self.low)), dtype=bool)
+            for axis in range(2):
+                meet &= others.low[:, None, axis] <= self.high[:, axis]
+                meet &= others.high[:, None, axis] >= self.low[:, axis]
+            return np.nonzero(meet)
         found = [np.zeros(0, dtype=np.int64)]
         for size, numbers in self._sizes.items():
             for other_size, other_numbers in others._sizes.items():

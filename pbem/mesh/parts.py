@@ -46,7 +46,17 @@ class Parts:
 
 
 def find_parts(mesh: Mesh) -> Parts:
-    """The parts of all regions, which rigid motions move one by one; one for each that no cracks cut (theory, 83)."""
+    """The parts of all regions, which rigid motions move one by one; one for each that no cracks cut (theory, 83).
+
+    They are found once for each mesh, which keeps them.
+    """
+    kept = vars(mesh)
+    if "_parts" not in kept:
+        kept["_parts"] = _find_parts(mesh)
+    return kept["_parts"]  # type: ignore[no-any-return]
+
+
+def _find_parts(mesh: Mesh) -> Parts:
     first = mesh.region.astype(np.int64).copy()
     second, region, unbounded = first.copy(), list(range(len(mesh.region_names))), set[int]()
     for number in np.unique(mesh.region[mesh.crack]):

@@ -106,7 +106,8 @@ from pbem.parallel import world
 from pbem.solve.launch import start
 whole = start.read_libraries
 bad = [int(rank) for rank in sys.argv[1].split(",")]
-start.read_libraries = lambda: replace(whole(), scalar=np.dtype(complex)) if world.rank in bad else whole()
+start.read_libraries = lambda files: (
+    replace(whole(files), scalar=np.dtype(complex)) if world.rank in bad else whole(files))
 sys.exit(main(sys.argv[2:]))
 """
 

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbem.geometry.boxes import Boxes, Meetings
+from pbem.geometry.boxes import FEW, Boxes, Meetings
 from pbem.geometry.curve import Leg
+
+
+@pytest.fixture(params=[0, FEW], ids=["in cells", "one by one"], autouse=True)
+def _few(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few boxes are compared one by one; many, and here few as well, are sorted into cells."""
+    monkeypatch.setattr("pbem.geometry.boxes.FEW", request.param)
 
 
 def make_boxes(seed: int, count: int) -> Boxes:

@@ -30,7 +30,8 @@ MUMPS_LIBRARY = re.compile(r"/libdmumps[a-z_]*-(\d+(?:\.\d+)+)\.so")
 
 def list_versions() -> dict[str, str]:
     """Names and versions of what a run computes with; MUMPS "unknown" where its file does not tell."""
-    found = (MUMPS_LIBRARY.search(os.path.realpath(file)) for file in list_mapped_files())
+    files = (os.path.realpath(file) for file in list_mapped_files() if "mumps" in file)
+    found = map(MUMPS_LIBRARY.search, files)
     mumps = next((match[1] for match in found if match), "unknown")
     return {
         "pbem": __version__, "PETSc": petsc_version(), "MUMPS": mumps, "NumPy": np.__version__,

@@ -49,27 +49,28 @@ def check_start(comm: MPI.Intracomm) -> tuple[str, ...]:
     copies = refuse_copies(find_launch(os.environ), world.size, describe_library())
     if copies:
         raise LaunchError(copies)  # each copy is alone: there is nobody to ask
-    refuse_together(comm, refuse_libraries(read_libraries(), world.size))
+    files = list_mapped_files()
+    refuse_together(comm, refuse_libraries(read_libraries(files), world.size))
     allowed = broadcast(comm, is_set(os.environ, OVERRIDE))
     refusal, notes = judge_nodes(gather_by_node(comm, read_site(os.environ)), allowed)
     if refusal:
         raise LaunchError(refusal)
-    claim_work_space()
+    claim_work_space(files)
     return notes
 
 
-def claim_work_space() -> None:
+def claim_work_space(files: Iterable[str]) -> None:
     """Let OpenBLAS take its work space while it is known that there is some: without, it would ask for it for ever.
 
-    Raises MemoryError.
+    files: that this process has mapped. Raises MemoryError.
     """
-    if any("openblas" in file.lower() for file in list_mapped_files()):
+    if any("openblas" in file.lower() for file in files):
         np.empty(WORK_SPACE, dtype=np.uint8)  # only asked for, and given back
     np.linalg.solve(np.eye(2), np.ones(2))
 
 
-def read_libraries() -> Libraries:
-    """What this process has loaded."""
+def read_libraries(files: Iterable[str]) -> Libraries:
+    """What this process has loaded; files: that it has mapped."""
     major, minor = PETSc.Sys.getVersion()[:2]
     own = re.match(r"(\d+)\.(\d+)", petsc4py.__version__)
     return Libraries(
@@ -78,17 +79,18 @@ def read_libraries() -> Libraries:
         petsc=(major, minor),
         petsc4py=(int(own[1]), int(own[2])) if own else (major, minor),
         world=PETSc.COMM_WORLD.getSize(),
-        mpi=find_mpi_libraries(list_mapped_files()),
+        mpi=find_mpi_libraries(files),
     )
 
 
 def list_mapped_files() -> list[str]:
-    """The files that this process has mapped, its libraries among them."""
+    """The files that this process has mapped, each once, its libraries among them."""
     try:
         lines = Path("/proc/self/maps").read_text().splitlines()
     except OSError:
         return []
-    return [line.split(None, 5)[5] for line in lines if line.count("/")]
+    # A path is all that has slashes in a line.
+    return list(dict.fromkeys(line[line.index("/"):] for line in lines if "/" in line))
 
 
 def find_mpi_libraries(files: Iterable[str]) -> tuple[str, ...]:

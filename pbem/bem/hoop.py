@@ -106,22 +106,41 @@ def _differentiate_along(mesh: Mesh, values: Complex, with_tips: bool) -> Comple
     """Derivative of nodal values (nodes,) by the length in the direction of travel."""
     if mesh.order == 0:
         return _difference_neighbours(mesh, values)
-    local = locate_nodes(mesh)
-    shapes = differentiate_at_nodes(local)
-    tips = np.flatnonzero(mesh.tip)
-    if with_tips and len(tips):
-        shapes[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
-    by_local = np.einsum("epj,ej->ep", shapes, values.reshape(mesh.elements, -1))
-    derivative = by_local / mesh.geometry.stretch(local)
+    shapes = mesh.keep("derivatives", _derive_shapes)
+    nodal = values.reshape(mesh.elements, -1)
+    derivative = np.einsum("epj,ej->ep", shapes.of_jumps if with_tips else shapes.plain, nodal) / shapes.stretch
     if not with_tips:
-        inner, derivatives = _differentiate_patches(mesh, values)
-        derivative[inner] = derivatives
+        former, inner, latter = shapes.patches
+        known = np.concatenate([nodal[former, -1:], nodal[inner], nodal[latter, :1]], axis=1)
+        derivative[inner] = np.einsum("epj,ej->ep", shapes.of_patches, known) / shapes.lengths[:, None]
     return np.asarray(derivative).ravel()
 
 
-def _differentiate_patches(mesh: Mesh, values: Complex) -> tuple[Integer, Complex]:
-    """Elements (k,) that go on smoothly at both ends, and derivatives (k, p + 1) there by the polynomials through the
-    own nodes and the nearest of each neighbour."""
+@dataclass(frozen=True)
+class _Shapes:
+    """What derivatives of nodal values along the elements (e,) of a mesh take.
+
+    plain, of_jumps (e, p + 1, p + 1): derivatives by s at the nodes, of the element's polynomials, with the square-root
+    shape at tips for jumps; stretch (e, p + 1): length by s. patches (3, k): numbers of elements that go on smoothly
+    at both ends, between those before and after them; of_patches (k, p + 1, p + 3): derivatives there, by the length
+    over that of the element (k,), of the polynomials through the own nodes and the nearest of each neighbour.
+    """
+
+    plain: Real
+    of_jumps: Real
+    stretch: Real
+    patches: Integer
+    of_patches: Real
+    lengths: Real
+
+
+def _derive_shapes(mesh: Mesh) -> _Shapes:
+    local = locate_nodes(mesh)
+    plain = of_jumps = differentiate_at_nodes(local)
+    tips = np.flatnonzero(mesh.tip)
+    if len(tips):
+        of_jumps = plain.copy()
+        of_jumps[tips] = differentiate_tips(mesh.tip[tips], local[tips], local[tips])
     following = _find_smooth_joints(mesh)
     before = np.full(mesh.elements, -1)
     before[following[following >= 0]] = np.flatnonzero(following >= 0)
@@ -129,13 +148,11 @@ def _differentiate_patches(mesh: Mesh, values: Complex) -> tuple[Integer, Comple
     former, latter = before[inner], following[inner]
     # Lengths from the start.
     length = mesh.geometry.lengths
-    along = mesh.geometry.fractions(locate_nodes(mesh)) * length[:, None]
+    along = mesh.geometry.fractions(local) * length[:, None]
     places = np.concatenate([along[former, -1:] - length[former, None], along[inner],
                              along[latter, :1] + length[inner, None]], axis=1) / length[inner, None]
-    nodal = values.reshape(mesh.elements, -1)
-    known = np.concatenate([nodal[former, -1:], nodal[inner], nodal[latter, :1]], axis=1)
-    shapes = differentiate_at_nodes(places)[:, 1:-1]
-    return inner, np.einsum("epj,ej->ep", shapes, known) / length[inner, None]
+    return _Shapes(plain, of_jumps, mesh.geometry.stretch(local), np.stack([former, inner, latter]),
+                   differentiate_at_nodes(places)[:, 1:-1], length[inner])
 
 
 def _find_smooth_joints(mesh: Mesh) -> Integer:

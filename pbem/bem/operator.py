@@ -206,7 +206,8 @@ def collect_free_terms(mesh: Mesh, nodes: Integer, scale: Real) -> sparse.csr_ma
     first_column = np.where(mesh.traction_equation[nodes], 2 * mesh.nodes, 0) + 2 * nodes
     columns = (first_column[:, None] + np.arange(2)).ravel()
     rows = np.arange(2 * len(nodes))
-    return sparse.csr_matrix((np.repeat(value, 2), (rows, columns)), shape=(2 * len(nodes), 4 * mesh.nodes))
+    entries = (np.repeat(value, 2), (rows, columns))
+    return sparse.coo_matrix(entries, shape=(2 * len(nodes), 4 * mesh.nodes)).tocsr()
 
 
 def _region_nodes(mesh: Mesh, region: int) -> Integer:

@@ -81,8 +81,8 @@ class _Entries:
         values, rows, columns = (np.concatenate(parts) for parts in (self.values, self.rows, self.columns))
         for parts in (self.values, self.rows, self.columns):
             parts.clear()
-        entries = (values, (rows, columns))
-        return sparse.csr_matrix(entries, shape=(4 * self.nodes, 2 * self.nodes))
+        # Made and checked once; sparse.csr_matrix of entries copies and checks the matrix twice more.
+        return sparse.coo_matrix((values, (rows, columns)), shape=(4 * self.nodes, 2 * self.nodes)).tocsr()
 
 
 DISPLACEMENT, TRACTION = 0, 1

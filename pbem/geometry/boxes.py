@@ -73,7 +73,8 @@ class Boxes:
             for axis in range(2):
                 meet &= others.low[:, None, axis] <= self.high[:, axis]
                 meet &= others.high[:, None, axis] >= self.low[:, axis]
-            return np.nonzero(meet)
+            other, own = np.nonzero(meet)
+            return other, own
         found = [np.zeros(0, dtype=np.int64)]
         for size, numbers in self._sizes.items():
             for other_size, other_numbers in others._sizes.items():

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.geometry.elements import Elements
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,13 @@ class Mesh:
     def geometry(self) -> Elements:
         """The elements by themselves: their places, directions and lengths."""
         return Elements(self.start, self.end, self.center, self.sweep)
+
+    def keep(self, name: str, find: Callable[[Mesh], T]) -> T:
+        """What `find` finds from this mesh alone: found once, and then kept with the mesh under a name."""
+        kept = vars(self).setdefault("_kept", {})
+        if name not in kept:
+            kept[name] = find(self)
+        return kept[name]  # type: ignore[no-any-return]
 
     @property
     def family(self) -> NDArray[np.int8]:

@@ -48,12 +48,9 @@ class Parts:
 def find_parts(mesh: Mesh) -> Parts:
     """The parts of all regions, which rigid motions move one by one; one for each that no cracks cut (theory, 83).
 
-    They are found once for each mesh, which keeps them.
+    The mesh keeps them.
     """
-    kept = vars(mesh)
-    if "_parts" not in kept:
-        kept["_parts"] = _find_parts(mesh)
-    return kept["_parts"]  # type: ignore[no-any-return]
+    return mesh.keep("parts", _find_parts)
 
 
 def _find_parts(mesh: Mesh) -> Parts:

@@ -31,17 +31,19 @@ def press_faces(
     other_weight = weigh_nodes(master.elements, master.local).ravel()
     outward = slave.elements.normals(slave.local).ravel()
     facing = master.elements.normals(master.local).ravel()
-    cover = couple_curves(master, slave, others, overlap).cover
+    back = couple_curves(master, slave, others, overlap)
     carried = np.bincount(seen.master, seen.product, minlength=len(other_weight)) / other_weight
     used = pair_of_node[seen.slave] >= 0
     own, other, product, turn = seen.slave[used], seen.master[used], seen.product[used], seen.turn[used]
-    share = product / (seen.cover[own] * other_weight[other])
-    traction = share * (outward - normal)[own] - turn / (seen.cover[own] * other_weight[other])
-    traction -= _share_out(other, product, len(other_weight)) * ((cover - carried) * facing)[other]
+    exchanged = (product * (outward - normal)[own] - turn) / (seen.cover[own] * other_weight[other])
+    # What the master's own normals meet, and nothing of the slave's does, is pressed by what these meet.
+    used = pair_of_node[back.master] >= 0
+    node, giver = back.slave[used], back.master[used]
+    left = -_share_out(node, back.product[used], len(other_weight)) * ((back.cover - carried) * facing)[node]
     nodes = np.flatnonzero(pair_of_node >= 0)
-    pairs = np.concatenate([pair_of_node[nodes], pair_of_node[own]])
-    at = np.concatenate([slave.first_node + nodes, master.first_node + other])
-    pressed = np.concatenate([(normal - outward)[nodes], traction])
+    pairs = np.concatenate([pair_of_node[nodes], pair_of_node[own], pair_of_node[giver]])
+    at = np.concatenate([slave.first_node + nodes, master.first_node + other, master.first_node + node])
+    pressed = np.concatenate([(normal - outward)[nodes], exchanged, left])
     kept = np.abs(pressed) > ROUNDING
     return pairs[kept], at[kept], pressed[kept]
 

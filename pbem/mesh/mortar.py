@@ -44,7 +44,7 @@ class Coupling:
 
     cover (n1,): part of a node's weight that faces the master. distance (n1,): mean distance along the normal.
     slave, master, product (l,): for every two nodes that see each other, the integral of the product of their shapes;
-    turn (l,): the same times the sum (complex) of both outward normals there, none where faces are parallel.
+    turn (l,): the same times the sum (complex) of both outward normals there, none where they are opposite.
     slave_element, master_element, shared (q,): elements that see each other, and the length over which they do.
     """
 

@@ -9,7 +9,7 @@ import numpy as np
 from pbem.mesh.chain import Chain
 from pbem.mesh.mesh import Links, Pairs
 from pbem.mesh.mortar_pairs import Columns, pair_contact, place_pairs
-from pbem.model.model import Contact, Interface, Model
+from pbem.model.model import Contact, Interface, Model, list_wet
 
 
 def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:
@@ -19,7 +19,7 @@ def pair_nodes(model: Model, chains: Sequence[Chain]) -> tuple[Pairs, Links]:
     pairs: list[Columns] = []
     links: list[Columns] = []
     count = 0
-    wet = {name for stage in model.stages for name, pressure in stage.pressure.items() if pressure}
+    wet = list_wet(model)
     joints: list[Interface | Contact] = [*model.interfaces.values(), *model.contacts.values()]
     for number, joint in enumerate(joints):
         if isinstance(joint, Contact):

@@ -6,7 +6,8 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from pbem.arrays import Complex, Integer, Real
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.geometry.curve import Leg
 from pbem.geometry.elements import Elements
 from pbem.geometry.loop import Side, side_legs
 from pbem.model.model import Contact, Model, Stage
@@ -32,12 +33,16 @@ def list_fluids(
             if bounded[own.side.curve] not in moving:
                 continue
             breaks = kinks if own is first else first.project(kinks, second)
-            for piece in divide_side(model.curves, own.side, breaks):
+            for piece in divide_side(model.curves, own.side, np.concatenate([breaks, own.find_ends(other)])):
                 met, places = other.meet(piece.places.point, piece.normals)
                 places = piece.places.take(met) if own is first else places
                 shifted = Places(places.point + model.origin, places.along)
                 pushes = -blend(*pressures, shifted, now) * (piece.normals * piece.weights)[met]
                 yield bounded[own.side.curve], piece.places.point[met], pushes
+
+
+# Places on a leg between which its normals begin or cease to meet another face once at most, and halvings from there.
+SAMPLES, HALVINGS = 65, 48
 
 
 class _Face:
@@ -60,6 +65,28 @@ class _Face:
         local = shapes.preimage(feet[:, None]).real
         along = (np.cumsum(lengths) - lengths)[at] + lengths[at] * shapes.fractions(local)[:, 0]
         return met, Places(feet, along if self.side.forward else lengths.sum() - along)
+
+    def find_ends(self, other: _Face) -> Real:
+        """The lengths along this face at which its normals begin or cease to meet another one, to rounding."""
+        ends, passed = [np.zeros(0)], 0.0
+        for leg in self._legs:
+            def meets(fractions: Real, leg: Leg = leg) -> Bool:
+                met = np.zeros(len(fractions), dtype=bool)
+                met[other.meet(leg.point(fractions), leg.normals(leg.point(fractions)))[0]] = True
+                return met
+
+            places = np.linspace(0.0, 1.0, SAMPLES)
+            met = meets(places)
+            change = np.flatnonzero(met[1:] != met[:-1])
+            low, high, before = places[change], places[change + 1], met[change]
+            for _ in range(HALVINGS if len(change) else 0):
+                middle = 0.5 * (low + high)
+                same = meets(middle) == before
+                low, high = np.where(same, middle, low), np.where(same, high, middle)
+            ends.append(passed + leg.length * 0.5 * (low + high))
+            passed += leg.length
+        travelled = np.concatenate(ends)
+        return travelled if self.side.forward else passed - travelled
 
     def project(self, along: Real, other: _Face) -> Real:
         """The lengths along another face where the normals meet it from lengths along this one."""

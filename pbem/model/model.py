@@ -196,6 +196,12 @@ def list_timed(stage: Stage) -> list[Varying]:
     return [value for value in values if isinstance(value, Varying) and value.timed]
 
 
+def list_wet(model: Model) -> tuple[str, ...]:
+    """The contacts in which there is a fluid in any stage."""
+    wet = {name for stage in model.stages for name, pressure in stage.pressure.items() if pressure}
+    return tuple(name for name in model.contacts if name in wet)
+
+
 @dataclass(frozen=True)
 class Analysis:
     """scheme: which equation is collocated on which face; order: of the polynomials; tips: crack-tip elements.

@@ -159,7 +159,7 @@ def _count_asked(leg: Leg) -> float:
 
 
 def find_wedges(
-    surroundings: Surroundings, kept: frozenset[str] = frozenset(), order: int = 2
+    surroundings: Surroundings, kept: frozenset[str], order: int
 ) -> Wedges:
     """The wedges of a model and what is tied in their corners. kept: curves whose grading is the user's; order: of the
     elements."""

@@ -23,7 +23,7 @@ from pbem.driver import impose_operator, run
 from pbem.errors import CaseError, ConvergenceError, Fault, LawError, PbemError, ResultFileError, StopError
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Mesh
-from pbem.model.model import Model, Operator
+from pbem.model.model import Model, Operator, list_wet
 from pbem.model.recall import Recall
 from pbem.parallel import Comm, StopSignals, abort_if_unexpected, broadcast, check_communicator, do_on_first
 from pbem.solve.launch.arguments import check_arguments
@@ -341,10 +341,12 @@ def compute_case(
 
 
 def _mesh(setting: Setting, model: Model) -> Mesh:
-    """The mesh of the last case if this one has the same: neither laws nor conditions are part of it."""
+    """The mesh of the last case if this one has the same: neither laws nor conditions are part of it, but for which
+    contacts are ever under fluid."""
     interfaces = [(each.name, each.first, each.second) for each in model.interfaces.values()]
     contacts = [(each.name, each.first, each.second) for each in model.contacts.values()]
-    given = (model.curves, model.regions, interfaces, contacts, model.crack_tips, model.analysis, model.size)
+    given = (model.curves, model.regions, interfaces, contacts, model.crack_tips, model.analysis, model.size,
+             list_wet(model))
     return setting.recall.find("mesh", given, lambda: generate_mesh(model))
 
 

@@ -26,7 +26,7 @@ def make_field() -> LengthField:
         curves[f"c{number}"] = Curve(f"c{number}", (Leg(a, b, 3, refine_start=number % 3 == 0, **bent),))
     surroundings = Surroundings(curves, [list(curves)[:25], list(curves)[20:]], (), frozenset(curves))
     tips = dict.fromkeys(curves, (True, True))
-    return LengthField(surroundings, find_wedges(surroundings), tips, frozenset(), 2)
+    return LengthField(surroundings, find_wedges(surroundings, frozenset(), 2), tips, frozenset(), 2)
 
 
 def test_halves_of_cells_find_all_that_is_near_among_what_was_near_the_whole() -> None:

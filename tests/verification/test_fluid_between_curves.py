@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.cli import main
 
 Tables = dict[str, Any]
 
@@ -151,3 +153,105 @@ def test_kinks_of_the_pressure_lie_opposite_on_the_other_curve(first: str, gap: 
     pbem.run(make(force), tmp_path / "blocks.h5")
     with pytest.raises(pbem.CaseError, match=r"free rigid motion \(translation along y"):
         pbem.run(make(1.001 * force), tmp_path / "wrong.h5")
+
+
+@pytest.mark.parametrize("first", ["square", "hole"])
+def test_what_faces_the_corners_of_a_square_is_pressed_as_well(first: str, tmp_path: Path) -> None:
+    """Lame: normals of the square meet a part of the hole alone; those of the hole meet the square."""
+    sides = [[1, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]]
+    second = "hole" if first == "square" else "square"
+    results = pbem.run({
+        "materials": {"m": {"young": 1000.0, "poisson": 0.3}},
+        "curves": {"square": {"points": sides, "elements": 12},
+                   "hole": {"center": [0.0, 0.0], "radius": 2.2, "elements": 64},
+                   "rim": {"center": [0.0, 0.0], "radius": 3.0, "elements": 32}},
+        "regions": {"inner": {"material": "m", "boundary": ["square"]},
+                    "ring": {"material": "m", "boundary": ["rim", "hole"]}},
+        "contacts": {"gap": {"between": [first, second], "law": "open", "pressure": 1.0}},
+        "boundary": {"rim": {"tx": 0.0, "ty": 0.0}},
+        "analysis": {"steps": 1}, "output": {"points": [[0.2, 0.1], [2.5, 0.0], [1.8, 1.8]]},
+    }, tmp_path / "square.h5")
+    stress = results.interior.stress[-1]
+    np.testing.assert_allclose(stress[0], [-1.0, -1.0, 0.0], atol=1e-3)
+    for found, at in ((stress[1], 2.5), (stress[2], 1.8 * math.sqrt(2))):
+        mean, outer = 2.2**2 / (3.0**2 - 2.2**2), (3.0 / at) ** 2
+        assert found[0] + found[1] == pytest.approx(2 * mean, rel=1e-3)
+        assert math.hypot(0.5 * (found[0] - found[1]), found[2]) == pytest.approx(mean * outer, rel=1e-3)
+
+
+@pytest.mark.parametrize("radius", [1.2, 2.0])
+def test_the_whole_model_balances_with_the_fluid_on_either_face(radius: float, tmp_path: Path) -> None:
+    half = math.sqrt(0.5)
+    seat, foot = radius * half, half
+    results = pbem.run({
+        "materials": {"m": {"young": 1000.0, "poisson": 0.3}},
+        "curves": {
+            "seat": {"center": [0, 0], "radius": radius, "angles": [315, 225], "elements": 8},
+            "left": {"points": [[-seat, -seat], [-seat, -4.0]], "elements": 8},
+            "base": {"points": [[-seat, -4.0], [seat, -4.0]], "elements": 8},
+            "right": {"points": [[seat, -4.0], [seat, -seat]], "elements": 8},
+            "foot": {"center": [0, 0], "radius": 1.0, "angles": [225, 315], "elements": 8},
+            "east": {"points": [[foot, -foot], [foot, 0.5]], "elements": 8},
+            "head": {"points": [[foot, 0.5], [-foot, 0.5]], "elements": 8},
+            "west": {"points": [[-foot, 0.5], [-foot, -foot]], "elements": 8},
+        },
+        "regions": {"up": {"material": "m", "boundary": ["foot", "east", "head", "west"]},
+                    "low": {"material": "m", "boundary": ["seat", "left", "base", "right"]}},
+        "contacts": {"k": {"between": ["foot", "seat"], "law": "open", "pressure": 1.0}},
+        "boundary": {"head": {"ux": 0.0, "uy": 0.0}, "base": {"ux": 0.0, "uy": 0.0}},
+        "analysis": {"steps": 1},
+    }, tmp_path / "seat.h5")
+    # Statics: either arc has the force of its own chord.
+    np.testing.assert_allclose(results.reactions["head"][-1], [0.0, -2 * foot], atol=2e-3 * seat)
+    np.testing.assert_allclose(results.reactions["base"][-1], [0.0, 2 * seat], atol=2e-3 * seat)
+    assert np.abs(results.balance.whole_relative).max() < 1e-3
+
+
+@pytest.mark.parametrize("first", ["foot", "top"])
+@pytest.mark.parametrize("inset", [0.005, 0.02])
+def test_a_face_that_ends_near_the_end_of_the_other_one_balances(first: str, inset: float, tmp_path: Path) -> None:
+    width = 3.0 - inset
+    blocks = {"base": [[0, 0], [3, 0]], "right": [[3, 0], [3, 1]], "top": [[3, 1], [0, 1]], "left": [[0, 1], [0, 0]],
+              "foot": [[inset, 1.3], [3, 1.3]], "east": [[3, 1.3], [3, 3]], "head": [[3, 3], [inset, 3]],
+              "west": [[inset, 3], [inset, 1.3]]}  # fmt: skip
+    results = pbem.run({
+        "materials": {"m": {"young": 1000.0, "poisson": 0.2}},
+        "curves": {name: {"points": points, "elements": 6} for name, points in blocks.items()},
+        "regions": {"low": {"material": "m", "boundary": ["base", "right", "top", "left"]},
+                    "up": {"material": "m", "boundary": ["foot", "east", "head", "west"]}},
+        "contacts": {"seat": {"between": [first, "top" if first == "foot" else "foot"], "law": "open",
+                              "pressure": 1.0}},
+        "boundary": {"left": {"ux": 0.0}, "base": {"ty": width / 3}, "head": {"ux": 0.0, "uy": 0.0}},
+        "analysis": {"steps": 1},
+    }, tmp_path / "near.h5")
+    # A node of which the other face covers a part bears the fluid on all of it.
+    assert results.reactions["head"][-1][1] == pytest.approx(-width, rel=5e-3)
+
+
+def test_a_sweep_that_begins_without_fluid_has_it_later(tmp_path: Path) -> None:
+    case = tmp_path / "foot.toml"
+    case.write_text("""
+    materials.m = { young = 1000.0, poisson = 0.2 }
+    curves.base = { points = [[0, 0], [3, 0]], elements = 6 }
+    curves.sides = { points = [[3, 0], [3, 1]], elements = 4 }
+    curves.top = { points = [[3, 1], [0, 1]], elements = 6 }
+    curves.left = { points = [[0, 1], [0, 0]], elements = 4 }
+    curves.foot = { points = [[0.9, 1.2], [2.1, 1.4]], elements = 6 }
+    curves.head = { points = [[2.1, 1.4], [2.1, 3], [0.9, 3], [0.9, 1.2]], elements = 12 }
+    regions.low = { material = "m", boundary = ["base", "sides", "top", "left"] }
+    regions.up = { material = "m", boundary = ["foot", "head"] }
+    contacts.seat = { between = ["foot", "top"], law = "open", pressure = 1.0 }
+    boundary.base = { ux = 0.0, uy = 0.0 }
+    boundary.head = { ux = 0.0, uy = 0.0 }
+    analysis.steps = 1
+    """)
+    rows = []
+    for number, values in enumerate(("0,1", "1")):
+        table = tmp_path / f"{number}.csv"
+        command = ["sweep", str(case), "--set", f"contacts.seat.pressure={values}", "--output", str(table)]
+        assert main(command) == 0
+        with table.open(newline="") as file:
+            rows.append(list(csv.DictReader(file))[-1])
+    found, alone = (float(row["reactions.base.y"]) for row in rows)
+    assert found == pytest.approx(alone, rel=1e-9)
+    assert found == pytest.approx(1.2, rel=1e-3)

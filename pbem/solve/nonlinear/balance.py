@@ -232,7 +232,8 @@ def _measure_whole(
 ) -> tuple[_Sums, float]:
     """The sums over outer curves, and the weight: what acts on all bodies together from outside.
 
-    What interfaces and contacts carry from one to the other cancels in it, as it should; but errors are as large as
+    What interfaces and contacts carry from one to the other cancels in it, as it should, but where fluid presses on
+    faces of different lengths: there what the bodies have counts, and not what tools have. Errors are as large as
     what acts on the bodies, so that they are measured by the one on which most does, about the same middle.
     """
     outer = np.zeros(problem.mesh.nodes, dtype=bool)
@@ -241,7 +242,7 @@ def _measure_whole(
         outer[problem.arrangement.bare] = True  # what a region that is gone still carries, or fluid in its place
     # Tools act by what their contacts carry: on bodies that are gone, by nothing.
     tools = np.array([region.rigid for region in problem.model.regions])[of]
-    acting = outer[faces.node] != tools
+    acting = np.where(_find_wet(problem)[faces.node], ~tools, outer[faces.node] != tools)
     seen = replace(
         faces, traction=np.where(acting, np.where(tools, -1.0, 1.0) * faces.traction, 0.0),
         weight=np.where(acting | (faces.bounding & (faces.known != 0)), faces.weight, 0.0),
@@ -255,6 +256,15 @@ def _measure_whole(
     infinite = any(region.infinite for region in problem.model.regions)
     parts = [_divide(np.abs(sums.force), sums.forces), _divide(np.abs(sums.moment), sums.moments)]
     return sums, float(parts[0][0] if infinite else max(part[0] for part in parts))
+
+
+def _find_wet(problem: Problem) -> Bool:
+    """The nodes (nodes,) on the curves of contacts with fluid that presses on them besides what they exchange."""
+    mesh, contacts = problem.mesh, problem.model.contacts
+    interfaces = np.unique(mesh.pairs.interface[mesh.links.fluid_pair])
+    wet = [contacts[mesh.interface_names[number]] for number in interfaces]
+    curves = {curve for contact in wet for curve in (contact.first, contact.second)}
+    return np.array([name in curves for name in mesh.curve_names], dtype=bool)[mesh.node_curve]
 
 
 def _find_least_traction(problem: Problem, v: Real, largest: float) -> float:

@@ -22,6 +22,8 @@ FREE = 3
 # Loads that leave no more than this part of themselves drive nothing: a small push beside large loads that balance does
 # drive a body.
 UNDRIVEN = 1e-6
+# The same of bodies that turn about others: where these touch is known to the distance of their pairs.
+UNTURNED = 1e-3
 # A pair that a body has rolled to until it touched may pull by this part of the largest pressure: by no more than the
 # moment of the other pairs is known to.
 SLIGHT = 1e-2
@@ -85,12 +87,13 @@ def let_lie(
 def pulls_aside(
     problem: Problem, load: Load | None, modes: ModeState, carried: Real, opens: Bool, free: Sequence[RigidBodyMode]
 ) -> bool:
-    """Whether pairs (m,) that would open pull by next to nothing, and the motions that they alone prevent are those of
-    a body that rolls about others, or that nothing drives. carried (m,): by the pairs."""
+    """Whether pairs (m,) that would open pull by next to nothing, and no load drives the motions that they alone
+    prevent. carried (m,): by the pairs."""
     of_body = (modes.mode != OPEN) & find_contacts_of(problem.mesh, free)
     if carried[opens].max() > SLIGHT * np.abs(carried[of_body]).max(initial=0.0):
         return False
-    return load is None or any(map(_turns, free)) or not is_driven(problem, load, free, UNDRIVEN)
+    return load is None or not any(
+        is_driven(problem, load, [motion], UNTURNED if _turns(motion) else UNDRIVEN) for motion in free)
 
 
 def _turns(motion: RigidBodyMode) -> bool:

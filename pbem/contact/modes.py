@@ -40,12 +40,14 @@ class Linearisation:
     """state = tangent @ (x_n, x_s) + offset, state ordered p_n, p_s, g_n, g_s: tangent (m, 4, 2), offset (m, 4).
 
     leader (m,): the pair whose jump each pair has, itself but in the corner of a narrow wedge. There the unknowns are
-    the tractions that this takes, and the pair counts as being in the state of its leader.
+    the tractions that this takes, and the pair counts as being in the state of its leader. smoothed: whether it is of
+    smoothed laws, under which hardly any unknown leaves the faces where they are.
     """
 
     tangent: Real
     offset: Real
     leader: Integer
+    smoothed: bool = False
 
     def evaluate(self, unknowns: Real) -> PairState:
         """State of the pairs from their unknowns (m, 2)."""

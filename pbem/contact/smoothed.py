@@ -97,7 +97,7 @@ def linearise_smoothly(
     other = linearise(laws, sticking, state.p_n, memory.slip, memory, pressure, scale)
     return Linearisation(
         np.where(smooth[:, None, None], tangent, other.tangent), np.where(smooth[:, None], offset, other.offset),
-        laws.leader,
+        laws.leader, smoothed=True,
     )
 
 

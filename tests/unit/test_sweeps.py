@@ -94,12 +94,12 @@ def test_tractions_are_those_of_the_solution_and_of_the_stiffness(many_groups: N
     np.testing.assert_allclose(tractions, exact, rtol=0, atol=1e-6 * np.abs(exact).max())
     # Of all groups: what the jumps of their pairs alone change.
     random = np.random.default_rng(1)
-    for k in range(0, len(found._stiffness), 3):
-        pairs = found._pairs[found._first[k] : found._first[k + 1]]
+    for k in range(0, len(found.parts.stiffness), 3):
+        pairs = found.parts.pairs[found.parts.first[k] : found.parts.first[k + 1]]
         change = np.zeros_like(jumps)
         change[pairs] = random.normal(size=(len(pairs), 2)) * np.abs(jumps).max()
         moved = (found.find_tractions(constraints, load, solved, jumps + change) - tractions)[pairs]
-        stiff = (found._stiffness[k] @ change[pairs].ravel()).reshape(-1, 2)
+        stiff = (found.parts.stiffness[k] @ change[pairs].ravel()).reshape(-1, 2)
         np.testing.assert_allclose(stiff, moved, rtol=0, atol=1e-4 * np.abs(moved).max())
     tangent.destroy()
 

@@ -131,6 +131,11 @@ class SchwarzPreconditioner:
                     count += 1
         return count
 
+    def pass_over(self, constraints: ConstraintMap) -> None:
+        """Take a constraint map without inverses, as others serve for it; `update` then forms all of them anew."""
+        self._take_map(constraints)
+        self.drop_inverses()
+
     def _take_map(self, constraints: ConstraintMap) -> Real:
         """Take another constraint map; by which part of itself each of its columns (unknowns,) has changed."""
         matrix, former = constraints.matrix, self._less

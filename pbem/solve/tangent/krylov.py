@@ -13,19 +13,29 @@ from pbem.clock import clock
 from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import Memory, ModeState
 from pbem.contact.loads import Load
-from pbem.contact.modes import Linearisation, carry_over
-from pbem.errors import ConvergenceError
+from pbem.contact.modes import Linearisation
 from pbem.heap import give_back
 from pbem.parallel import add_up, gather_parts
 from pbem.solve.petsc.minimal_residual import MinimalResidual
-from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence, petsc_options
+from pbem.solve.petsc.session import PREFIX, PETSc, pass_over_divergence
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.response import select_states
 from pbem.solve.problem.tangent import MOST_SETTLED, Judge, Settling, Solved, TangentOperator, size_residual
-from pbem.solve.tangent.krylov_calls import Preconditioning, Product, Rows, choose_options, find_order, refuse_unsolved
+from pbem.solve.tangent.krylov_calls import (
+    Preconditioning,
+    Product,
+    Rows,
+    carry_solution,
+    describe_unsolved,
+    find_order,
+    is_unsolved,
+    refuse_unsolved,
+    take_options,
+)
 from pbem.solve.tangent.nearby import MOST_ASKED, answers_nearby, respond_nearby
+from pbem.solve.tangent.part_inverses import PartInverses
 from pbem.solve.tangent.shared_product import SharedProduct, SharedRows
 from pbem.solve.tangent.sweeps import Sweeps
 
@@ -42,6 +52,8 @@ WIDENING, MOST_WIDENING = 4, 16
 MOST_DRIFT = 0.9
 # GMRES goes on to this part of Newton's tolerance: two ways to a state then leave less than 1e-9 between its fields.
 SAFETY = 0.03
+# Systems whose inverses of parts serve worse than in so many iterations are gone on with by those of the groups.
+MOST_BY_PARTS = 150
 # The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
 # sets that are far from each other are settled one by one.
 MOST_SETTLED_BY_GMRES = 12
@@ -89,6 +101,7 @@ class KrylovTangent(TangentOperator):
         rows = 2 * len(problem.system.nodes)
         sizes = ((rows, problem.unknowns), (rows, problem.unknowns))
         self._sweeps: Sweeps | None = None
+        self._parts, self._by_parts = PartInverses(problem), False
         self._order = find_order(problem)
         self._matrix = PETSc.Mat().createPython(sizes, Product(self), comm=problem.comm)
         self._matrix.setUp()
@@ -101,25 +114,9 @@ class KrylovTangent(TangentOperator):
         solver.setType("python")
         solver.setPythonContext(self._space)
         solver.setTolerances(rtol=SAFETY * problem.model.solver.newton_tolerance, atol=0.0, max_it=MOST_ITERATIONS)
-        inner = solver.getPC()
-        inner.setType("python")
-        inner.setPythonContext(Preconditioning(self))
-        with petsc_options(choose_options()):
-            solver.setFromOptions()
-        # The user may have asked for another method.
-        self._keeps_directions = solver.getType() == "python"
-        if not self._keeps_directions:
-            solver.setPCSide(PETSc.PC.Side.RIGHT)
-            if not PETSc.Options().hasName(PREFIX + "ksp_gmres_restart"):
-                solver.setGMRESRestart(MOST_ITERATIONS)
-        if inner.getType() not in ("python", "none"):
-            kind = inner.getType()
-            solver.destroy()
-            raise ConvergenceError(
-                "linear solver",
-                f"PETSc's preconditioner {kind!r} needs a stored matrix, which the hierarchical operator has not; "
-                'omit pc_type, or use operator = "dense"',
-            )
+        solver.getPC().setType("python")
+        solver.getPC().setPythonContext(Preconditioning(self))
+        self._keeps_directions = take_options(solver, MOST_ITERATIONS)
         # The user's ksp_rtol and ksp_atol, if they are given.
         self._tolerance, self._least = (float(each) for each in solver.getTolerances()[:2])
         self._solver, self._now = solver, _Iterate(None, np.zeros(0), np.zeros(0), 0.0)
@@ -133,25 +130,38 @@ class KrylovTangent(TangentOperator):
         self, constraints: ConstraintMap, load: Load, law: Linearisation | None = None, forcing: float = 0.0
     ) -> Solved:
         """See TangentOperator. Raises ConvergenceError: "linear solver"."""
-        self._move_on(constraints)
-        self.constraints, self._space.residual = constraints, np.zeros(0)
-        begin = self._carry_over(law)
-        self.law = law
         loosely = forcing > 0 and self._keeps_directions
+        self._by_parts = loosely and law is not None and self._parts.suit(law)
+        self._move_on(constraints, load, law)
+        self.constraints, self._space.residual = constraints, np.zeros(0)
+        begin = self.solution
+        if begin is not None and law is not None and self.law is not None:
+            begin = carry_solution(self.problem, begin, self.law, law, self.expected)
+            self.expected = None
+        self.law = law
         self._now = self._begin(constraints, load, begin, loosely)
         if self._now.scale == 0.0:
             unknowns = np.zeros(self.problem.unknowns)
             return Solved(unknowns, constraints.evaluate(unknowns), 0.0)
         return self._solve_loosely(constraints, forcing) if loosely else self._complete(constraints, load)
 
-    def _move_on(self, constraints: ConstraintMap) -> None:
+    def _move_on(self, constraints: ConstraintMap, load: Load, law: Linearisation | None) -> None:
         """Make preconditioner and GMRES ready for a constraint map; directions of the same operator serve on."""
         if self._known is None or not constraints.acts_as(self._known):
             self._forget()
             give_back()
             self._known = constraints
         self._product.take_map(constraints)
-        self.preconditioner.update(constraints)
+        if self._by_parts and law is not None:
+            self.preconditioner.pass_over(constraints)
+            self._parts.form(law, self._divide(load).parts)
+        else:
+            self.preconditioner.update(constraints)
+
+    def _divide(self, load: Load) -> Sweeps:
+        if self._sweeps is None:
+            self._sweeps = Sweeps(self.problem, self.preconditioner, self._groups, load)
+        return self._sweeps
 
     def _forget(self) -> None:
         self._known = None
@@ -185,13 +195,19 @@ class KrylovTangent(TangentOperator):
         """
         now = self._now
         begin, least = self.problem.measure(now.residual), self._tolerance * now.scale
-        now = self._improve(now, max(forcing * begin, least))
+        goal = max(forcing * begin, least)
+        now, count = self._improve(now, goal), 0
+        if self._by_parts and is_unsolved(self._solver):
+            self._by_parts, count = False, self.iterations[-1]
+            self.preconditioner.update(constraints)
+            now = self._improve(now, goal)
         refuse_unsolved(self._solver, forcing)
         off, left = self.preconditioner.correct(now.residual)
         self._now = replace(now, part=now.part - off, residual=self.preconditioner.turn_back(left))
         unknowns = self.solution = self.gather(self._now.part)
         residual = self.problem.measure(left) / size_residual(now.scale, unknowns, constraints.given)
-        return Solved(unknowns, constraints.evaluate(unknowns), residual, False, self.iterations[-1], loosely=True)
+        count += self.iterations[-1]
+        return Solved(unknowns, constraints.evaluate(unknowns), residual, False, count, loosely=True)
 
     def _complete(self, constraints: ConstraintMap, load: Load) -> Solved:
         """The solution to the tolerance, from the iterate on."""
@@ -227,20 +243,15 @@ class KrylovTangent(TangentOperator):
                 anew = True
                 self._space.forget()
         singular = int(add_up(problem.comm, np.array([float(self.preconditioner.singular)]))[0])
-        loose = f"; {singular} groups of elements are not held by any neighbour" if singular else ""
-        raise ConvergenceError(
-            "linear solver",
-            f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"
-            + (f"; the option ksp_rtol = {self._tolerance:g} lets it end there"
-               if self._tolerance > SAFETY * tolerance else '; try operator = "dense"'),
-        )
+        raise describe_unsolved(residual, count, tolerance, (self._tolerance, SAFETY * tolerance), singular)
 
     def _improve(self, now: _Iterate, goal: float) -> _Iterate:
         """The iterate after GMRES, ended where the norm of the residual is at the goal."""
         self._right.setArray(-now.residual)
         self._left.set(0.0)
         usual = self._solver.getTolerances()
-        self._solver.setTolerances(rtol=0.0, atol=max(goal, self._least))
+        most = min(usual[3], MOST_BY_PARTS) if self._by_parts else usual[3]
+        self._solver.setTolerances(rtol=0.0, atol=max(goal, self._least), max_it=most)
         try:
             self._run_gmres()
         finally:
@@ -309,23 +320,8 @@ class KrylovTangent(TangentOperator):
         solved: Solved, judge: Judge,
     ) -> ModeState:
         """See TangentOperator; the next solution begins from the states that go with the modes."""
-        if self._sweeps is None:
-            self._sweeps = Sweeps(self.problem, self.preconditioner, self._groups, load)
-        settled, self.expected = self._sweeps.settle(constraints, modes, memory, load, law, solved, judge)
+        settled, self.expected = self._divide(load).settle(constraints, modes, memory, load, law, solved, judge)
         return settled
-
-    def _carry_over(self, law: Linearisation | None) -> Real | None:
-        """The last solution, or the states expected of the pairs, in the present unknowns; None if there is none."""
-        if self.solution is None or law is None or self.law is None:
-            return self.solution
-        slave = self.problem.mesh.pairs.slave
-        carried = self.solution.reshape(-1, 2).copy()
-        state = np.einsum("mij,mj->mi", self.law.tangent, carried[slave]) + self.law.offset
-        if self.expected is not None:
-            state = np.where(self.problem.laws.follows[:, None], state, self.expected)
-            self.expected = None
-        carried[slave] = carry_over(state, law, self.problem.traction_scale)
-        return carried.ravel()
 
     def gather(self, part: Real) -> Real:
         """A vector (unknowns,) on every rank, in the order of the nodes, from the ranks' parts."""
@@ -339,6 +335,8 @@ class KrylovTangent(TangentOperator):
 
     def precondition(self, part: Real) -> Real:
         """This rank's part of the preconditioned residual, for its part of the residual."""
+        if self._by_parts:
+            return self._parts.apply(self._product.surround(part, self._parts.beyond))
         result, inner = np.zeros(len(part)), self.preconditioner
         inner.apply(part if inner.whole else self._product.surround(part, inner.beyond), result)
         return result
@@ -386,7 +384,7 @@ class KrylovTangent(TangentOperator):
 
     def take_over(self, problem: Problem) -> None:
         """See TangentOperator."""
-        self.problem, self.expected, self._sweeps = problem, None, None
+        self.problem, self.expected, self._sweeps, self._parts = problem, None, None, PartInverses(problem)
         self._product.take_over(problem)
         self.preconditioner.most_drift = MOST_DRIFT
         self._forget()
@@ -394,6 +392,7 @@ class KrylovTangent(TangentOperator):
     def destroy(self) -> None:
         """See TangentOperator."""
         self._sweeps = None
+        self._parts.forget()
         self._space.forget()
         self.preconditioner.drop_inverses()
         for item in (self._solver, self._matrix, self._right, self._left):

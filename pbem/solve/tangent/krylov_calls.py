@@ -7,10 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.contact.modes import Linearisation, carry_over
 from pbem.errors import ConvergenceError
 from pbem.mesh.numbering import number_components
 from pbem.parallel import gather_parts
-from pbem.solve.petsc.session import PREFIX, PETSc
+from pbem.solve.petsc.session import PREFIX, PETSc, petsc_options
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.problem.problem import Problem
 
@@ -68,6 +69,29 @@ class Preconditioning:
         y.setArray(self._tangent.precondition(np.array(x.getArray(readonly=True))))
 
 
+def take_options(solver: PETSc.KSP, most: int) -> bool:
+    """Set a solver as the user's options say, who may ask for another method; whether it is ours. most: iterations.
+
+    Raises ConvergenceError: "linear solver", for a preconditioner that needs a stored matrix.
+    """
+    with petsc_options(choose_options()):
+        solver.setFromOptions()
+    ours = solver.getType() == "python"
+    if not ours:
+        solver.setPCSide(PETSc.PC.Side.RIGHT)
+        if not PETSc.Options().hasName(PREFIX + "ksp_gmres_restart"):
+            solver.setGMRESRestart(most)
+    kind = solver.getPC().getType()
+    if kind not in ("python", "none"):
+        solver.destroy()
+        raise ConvergenceError(
+            "linear solver",
+            f"PETSc's preconditioner {kind!r} needs a stored matrix, which the hierarchical operator has not; "
+            'omit pc_type, or use operator = "dense"',
+        )
+    return bool(ours)
+
+
 def choose_options() -> dict[str, str]:
     """Options of PETSc's that have no function of their own, unless the user says otherwise.
 
@@ -78,6 +102,20 @@ def choose_options() -> dict[str, str]:
     return {} if PETSc.Options().hasName(PREFIX + name) else {name: "refine_always"}
 
 
+def carry_solution(
+    problem: Problem, solution: Real, before: Linearisation, law: Linearisation, expected: Real | None
+) -> Real:
+    """The last solution (unknowns,), under the laws before, in the present unknowns; expected (m, 4): states that are
+    expected of the pairs, None for those of the solution."""
+    slave = problem.mesh.pairs.slave
+    carried = solution.reshape(-1, 2).copy()
+    state = np.einsum("mij,mj->mi", before.tangent, carried[slave]) + before.offset
+    if expected is not None:
+        state = np.where(problem.laws.follows[:, None], state, expected)
+    carried[slave] = carry_over(state, law, problem.traction_scale)
+    return carried.ravel()
+
+
 def find_order(problem: Problem) -> Integer:
     """Unknowns of all ranks, one rank after the other."""
     own = problem.system.nodes.astype(float)
@@ -85,12 +123,36 @@ def find_order(problem: Problem) -> Integer:
     return number_components(nodes)
 
 
+def is_unsolved(solver: PETSc.KSP) -> bool:
+    """Whether GMRES came to its limit of iterations. Not where rounding ended it, as there is no better solution then.
+    """
+    reasons = PETSc.KSP.ConvergedReason
+    return solver.getConvergedReason() in (reasons.DIVERGED_MAX_IT, reasons.DIVERGED_NANORINF)
+
+
 def refuse_unsolved(solver: PETSc.KSP, part: float) -> None:
     """Raise ConvergenceError ("linear solver") where GMRES did not reduce a residual to a part of it within its limit
-    of iterations. Not where rounding ended it, as there is no better solution then."""
-    reasons = PETSc.KSP.ConvergedReason
-    if solver.getConvergedReason() in (reasons.DIVERGED_MAX_IT, reasons.DIVERGED_NANORINF):
+    of iterations."""
+    if is_unsolved(solver):
         raise ConvergenceError(
             "linear solver",
             f"GMRES did not reduce a residual to {part:g} of it in {solver.getIterationNumber()} iterations",
         )
+
+
+def describe_unsolved(
+    residual: float, count: int, tolerance: float, asked: tuple[float, float], singular: int
+) -> ConvergenceError:
+    """The error of a system that GMRES solved to a residual only, in so many iterations; tolerance: of that.
+
+    asked: the relative tolerance of GMRES, and what it is unless the user asks for another. singular: groups of
+    elements whose matrices are.
+    """
+    loose = f"; {singular} groups of elements are not held by any neighbour" if singular else ""
+    given, usual = asked
+    return ConvergenceError(
+        "linear solver",
+        f"GMRES reached a relative residual of {residual:.1e} in {count} iterations (asked: {tolerance:.1e}){loose}"
+        + (f"; the option ksp_rtol = {given:g} lets it end there"
+           if given > usual else '; try operator = "dense"'),
+    )

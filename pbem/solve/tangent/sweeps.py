@@ -10,8 +10,8 @@ solution of the whole model, which begins from the states that go with them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,7 +22,7 @@ from pbem.contact.complementarity import Subset, take_subset
 from pbem.contact.constraints import ConstraintMap, evaluate_pairs
 from pbem.contact.laws import Memory, ModeState, PairState, follow_leaders, plastic_slip
 from pbem.contact.loads import Load
-from pbem.contact.local_laws import solve_laws
+from pbem.contact.local_laws import Single, solve_laws
 from pbem.contact.modes import G_N, G_S, P_N, P_S, Linearisation, linearise
 from pbem.heap import give_back
 from pbem.mesh.mesh import Mesh
@@ -41,12 +41,33 @@ MOST_STEPS = 8
 SMALL = 1e-3
 
 
+@dataclass(frozen=True)
+class Parts:
+    """Parts of this rank's groups with what is around them, and what moves them.
+
+    Their pairs (k,), one part after the other, are in `pairs`, most of them in more than one part; owned (k,): those
+    that belong to the part and not to what is around it. Part j has those from first[j] to first[j + 1], and their
+    stiffness[j] (see pbem.contact.local_laws). softness (m, 2, 2): from what is left of the equations of each pair's
+    node to its tractions along n and s.
+    """
+
+    pairs: Integer
+    owned: Bool
+    first: Integer
+    stiffness: Sequence[Single]
+    softness: Real
+
+    def list(self) -> Iterator[tuple[Integer, Bool, Single]]:
+        """Pairs, which of them are owned, and stiffness of each part."""
+        for j, each in enumerate(self.stiffness):
+            here = slice(self.first[j], self.first[j + 1])
+            yield self.pairs[here], self.owned[here], each
+
+
 class Sweeps:
     """The groups of this rank, and the tractions of all pairs from their jumps.
 
-    All groups take a step of Newton's method at a time. Their pairs (k,), one group after the other, are in `pairs`,
-    most of them in more than one group; owned (k,): those that belong to the group and not to what is around it.
-    Subdomain j has those from first[j] to first[j + 1], and their stiffness (see pbem.contact.local_laws).
+    All groups take a step of Newton's method at a time.
     """
 
     def __init__(
@@ -58,23 +79,23 @@ class Sweeps:
         closed = problem.constrain(_free(problem, np.zeros(problem.laws.count, dtype=bool)), load)
         # The tractions of a crack's pair are in its own node's equations alone.
         own_equations = take_blocks((preconditioner.free @ closed.matrix).tocsr(), mesh.nodes)[mesh.pairs.slave]
-        self._softness = np.linalg.inv(own_equations)
+        softness = np.linalg.inv(own_equations)
         self._held = np.flatnonzero(np.isin(mesh.pairs.slave, problem.system.nodes))
         pair_of_node = np.full(mesh.nodes, -1)
         pair_of_node[mesh.pairs.slave] = np.where(problem.laws.follows, -1, np.arange(mesh.pairs.count))
         pairs, owned = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=bool)]
-        self._stiffness = []
+        stiffness = []
         for own, around in _divide(mesh, groups):
             near, inside = (_find_pairs(mesh, pair_of_node, each) for each in (around, own))
             if not len(inside):
                 continue
             formed = preconditioner.form_block(constraints.matrix, around, mesh.pairs.slave[near])
-            formed = self._softness[near] @ formed.reshape(len(near), 2, -1)
-            self._stiffness.append(-formed.reshape(2 * len(near), -1).astype(np.float32))
+            formed = softness[near] @ formed.reshape(len(near), 2, -1)
+            stiffness.append(-formed.reshape(2 * len(near), -1).astype(np.float32))
             pairs.append(near)
             owned.append(np.isin(near, inside))
-        self._pairs, self._owned = np.concatenate(pairs), np.concatenate(owned)
-        self._first = np.cumsum([len(each) for each in pairs])
+        first = np.cumsum([len(each) for each in pairs])
+        self.parts = Parts(np.concatenate(pairs), np.concatenate(owned), first, stiffness, softness)
         give_back()
 
     def settle(
@@ -85,7 +106,7 @@ class Sweeps:
 
         All ranks together, the same on all. law, solved: linearised at the modes, and the solution for that.
         """
-        problem, laws, pairs = self._problem, self._problem.laws, self._pairs
+        problem, laws, pairs = self._problem, self._problem.laws, self.parts.pairs
         subset = take_subset(laws, memory, load.pressure, modes, pairs)
         state = evaluate_pairs(problem.mesh, law, solved.unknowns)
         values = np.stack([state.p_n, state.p_s, state.g_n, state.g_s], axis=1)
@@ -96,7 +117,7 @@ class Sweeps:
             start = replace(subset, modes=ModeState(modes.mode[pairs], modes.sign[pairs]))
             settled, reached = self._settle_groups(start, values[pairs], judge, sweep > 0)
             found = np.zeros((len(values), 6))
-            found[pairs[self._owned]] = np.column_stack([settled.mode, settled.sign, reached])[self._owned]
+            found[pairs[self.parts.owned]] = np.column_stack([settled.mode, settled.sign, reached])[self.parts.owned]
             found = add_up(problem.comm, found)[laws.leader]
             before, modes = modes, follow_leaders(laws, ModeState(np.rint(found[:, 0]).astype(np.int8), found[:, 1]))
             values = found[:, 2:]
@@ -111,12 +132,12 @@ class Sweeps:
         """
         scale, values = self._problem.traction_scale, values.copy()
         mode, sign = subset.modes.mode.copy(), subset.modes.sign.copy()
-        groups = np.arange(len(self._stiffness))
+        groups = np.arange(len(self.parts.stiffness))
         for taken in range(MOST_STEPS + 1):
             if not len(groups):
                 break
-            at = np.concatenate([np.arange(*self._first[group : group + 2]) for group in groups])
-            first = np.concatenate([[0], np.cumsum(self._first[groups + 1] - self._first[groups])])
+            at = np.concatenate([np.arange(*self.parts.first[group : group + 2]) for group in groups])
+            first = np.concatenate([[0], np.cumsum(self.parts.first[groups + 1] - self.parts.first[groups])])
             part = take_subset(subset.laws, subset.memory, subset.pressure, ModeState(mode, sign), at)
             if taken or moved:
                 values[at] = self._solve_groups(part, groups, first, values[at], 0.0 if taken else SMALL)
@@ -130,13 +151,13 @@ class Sweeps:
     def _solve_groups(self, part: Subset, groups: Integer, first: Integer, values: Real, least: float) -> Real:
         """The values of the pairs of some groups in their modes; as they were where there are none. least: what counts.
         """
-        scale, result = self._problem.traction_scale, values.copy()
+        scale, result, stiffness = self._problem.traction_scale, values.copy(), self.parts.stiffness
         state = _name_state(values, scale)
         slip = plastic_slip(part.laws, state)
         law = linearise(part.laws, part.modes, state.p_n, slip, part.memory, part.pressure, scale)
         for k, group in enumerate(groups):
             own = slice(first[k], first[k + 1])
-            found = solve_laws(law.tangent[own], law.offset[own], self._stiffness[group], values[own], scale, least)
+            found = solve_laws(law.tangent[own], law.offset[own], stiffness[group], values[own], scale, least)
             if found is not None:
                 result[own] = found
         return result
@@ -153,7 +174,7 @@ class Sweeps:
         equations = problem.apply(v, load, constraints.released).reshape(-1, 2)
         place = np.searchsorted(problem.system.nodes, mesh.pairs.slave[self._held])
         result = np.zeros((mesh.pairs.count, 2))
-        result[self._held] = -(self._softness[self._held] @ equations[place][..., None])[..., 0]
+        result[self._held] = -(self.parts.softness[self._held] @ equations[place][..., None])[..., 0]
         return add_up(problem.comm, result)
 
 

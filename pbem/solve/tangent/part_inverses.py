@@ -17,6 +17,7 @@ from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
 from pbem.solve.problem.problem import Problem
 from pbem.solve.system.halo import place_unknowns
+from pbem.solve.tangent.block_motions import BlockMotions
 from pbem.solve.tangent.nearby import answers_nearby
 from pbem.solve.tangent.sweeps import Parts
 
@@ -53,6 +54,7 @@ class PartInverses:
         self.forget()
         tractions, jumps = law.tangent[:, :2] / self._problem.traction_scale, law.tangent[:, 2:]
         with clock.piece("preconditioner"):
+            self._blocks.form(law, self._problem.traction_scale)
             for (near, _, stiffness), (_, own) in zip(parts.list(), self._places, strict=True):
                 self._rows.append(_invert(tractions[near], jumps[near], stiffness, own))
 
@@ -64,7 +66,8 @@ class PartInverses:
         self._parts, self.beyond = parts, np.setdiff1d(slave[parts.pairs], nodes)
         pair_of_node = np.empty(mesh.nodes, dtype=np.int64)
         pair_of_node[slave] = np.arange(mesh.pairs.count)
-        self._softness = parts.softness[pair_of_node[np.concatenate([nodes, self.beyond])]]
+        here = pair_of_node[np.concatenate([nodes, self.beyond])]
+        self._softness, self._blocks = parts.softness[here], BlockMotions(self._problem, here, len(nodes))
         self._places = [
             (place_unknowns(nodes, self.beyond, number_components(slave[near])),
              number_components(np.flatnonzero(owned)))
@@ -73,15 +76,16 @@ class PartInverses:
 
     def apply(self, residual: Real) -> Real:
         """The unknowns (own unknowns,) for a residual of the own nodes' equations, with those of the nodes `beyond`
-        after them. Pairs that follow others have tractions of their own alone."""
+        after them (theory, 63). Pairs that follow others have tractions of their own alone."""
         left = (self._softness @ residual.reshape(-1, 2, 1)).ravel()
+        moved, left = self._blocks.correct(left)
         result = left[: 2 * len(self._problem.system.nodes)].copy()
         # Single precision has few powers of ten; by a power of two, so that ranks round alike.
         size = float(np.ldexp(0.5, np.frexp(np.abs(left).max(initial=0.0))[1]))
         single = (left / size).astype(np.float32)
         for (places, own), rows in zip(self._places, self._rows, strict=True):
             result[places[own]] = size * (rows @ single[places])
-        return result
+        return result if moved is None else result + moved
 
 
 def _invert(traction: Real, jump: Real, stiffness: Single, own: Integer) -> Single:

@@ -7,6 +7,8 @@ smaller, and their stiffness is stored: another law only weighs its columns.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
@@ -22,6 +24,9 @@ from pbem.solve.tangent.nearby import answers_nearby
 from pbem.solve.tangent.sweeps import Parts
 
 Single = NDArray[np.float32]
+
+# What inverses in single precision may be off by, where they are to give back numbers of about one.
+EXACT = 0.03
 
 
 class PartInverses:
@@ -90,18 +95,32 @@ class PartInverses:
 
 def _invert(traction: Real, jump: Real, stiffness: Single, own: Integer) -> Single:
     """Rows `own` (o,) of the inverse (2 k, 2 k) for laws of pairs (k, 2, 2); those of the pairs alone if there is none.
+
+    In double precision where single precision does not give back a vector that the matrix was applied to.
     """
-    count = len(traction)
-    blocks, weight = -stiffness.reshape(2 * count, count, 2), jump.astype(np.float32)
-    matrix = np.empty((2 * count, count, 2), dtype=np.float32)
+    asked = np.random.default_rng(0).normal(size=2 * len(traction))
+    alone, moved = (np.einsum("kij,kj->ki", each, asked.reshape(-1, 2)).ravel() for each in (traction, jump))
+    given = alone - stiffness.astype(float) @ moved
+    for kind, factor, solve in ((np.float32, lapack.sgetrf, lapack.sgetrs), (np.float64, lapack.dgetrf, lapack.dgetrs)):
+        matrix = _form_matrix(traction, jump, stiffness.astype(kind, copy=False))
+        wanted = np.zeros((len(matrix), len(own)), dtype=kind, order="F")
+        wanted[own, np.arange(len(own))] = 1.0
+        factors, pivots, zero_pivot = factor(matrix.T, overwrite_a=True)
+        if zero_pivot:
+            continue
+        rows = solve(factors, pivots, wanted, overwrite_b=True)[0].T
+        if np.abs(rows @ given - asked[own]).max() <= EXACT:
+            return np.ascontiguousarray(rows, dtype=np.float32)
+    return np.eye(len(asked), dtype=np.float32)[own]
+
+
+def _form_matrix(traction: Real, jump: Real, stiffness: NDArray[Any]) -> NDArray[Any]:
+    """Tractions less those of the stiffness, from the unknowns of the laws of pairs: (2 k, 2 k)."""
+    count, at = len(traction), np.arange(len(traction))
+    blocks, weight = stiffness.reshape(2 * count, count, 2), jump.astype(stiffness.dtype)
+    matrix = np.empty((2 * count, count, 2), dtype=stiffness.dtype)
     for j in range(2):
-        matrix[:, :, j] = blocks[:, :, 0] * weight[:, 0, j] + blocks[:, :, 1] * weight[:, 1, j]
-    at = np.arange(count)
+        matrix[:, :, j] = -blocks[:, :, 0] * weight[:, 0, j] - blocks[:, :, 1] * weight[:, 1, j]
     for i in range(2):
         matrix[2 * at + i, at] += traction[:, i]
-    matrix = matrix.reshape(2 * count, 2 * count)
-    wanted = np.zeros((2 * count, len(own)), dtype=np.float32, order="F")
-    wanted[own, np.arange(len(own))] = 1.0
-    factors, pivots, zero_pivot = lapack.sgetrf(matrix.T, overwrite_a=True)
-    rows = lapack.sgetrs(factors, pivots, wanted, overwrite_b=True)[0].T if not zero_pivot else wanted.T
-    return np.ascontiguousarray(rows if np.isfinite(rows).all() else wanted.T)
+    return matrix.reshape(2 * count, 2 * count)

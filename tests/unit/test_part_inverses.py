@@ -13,7 +13,7 @@ from pbem.contact.modes import Linearisation
 from pbem.contact.smoothed import find_smooth, linearise_smoothly
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.problem import Problem
-from pbem.solve.tangent import krylov, part_inverses, sweeps
+from pbem.solve.tangent import krylov, sweeps
 from pbem.solve.tangent.krylov import KrylovTangent
 from tests.identities.solving import linearise_pairs
 from tests.unit.test_smoothed import write_grid
@@ -85,17 +85,3 @@ def test_nodes_of_outer_boundaries_have_no_part() -> None:
     law = smooth(network)[2]
     assert krylov.PartInverses(network).suit(law) and not krylov.PartInverses(network).suit(linearise_pairs(network))
     assert plate.mesh.pairs.count < plate.mesh.nodes and not krylov.PartInverses(plate).suit(law)
-
-
-@pytest.mark.parametrize("off", [1.0, 1.7e-7])
-def test_parts_that_are_nearly_singular_are_inverted_in_double_precision(off: float) -> None:
-    # Two faces of which each bears what the other one is moved by: all but singular.
-    stiffness = np.array([[0.0, -1.0], [-1.0, 0.0]], dtype=np.float32)
-    traction, jump = np.diag([1.0, 1.0 + off])[None], np.eye(2)[None]
-    found = part_inverses._invert(traction, jump, stiffness, np.arange(2))
-    exact = np.array([[1 + off, -1.0], [-1.0, 1.0]]) / off
-    np.testing.assert_allclose(found, exact, rtol=1e-6)
-    # Only the rows that are asked for; none of a matrix that is singular.
-    np.testing.assert_allclose(part_inverses._invert(traction, jump, stiffness, np.array([1])), exact[1:], rtol=1e-6)
-    singular = part_inverses._invert(np.eye(2)[None], jump, stiffness, np.array([1]))
-    np.testing.assert_array_equal(singular, [[0.0, 1.0]])

@@ -23,7 +23,9 @@ from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear import newton, smooth_search
 from pbem.solve.nonlinear.newton import solve_step
 from pbem.solve.nonlinear.smooth_search import (
-    AIMS,
+    AIM,
+    AIM_AGAIN,
+    CENTRED,
     FARTHEST,
     FIRST,
     FIRST_ALONE,
@@ -348,36 +350,32 @@ def test_a_step_aims_at_the_laws_of_a_narrower_width_to_the_first_order(aim: flo
 def test_the_square_of_the_width_falls_by_the_part_of_the_way_that_is_gone() -> None:
     width = Width(2.0, 4.0, 1e-3, 0.1)
     np.testing.assert_allclose([width.fall(part) ** 2 for part in (0.0, 0.5, 1.0)], [4.0, 2.2, 0.4], rtol=1e-12)
-    # The less is aimed at the nearer pairs are to their laws; from far off they come nearer first.
-    most, aims = zip(*AIMS, strict=True)
-    assert list(most) == sorted(most) and list(aims) == sorted(aims) and max(aims) < 1
-    for part in (0.3, 1.0):
-        assert [width.go_on(part, 0.99 * off).aim for off in most] == list(aims)
-        assert [width.go_on(part, 1.01 * off).aim for off in most] == [*aims[1:], 1.0]
-    assert Width(2.0, 4.0, 1e-3).go_on(1.0, most[0]) == Width(2.0, 4.0, 1e-3, aims[0])
-    far = 2 * most[-1]
+    # Aimed at again once pairs are near to their laws, at more after a whole way; else they come nearer first.
+    near, far = 0.9 * CENTRED, 1.1 * CENTRED
+    assert [width.go_on(part, off).aim for part, off in ((1.0, near), (0.9, near), (1.0, far))] == [AIM_AGAIN, AIM, 1]
+    assert Width(2.0, 4.0, 1e-3).go_on(1.0, near) == Width(2.0, 4.0, 1e-3, AIM)
     assert Width(2.0, 4.0, 1e-3).go_on(0.3, far) == Width(2.0, 4.0, 1e-3, 1.0)
     # No further than the last one.
-    last = Width(2e-3, 4.0, 1e-3, 0.1).go_on(0.9, most[0])
+    last = Width(2e-3, 4.0, 1e-3, 0.1).go_on(0.9, near)
     assert last.aim == pytest.approx((1e-3 / last.value) ** 2, rel=1e-12) and last.fall(1.0) == pytest.approx(1e-3)
-    assert Width(1e-3, 4.0, 1e-3).go_on(1.0, most[0]) == Width(1e-3, 4.0, 1e-3, 1.0)
+    assert Width(1e-3, 4.0, 1e-3).go_on(1.0, near) == Width(1e-3, 4.0, 1e-3, 1.0)
 
 
 def test_of_the_way_so_much_is_gone_that_pairs_stay_near_to_their_laws(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = assemble(grow_branches(0, 6))
     count = problem.laws.count
-    search, aim = SmoothSearch(problem, remember(0.0, count), problem.evaluate_load(0, 1.0), True), AIMS[1][1]
+    search = SmoothSearch(problem, remember(0.0, count), problem.evaluate_load(0, 1.0), True)
     here, there = PairState(*np.zeros((4, count))), PairState(*np.ones((4, count)))
 
     def choose(off: Any, aim: float) -> tuple[float, float]:
         monkeypatch.setattr(SmoothSearch, "_measure_off", lambda at, state, width: off(state.p_n[0], width))
         return search._choose_part(here, there, Width(1.0, 1.0, 1e-3, aim))
 
-    assert choose(lambda part, width: 0.99 * NEAR, aim) == (1.0, 0.99 * NEAR)
-    assert choose(lambda part, width: NEAR * part / 0.75, aim)[0] == 0.7
+    assert choose(lambda part, width: 0.99 * NEAR, AIM) == (1.0, 0.99 * NEAR)
+    assert choose(lambda part, width: NEAR * part / 0.75, AIM)[0] == 0.7
     # Off by more anywhere: where it is least. The width is that which belongs to the part.
-    assert choose(lambda part, width: 2 * NEAR + abs(part - 0.3), aim)[0] == 0.3
-    assert choose(lambda part, width: 2 * NEAR + abs(width**2 - 1 + 0.2 * (1 - aim)), aim)[0] == 0.2
+    assert choose(lambda part, width: 2 * NEAR + abs(part - 0.3), AIM)[0] == 0.3
+    assert choose(lambda part, width: 2 * NEAR + abs(width**2 - 1 + 0.2 * (1 - AIM)), AIM)[0] == 0.2
     # With the same width: the whole, if it leaves less; else what leaves least.
     assert choose(lambda part, width: 5 - part, 1.0)[0] == 1.0
     assert choose(lambda part, width: 5 - 0.1 * part, 1.0)[0] == 1.0

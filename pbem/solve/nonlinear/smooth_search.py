@@ -51,10 +51,11 @@ SOARED = 2
 # The first width is this part of the mean violation of the true laws; the last one this part of the largest traction:
 # with less, blocks that touch nothing would be held by nothing but rounding.
 WIDTH, NARROWEST = 0.1, 1e-6
-# The square of the width falls to such a part of itself where pairs are off their smoothed laws by no more than so much
-# of it, in the mean along all pairs, in which none counts for more than FARTHEST widths: the less the nearer they are.
-# Else an iteration with the same width brings them nearer.
-AIMS, FARTHEST = ((0.1, 0.01), (0.15, 0.1), (0.6, 0.3)), 10.0
+# The square of the width falls to AIM of itself where pairs are off their smoothed laws by no more than CENTRED of it,
+# in the mean along all pairs, in which none counts for more than FARTHEST widths; to AIM_AGAIN after such a fall that
+# leaves them there. Else an iteration with the same width brings them nearer.
+AIM, AIM_AGAIN = 0.1, 0.01
+CENTRED, FARTHEST = 0.15, 10.0
 # Of the way to a solution the largest of these parts is gone that leaves pairs off by no more than NEAR; with the same
 # width, the whole if it leaves BETTER of what they were off, else the part that leaves least.
 PARTS = (1.0, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.05)
@@ -89,7 +90,8 @@ class Width:
 
     def go_on(self, part: float, off: float) -> Width:
         """The width of the next iteration, after one that went a part of its way and leaves pairs so much off."""
-        value, aim = self.fall(part), next((aim for most, aim in AIMS if off <= most), 1.0)
+        value = self.fall(part)
+        aim = 1.0 if off > CENTRED else AIM if self.aim == 1 or part < 1 else AIM_AGAIN
         return replace(self, value=value, aim=max(aim, (self.last / value) ** 2))
 
 
@@ -221,7 +223,7 @@ class SmoothSearch:
         return PARTS[best], off[best]
 
     def _measure_off(self, state: PairState, width: float) -> float:
-        """By how many widths pairs are off their smoothed laws, in the mean along them (see FARTHEST)."""
+        """By how many widths pairs are off their smoothed laws, in the mean along them (see CENTRED)."""
         off = self._find_violation(state, width) / (width * self._shape)
         return float(self._along @ np.minimum(off, FARTHEST))
 

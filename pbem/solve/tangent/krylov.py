@@ -53,7 +53,7 @@ MOST_DRIFT = 0.9
 # GMRES goes on to this part of Newton's tolerance: two ways to a state then leave less than 1e-9 between its fields.
 SAFETY = 0.03
 # Systems whose inverses of parts serve worse than in so many iterations are gone on with by those of the groups.
-MOST_BY_PARTS = 100
+MOST_BY_PARTS = 150
 # The most pairs that are settled together: each costs two solutions. Of cracks that meet nearby elements answer, and
 # sets that are far from each other are settled one by one.
 MOST_SETTLED_BY_GMRES = 12

@@ -7,8 +7,6 @@ smaller, and their stiffness is stored: another law only weighs its columns.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
@@ -19,14 +17,10 @@ from pbem.contact.modes import Linearisation
 from pbem.mesh.numbering import number_components
 from pbem.solve.problem.problem import Problem
 from pbem.solve.system.halo import place_unknowns
-from pbem.solve.tangent.block_motions import BlockMotions
 from pbem.solve.tangent.nearby import answers_nearby
 from pbem.solve.tangent.sweeps import Parts
 
 Single = NDArray[np.float32]
-
-# What inverses in single precision may be off by, where they are to give back numbers of about one.
-EXACT = 0.03
 
 
 class PartInverses:
@@ -59,7 +53,6 @@ class PartInverses:
         self.forget()
         tractions, jumps = law.tangent[:, :2] / self._problem.traction_scale, law.tangent[:, 2:]
         with clock.piece("preconditioner"):
-            self._blocks.form(law, self._problem.traction_scale)
             for (near, _, stiffness), (_, own) in zip(parts.list(), self._places, strict=True):
                 self._rows.append(_invert(tractions[near], jumps[near], stiffness, own))
 
@@ -71,8 +64,7 @@ class PartInverses:
         self._parts, self.beyond = parts, np.setdiff1d(slave[parts.pairs], nodes)
         pair_of_node = np.empty(mesh.nodes, dtype=np.int64)
         pair_of_node[slave] = np.arange(mesh.pairs.count)
-        here = pair_of_node[np.concatenate([nodes, self.beyond])]
-        self._softness, self._blocks = parts.softness[here], BlockMotions(self._problem, here, len(nodes))
+        self._softness = parts.softness[pair_of_node[np.concatenate([nodes, self.beyond])]]
         self._places = [
             (place_unknowns(nodes, self.beyond, number_components(slave[near])),
              number_components(np.flatnonzero(owned)))
@@ -81,46 +73,31 @@ class PartInverses:
 
     def apply(self, residual: Real) -> Real:
         """The unknowns (own unknowns,) for a residual of the own nodes' equations, with those of the nodes `beyond`
-        after them (theory, 63). Pairs that follow others have tractions of their own alone."""
+        after them. Pairs that follow others have tractions of their own alone."""
         left = (self._softness @ residual.reshape(-1, 2, 1)).ravel()
-        moved, left = self._blocks.correct(left)
         result = left[: 2 * len(self._problem.system.nodes)].copy()
         # Single precision has few powers of ten; by a power of two, so that ranks round alike.
         size = float(np.ldexp(0.5, np.frexp(np.abs(left).max(initial=0.0))[1]))
         single = (left / size).astype(np.float32)
         for (places, own), rows in zip(self._places, self._rows, strict=True):
             result[places[own]] = size * (rows @ single[places])
-        return result if moved is None else result + moved
+        return result
 
 
 def _invert(traction: Real, jump: Real, stiffness: Single, own: Integer) -> Single:
     """Rows `own` (o,) of the inverse (2 k, 2 k) for laws of pairs (k, 2, 2); those of the pairs alone if there is none.
-
-    In double precision where single precision does not give back a vector that the matrix was applied to.
     """
-    asked = np.random.default_rng(0).normal(size=2 * len(traction))
-    alone, moved = (np.einsum("kij,kj->ki", each, asked.reshape(-1, 2)).ravel() for each in (traction, jump))
-    given = alone - stiffness.astype(float) @ moved
-    for kind, factor, solve in ((np.float32, lapack.sgetrf, lapack.sgetrs), (np.float64, lapack.dgetrf, lapack.dgetrs)):
-        matrix = _form_matrix(traction, jump, stiffness.astype(kind, copy=False))
-        wanted = np.zeros((len(matrix), len(own)), dtype=kind, order="F")
-        wanted[own, np.arange(len(own))] = 1.0
-        factors, pivots, zero_pivot = factor(matrix.T, overwrite_a=True)
-        if zero_pivot:
-            continue
-        rows = solve(factors, pivots, wanted, overwrite_b=True)[0].T
-        if np.abs(rows @ given - asked[own]).max() <= EXACT:
-            return np.ascontiguousarray(rows, dtype=np.float32)
-    return np.eye(len(asked), dtype=np.float32)[own]
-
-
-def _form_matrix(traction: Real, jump: Real, stiffness: NDArray[Any]) -> NDArray[Any]:
-    """Tractions less those of the stiffness, from the unknowns of the laws of pairs: (2 k, 2 k)."""
-    count, at = len(traction), np.arange(len(traction))
-    blocks, weight = stiffness.reshape(2 * count, count, 2), jump.astype(stiffness.dtype)
-    matrix = np.empty((2 * count, count, 2), dtype=stiffness.dtype)
+    count = len(traction)
+    blocks, weight = -stiffness.reshape(2 * count, count, 2), jump.astype(np.float32)
+    matrix = np.empty((2 * count, count, 2), dtype=np.float32)
     for j in range(2):
-        matrix[:, :, j] = -blocks[:, :, 0] * weight[:, 0, j] - blocks[:, :, 1] * weight[:, 1, j]
+        matrix[:, :, j] = blocks[:, :, 0] * weight[:, 0, j] + blocks[:, :, 1] * weight[:, 1, j]
+    at = np.arange(count)
     for i in range(2):
         matrix[2 * at + i, at] += traction[:, i]
-    return matrix.reshape(2 * count, 2 * count)
+    matrix = matrix.reshape(2 * count, 2 * count)
+    wanted = np.zeros((2 * count, len(own)), dtype=np.float32, order="F")
+    wanted[own, np.arange(len(own))] = 1.0
+    factors, pivots, zero_pivot = lapack.sgetrf(matrix.T, overwrite_a=True)
+    rows = lapack.sgetrs(factors, pivots, wanted, overwrite_b=True)[0].T if not zero_pivot else wanted.T
+    return np.ascontiguousarray(rows if np.isfinite(rows).all() else wanted.T)

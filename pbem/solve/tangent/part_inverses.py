@@ -73,7 +73,7 @@ class PartInverses:
 
     def apply(self, residual: Real) -> Real:
         """The unknowns (own unknowns,) for a residual of the own nodes' equations, with those of the nodes `beyond`
-        after them. Pairs that follow others have tractions of their own alone."""
+        after them (theory, 63). Pairs that follow others have tractions of their own alone."""
         left = (self._softness @ residual.reshape(-1, 2, 1)).ravel()
         result = left[: 2 * len(self._problem.system.nodes)].copy()
         # Single precision has few powers of ten; by a power of two, so that ranks round alike.

@@ -74,7 +74,7 @@ def compute(case):
     released = np.linalg.qr(random.standard_normal((len(problem.anchors), 1)))[0] if len(problem.anchors) > 2 else None
     constraints = replace(problem.constrain(law, load), released=released)
     tangent.constraints = constraints
-    tangent._move_on(constraints)
+    tangent._move_on(constraints, load, law)
     unknowns = random.standard_normal((problem.mesh.nodes, 2))
     part = unknowns[problem.system.nodes].ravel()
     tangent.precondition(part)

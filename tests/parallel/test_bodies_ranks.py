@@ -9,14 +9,16 @@ import pytest
 from scripts.bench_connected import write_layers, write_wall
 from tests.parallel.on_ranks import Launch, expect_same_search, run_hierarchical
 
+LAYERS = write_layers(0.2)
+SHORT = LAYERS.replace("elements = 24", "elements = 18")
 
-@pytest.mark.parametrize("text", [write_wall(0.25), write_layers(0.2)], ids=["wall", "layers"])
+
+@pytest.mark.parametrize("text", [write_wall(0.25), SHORT], ids=["wall", "layers"])
 def test_statuses_and_products_are_the_same_on_all_ranks(text: str, tmp_path: Path, mpirun: Launch) -> None:
     expect_same_search(run_hierarchical(mpirun, tmp_path, text, (1, 2, 3)))
 
 
 def test_groups_in_the_place_of_the_factors_take_the_same_search_on_all_ranks(tmp_path: Path, mpirun: Launch) -> None:
-    text, groups = write_layers(0.2), ("-pbem_newton_bodies", "0")
-    results = run_hierarchical(mpirun, tmp_path, text, (1, 3), *groups)
+    results = run_hierarchical(mpirun, tmp_path, LAYERS, (1, 3), "-pbem_newton_bodies", "0")
     expect_same_search(results)
     assert results[0].convergence["products"].sum() > 40  # factors take 24

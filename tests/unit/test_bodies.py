@@ -31,7 +31,7 @@ from tests.unit.test_forcing import expect_same
 from tests.unit.test_gone_on_with import run
 
 Real = NDArray[np.float64]
-WALL, LAYERS = write_wall(0.25), write_layers(0.25)  # 5 x 5 bricks, 10 layers
+WALL, LAYERS = write_wall(0.25), write_layers(0.2)  # 5 x 5 bricks, 8 layers
 
 
 def read_mesh(text: str) -> Mesh:
@@ -105,8 +105,7 @@ def test_units_change_no_count(tmp_path: Path) -> None:
 
 
 def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    layers = write_layers(0.2)
-    found, _ = run(layers, tmp_path)
+    found, _ = run(LAYERS, tmp_path)
     calls = []
 
     def refuse(self: BodyFactors, constraints: object) -> bool:
@@ -114,7 +113,7 @@ def test_a_singular_operator_leaves_it_to_the_groups(tmp_path: Path, monkeypatch
         return False
 
     monkeypatch.setattr(BodyFactors, "factorise", refuse)
-    by_groups, _ = run(layers, tmp_path, newton_bodies="1")
+    by_groups, _ = run(LAYERS, tmp_path, newton_bodies="1")
     # The solution from which errors are estimated asks once, too.
     assert 1 <= len(calls) <= 2
     expect_same(found, by_groups)

@@ -8,7 +8,6 @@ import numpy as np
 from scipy import sparse
 
 from pbem.arrays import Complex, Integer, Real
-from pbem.mesh.elements import divide_curve
 from pbem.mesh.interpolation import interpolate, interpolate_tips, locate_nodes
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -37,11 +36,12 @@ def list_curve_elements(model: Model, mesh: Mesh) -> list[tuple[str, Integer]]:
     chains = []
     key = np.stack([mesh.region, mesh.curve, mesh.crack])
     borders = np.flatnonzero((np.diff(key, axis=1) != 0).any(axis=0)) + 1
-    starts = {name: divide_curve(curve) for name, curve in model.curves.items()}
+    # As `divide_curve` has the first of each curve's elements.
+    firsts = {name: curve.legs[0].element_ends()[:2] for name, curve in model.curves.items()}
     for chain in np.split(np.arange(mesh.elements), borders):
         name = mesh.curve_names[mesh.curve[chain[0]]]
-        elements = starts[name]
-        forward = mesh.start[chain[0]] == elements.start[0] and mesh.end[chain[0]] == elements.end[0]
+        start, end = firsts[name]
+        forward = mesh.start[chain[0]] == start and mesh.end[chain[0]] == end
         chains.append((name, chain if forward else chain[::-1]))
     return chains
 
@@ -53,15 +53,23 @@ def carry_nodes(fine_model: Model, fine: Mesh, coarse_model: Model, coarse: Mesh
     local = np.full((coarse.elements, coarse.order + 1), np.inf)
     points = coarse.position.reshape(coarse.elements, -1)
     chains = zip(list_curve_elements(fine_model, fine), list_curve_elements(coarse_model, coarse), strict=True)
+    # Coarse elements are made of the fine ones from a first one along their curve on, to one before a last one.
+    along, begin, end, target = [], [], [], []
+    placed = 0
     for (name, own), (_, others) in chains:
-        first = groups[name]
-        for offset in range(int(np.diff(first).max())):
-            at = np.flatnonzero(first[:-1] + offset < first[1:])
-            source, target = own[first[:-1][at] + offset], others[at]
-            s = fine.geometry.select(source).preimage(points[target]).real
-            better = np.abs(s) < np.abs(local[target])
-            local[target] = np.where(better, s, local[target])
-            element[target] = np.where(better, source[:, None], element[target])
+        along.append(own)
+        begin.append(placed + groups[name][:-1])
+        end.append(placed + groups[name][1:])
+        target.append(others)
+        placed += len(own)
+    sources, first, last, targets = (np.concatenate(each) for each in (along, begin, end, target))
+    for offset in range(int((last - first).max())):
+        at = np.flatnonzero(first + offset < last)
+        source, found = sources[first[at] + offset], targets[at]
+        s = fine.geometry.select(source).preimage(points[found]).real
+        better = np.abs(s) < np.abs(local[found])
+        local[found] = np.where(better, s, local[found])
+        element[found] = np.where(better, source[:, None], element[found])
     assert (np.abs(local) <= 1 + BEYOND).all()
     return _build_carry(fine, element.ravel(), local.ravel(), coarse.position, _RootOfTips(fine_model, fine))
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg.lapack import dgesvx
+from scipy.linalg.lapack import dgecon, dgesvx, dgetrf, dgetrs
 
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import (
@@ -44,6 +44,8 @@ ROUNDING, PERTURBATION = 1e-12, 1e-10
 BENT = 1e-9
 # Tractions that some motion hardly changes leave a body free without these pairs.
 FREE = 1e-11
+# Estimates of the reciprocal condition (of sums of columns) that tell without singular values that none does.
+HELD = 1e-6
 # Equations of modes whose reciprocal condition is less leave a body free: their solution would be rounding. Those of
 # bodies that are held have 1e-5 and more.
 REGULAR = 1e-12
@@ -176,6 +178,10 @@ def find_compliance(pairs: PairProblem) -> tuple[Real | None, bool]:
     """
     count = len(pairs.sign)
     tractions, jumps = (pairs.change[k : k + 2].reshape(2 * count, 2 * count) for k in (0, 2))
+    factors, pivots, _ = dgetrf(tractions)
+    if dgecon(factors, np.abs(tractions).sum(axis=0).max(initial=0.0))[0] > HELD:
+        found = dgetrs(factors, pivots, jumps.T, trans=1)[0].T
+        return (found if np.isfinite(found).all() else None), False
     values = np.linalg.svd(tractions, compute_uv=False)
     sprung = bool(values[-1] <= FREE * values[0])
     if sprung:

@@ -51,7 +51,7 @@ class Settled:
 
     modes: None if none were found. exhaustive: whether then every choice was tried and there are none at all (while the
     other pairs keep their modes). tried: number of complementarity problems that were solved. wrong (s,): pairs whose
-    own compliance has the wrong sign, on meshes that cannot carry contact.
+    own compliance has the wrong sign, on meshes that cannot carry contact; not asked where Newton's steps found modes.
     """
 
     modes: ModeState | None
@@ -71,14 +71,14 @@ def settle_subset(
     """
     problem = pose(subset, response)
     loses = (problem.adhesion > 0) | (tensile_limit(subset.laws, subset.memory) > 0)
-    compliance, sprung = find_compliance(problem)
     none = np.zeros(len(loses), dtype=bool)
+    stepped = _step(problem, subset.modes, response, judge, holds)
+    if stepped is not None:
+        return Settled(stepped, False, 0, none)
+    compliance, sprung = find_compliance(problem)
     if compliance is None or subset.effort.is_spent:
         return Settled(None, False, 0, none)
     wrong = none if sprung else (np.diag(compliance) >= 0).reshape(2, -1).any(axis=0)
-    stepped = _step(problem, subset.modes, response, judge, holds)
-    if stepped is not None:
-        return Settled(stepped, False, 0, wrong)
     if len(loses) > MOST_PIVOTED:
         return Settled(None, False, 0, wrong)
     kept = _release(subset, response, compliance, loses, judge, holds)

@@ -321,6 +321,11 @@ def find_pivoting(laws: PairLaws) -> Bool:
     return pivots
 
 
+def find_changing(laws: PairLaws) -> Bool:
+    """The pairs (m,) whose mode can change by itself: not those that are bonded, that never touch, or that follow."""
+    return np.asarray(~(laws.bonded | laws.parted | laws.follows))
+
+
 def find_creeping(laws: PairLaws) -> Bool:
     """The pairs (m,) whose friction rises with the rate of slip from nothing: they never stick, and hold as they creep.
 

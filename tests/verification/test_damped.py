@@ -9,7 +9,7 @@ import pytest
 
 from pbem.case.build import parse_model
 from pbem.contact.damped import Damped
-from pbem.contact.laws import SLIP, STICK, Memory, commit, plastic_slip, start_memory
+from pbem.contact.laws import OPEN, SLIP, STICK, Memory, commit, plastic_slip, start_memory
 from pbem.contact.loads import Load
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
@@ -113,6 +113,58 @@ joint = {{ law = "coulomb", friction = 0.2 }}
 [contacts]
 stop = {{ between = ["right", "w0"] }}
 """
+
+
+GLUED = """
+stages = [
+    {{ name = "press", steps = 1, boundary = {{ top = {{ tx = 0.0, ty = -1.0 }} }} }},
+    {{ name = "push", steps = 1, boundary = {{ top = {{ tx = {shear}, ty = -1.0 }} }} }},
+]
+[materials]
+m = {{ young = 1e3, poisson = 0.3 }}
+[curves]
+{curves}
+r1 = {{ points = [[2, 0], [2, 0.5]], elements = 3 }}
+r2 = {{ points = [[2, 0.5], [2, 1]], elements = 3 }}
+top = {{ points = [[2, 1], [0, 1]], elements = 6 }}
+l2 = {{ points = [[0, 1], [0, 0.5]], elements = 3 }}
+l1 = {{ points = [[0, 0.5], [0, 0]], elements = 3 }}
+seat = {{ points = [[0, 0], [-1, 0], [-1, -1], [3, -1], [3, 0], [2, 0]], elements = [3, 3, 8, 3, 3] }}
+[regions]
+base = {{ material = "m", boundary = ["joint", "seat"], cracks = ["slit"] }}
+lower = {{ material = "m", boundary = ["joint", "r1", "glue", "l1"] }}
+upper = {{ material = "m", boundary = ["glue", "r2", "top", "l2"] }}
+[boundary]
+seat = {{ ux = 0.0, uy = 0.0 }}
+top = {{ tx = 0.0, ty = -1.0 }}
+[interfaces]
+joint = {{ law = "coulomb", friction = 0.25 }}
+slit = {{ law = "open" }}
+"""
+CURVES = (
+    "joint = { points = [[0, 0], [2, 0]], elements = 8 }", "glue = { points = [[2, 0.5], [0, 0.5]], elements = 6 }",
+    "slit = { points = [[0.8, -0.6], [1.2, -0.6]], elements = 4 }",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (1, 2, 0)])
+def test_pairs_that_stay_as_they_are_are_not_asked(order: tuple[int, ...]) -> None:
+    """A block of two that are bonded, over a slit that never closes, slides at the push that friction can balance."""
+    curves = "\n".join(CURVES[k] for k in order)
+    for shear in (0.97 * 0.25, 1.03 * 0.25):
+        problem, tangent, memory, load = begin(GLUED.format(curves=curves, shear=shear))
+        assert can_be_damped(problem, tangent)
+        found = find_damped(problem, tangent, memory, load)
+        assert found is not None
+        assert (found.rest is not None, found.runs is not None) == (shear < 0.25, shear > 0.25)
+        modes = found.rest.modes if found.rest else found.runs
+        fixed = {"glue": STICK, "slit": OPEN}
+        for name, mode in fixed.items():
+            own = problem.mesh.pairs.interface == problem.mesh.interface_names.index(name)
+            assert modes is not None and (modes.mode[own] == mode).all()
+        if found.rest:
+            solution = solve_step(problem, tangent, memory, load, Listener())
+            np.testing.assert_array_equal(modes and modes.mode, solution.modes.mode)
 
 
 @pytest.mark.parametrize(("young", "gap"), [(1e4, 0.1), (1e5, 0.1), (2e6, 0.01), (2e6, 1e-3), (2e7, 0.3)])

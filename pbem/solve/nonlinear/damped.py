@@ -6,13 +6,12 @@ rest it soon ends.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from pbem.arrays import Integer, Real
 from pbem.contact.complementarity import take_subset
 from pbem.contact.damped import Damped, come_to_rest
-from pbem.contact.laws import OPEN, STICK, Memory, ModeState, find_pivoting
+from pbem.contact.laws import OPEN, STICK, Memory, ModeState, find_changing, find_pivoting
 from pbem.contact.loads import Load
 from pbem.contact.modes import linearise
 from pbem.contact.running import Rest, find_running
@@ -33,17 +32,20 @@ def can_be_damped(problem: Problem, tangent: TangentOperator) -> bool:
     """Whether `find_damped` can be asked: for laws whose contact can be pivoted, of models that are not too large."""
     laws = problem.laws
     pivots = (find_pivoting(laws) | find_running(laws)).all() and not laws.follows.any()
-    return bool(pivots) and 0 < laws.count <= MOST_PAIRS and not tangent.settling.nearby
+    some = find_changing(laws).any()
+    return bool(pivots and some) and laws.count <= MOST_PAIRS and not tangent.settling.nearby
 
 
 def find_damped(problem: Problem, tangent: TangentOperator, begin: Memory, load: Load) -> Damped | None:
     """Where the contact comes to rest under a load, from the memory of the last step; None if that operator is singular
-    in which all pairs stick. Two solutions for each pair with it; all ranks together. (theory, 129)
+    in which all pairs stick. Two solutions for each pair whose mode can change; all ranks together. (theory, 129)
+
+    In the result modes, normal tractions and slips are those of all pairs (m,); nan where the mode cannot change.
     """
     laws = problem.laws
     modes = ModeState(np.where(laws.parted, OPEN, STICK).astype(np.int8), begin.modes.sign)
     law = linearise(laws, modes, np.zeros(laws.count), begin.slip, begin, load.pressure, problem.traction_scale)
-    hold, pairs = Hold(problem, begin, load), np.arange(laws.count)
+    hold, pairs = Hold(problem, begin, load), np.flatnonzero(find_changing(laws))
     constraints = hold.release(problem.constrain(law, load), modes)
     try:
         solved = tangent.check(tangent.solve(constraints, load, law), constraints, load, law)
@@ -52,18 +54,28 @@ def find_damped(problem: Problem, tangent: TangentOperator, begin: Memory, load:
         return None
     subset = take_subset(laws, begin, load.pressure, begin.modes, pairs)
     judge = make_judge(problem, solved, GLOBALISATIONS[0])
-    before = np.stack([begin.opening, begin.slip], axis=1)
+    before = np.stack([begin.opening, begin.slip], axis=1)[pairs]
 
     def follow() -> Damped:
         found = come_to_rest(
-            subset, response, lambda m, s: judge(laws, m, s, begin, load.pressure),
-            lambda now: not hold.leaves_free(now), before,
+            subset, response, lambda m, s: judge(subset.laws, m, s, subset.memory, subset.pressure),
+            lambda own: not hold.leaves_free(modes.put(pairs, own)), before,
         )  # fmt: skip
+        runs = modes.put(pairs, found.runs) if found.runs else None
         # Smooth bodies that no load moves are turned by errors of the mesh, where nothing resists that.
-        driven = found.runs is not None and is_driven(problem, load, hold.list_free(found.runs))
-        return found if driven else replace(found, runs=None)
+        driven = runs is not None and is_driven(problem, load, hold.list_free(runs))
+        rest = found.rest and Rest(modes.put(pairs, found.rest.modes), *(
+            _spread(each, pairs, laws.count) for each in (found.rest.normal_traction, found.rest.slip)))
+        return Damped(rest, runs if driven else None, found.instants)
 
     return problem.decide(follow)
+
+
+def _spread(values: Real, pairs: Integer, count: int) -> Real:
+    """Values of some pairs (s,) among all of them (m,); nan elsewhere."""
+    everywhere = np.full(count, np.nan)
+    everywhere[pairs] = values
+    return everywhere
 
 
 def describe_run(problem: Problem, begin: Memory, load: Load, modes: ModeState) -> ConvergenceError:

@@ -15,7 +15,7 @@ from pbem.bem.rigid_motions import find_rigid_motions, free_rotations, need_rota
 from pbem.clock import clock
 from pbem.contact.anchor import Anchor
 from pbem.contact.dependence import find_unknowns_of_regions
-from pbem.contact.laws import PairLaws
+from pbem.contact.laws import PairLaws, find_changing
 from pbem.contact.loads import OuterNodes, evaluate_load, find_needed_columns
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Model
@@ -123,7 +123,7 @@ class DenseSystem:
     def make_tangent(self, problem: Problem) -> TangentOperator:
         """Condensed, or by GMRES if that is asked for; freed from the anchors if there are any."""
         rows, laws = self.tangent_rows, problem.laws
-        varying = ~(laws.bonded | laws.parted | laws.follows)
+        varying = find_changing(laws)
         tangent: TangentOperator
         if asks_for_gmres(problem.model):
             tangent = FactoredTangent(problem, rows)

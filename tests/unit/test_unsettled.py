@@ -9,7 +9,7 @@ import pytest
 
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
-from pbem.solve.nonlinear.unsettled import describe_unsettled, find_losing
+from pbem.solve.nonlinear.unsettled import describe_unsettled, find_losing, find_unwetted
 from tests.unit.test_nearby import draw_modes
 from tests.unit.test_sweeps import assemble, write_network
 
@@ -32,11 +32,12 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
     proposal = Proposal(draw_modes(count), violation)
     group = np.array([3, 5])
     wrong, none = (Settled(None, False, 4, each) for each in (WRONG, ~WRONG & False))
+    dry = np.zeros(count)
     found = [
-        describe_unsettled(problem, "mode cycle", proposal, group, wrong),
-        describe_unsettled(problem, "mode cycle", proposal, group, none),
-        describe_unsettled(problem, "mode cycle", proposal, group[:0], None),
-        describe_unsettled(problem, "no admissible modes", proposal, group, none),
+        describe_unsettled(problem, "mode cycle", proposal, group, wrong, dry),
+        describe_unsettled(problem, "mode cycle", proposal, group, none, dry),
+        describe_unsettled(problem, "mode cycle", proposal, group[:0], None, dry),
+        describe_unsettled(problem, "no admissible modes", proposal, group, none, dry),
     ]
     if losing:
         assert {error.reason for error in found} == {"no admissible modes"}
@@ -45,9 +46,33 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
         assert [error.reason for error in found[:3]] == ["unsound mesh", "mode cycle", "mode cycle"]
         assert all("cohesion" not in str(error) for error in found)
     # What the user limits is the user's to change; and laws of slipping pairs may be what does not settle.
-    assert describe_unsettled(problem, "iteration limit", proposal, group[:0], None).reason == "iteration limit"
+    assert describe_unsettled(problem, "iteration limit", proposal, group[:0], None, dry).reason == "iteration limit"
     settled = replace(proposal, violation=np.zeros(count))
-    assert describe_unsettled(problem, "mode cycle", settled, group, wrong).reason == "mode cycle"
+    assert describe_unsettled(problem, "mode cycle", settled, group, wrong, dry).reason == "mode cycle"
+
+
+@pytest.mark.parametrize(("law", "fluid", "unwetted"), [
+    ("friction = 0.4", 0.3, True),
+    ("friction = 0.4", 0.0, False),
+    ("friction = 0.0", 0.3, False),
+    ('friction = 0.4, pressurised = "all"', 0.3, False),
+])  # fmt: skip
+def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, fluid: float, unwetted: bool) -> None:
+    """Faces part at a compression of the pressure, where friction times the pressure holds closed ones."""
+    problem = assemble(write_network(teeth=2, law=law))
+    count = problem.mesh.pairs.count
+    pressure = np.full(count, fluid)
+    assert (find_unwetted(problem.laws, pressure) == unwetted).all()
+    violation = np.zeros(count)
+    violation[[3, 5]] = 1.0, 2.0
+    proposal, none = Proposal(draw_modes(count), violation), Settled(None, True, 4, ~WRONG & False)
+    ended, cycled = (describe_unsettled(problem, reason, proposal, np.array([3, 5]), none, pressure)
+                     for reason in ("no admissible modes", "mode cycle"))
+    assert ended.reason == "no admissible modes"
+    assert cycled.reason == ("no admissible modes" if unwetted else "mode cycle")
+    for error in (ended, cycled):
+        assert ('pressurised = "all"' in str(error)) == unwetted
+        assert "cohesion" not in str(error)
 
 
 def test_of_many_pairs_those_are_named_that_change() -> None:
@@ -59,12 +84,12 @@ def test_of_many_pairs_those_are_named_that_change() -> None:
     proposal = Proposal(draw_modes(count), violation)
     none = Settled(None, False, 4, np.zeros(count, dtype=bool))
     all_pairs, alone = (
-        str(describe_unsettled(problem, "no admissible modes", proposal, group, each))
+        str(describe_unsettled(problem, "no admissible modes", proposal, group, each, np.zeros(count)))
         for group, each in ((np.arange(count), none), (np.array([5]), Settled(None, True, 4, WRONG[1:])))
     )
     place = alone.split("laws of these 1: ")[1].split(";")[0]
     assert f"laws of these {count}, 1 of which changes: {place};" in all_pairs
     violation[[5, 7, 8]] = 1.0
     several = str(describe_unsettled(problem, "no admissible modes", Proposal(draw_modes(count), violation),
-                                     np.arange(count), none))
+                                     np.arange(count), none, np.zeros(count)))
     assert f"laws of these {count}, 3 of which change: {place}, " in several

@@ -34,7 +34,8 @@ def end_search(hold: Hold, reason: str, proposal: Proposal, search: Search) -> C
 
     def describe() -> ConvergenceError:
         error = describe_unsettled(
-            hold.problem, "iteration limit" if spent else reason, proposal, search.failed_group, search.failed)
+            hold.problem, "iteration limit" if spent else reason, proposal, search.failed_group, search.failed,
+            np.zeros(hold.problem.laws.count) if hold.load is None else hold.load.pressure)
         if search.is_spent() and error.reason == "iteration limit":
             taken = "pivoting has taken all that so many iterations may (solver.newton_max_iterations)"
             error = ConvergenceError(error.reason, f"{error.detail}; {taken}", error.places, error.unless)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbem.arrays import Bool, Integer
+from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import PairLaws, find_linear
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
@@ -36,18 +36,19 @@ class Unsettled:
 
 
 def describe_unsettled(
-    problem: Problem, reason: str, proposal: Proposal, group: Integer, failed: Settled | None
+    problem: Problem, reason: str, proposal: Proposal, group: Integer, failed: Settled | None, pressure: Real
 ) -> ConvergenceError:
     """The error of a search that ends, with its reason or a truer one.
 
     group (s,): the pairs for which pivoting found no modes last, with what it found; none if it did not fail.
+    pressure (m,): of fluid.
     """
     if not proposal.changed.any():
         return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
     if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
-        losing = find_losing(problem.laws) & proposal.changed
+        losing = (find_losing(problem.laws) | find_unwetted(problem.laws, pressure)) & proposal.changed
         if losing.any():
-            return _blame_loss(problem, losing, proposal)
+            return _blame_loss(problem, losing, proposal, pressure)
     if failed is not None and failed.wrong.any():
         return ConvergenceError(
             "unsound mesh",
@@ -66,18 +67,28 @@ def describe_unsettled(
         return ConvergenceError(
             reason,
             f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these {those}: "
-            f"{_name(problem, changing)}; {_advise(problem.laws, changing)}",
+            f"{_name(problem, changing)}; {_advise(problem.laws, changing, pressure)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
                             _list_places(problem, np.flatnonzero(proposal.changed)))
 
 
-def _advise(laws: PairLaws, group: Integer) -> str:
+def _advise(laws: PairLaws, group: Integer, pressure: Real) -> str:
     """Why pairs have no modes, and what to do, where they lose what they have back at once; else what may help."""
-    if not find_losing(laws)[group].any():
-        return "try shorter elements there, or smaller steps"
-    lost = "tensile strength and cohesion are" if (laws.tensile_strength[group] > 0).any() else "cohesion is"
-    return f"{lost} lost at once where faces part, and back where they meet: cohesion_lost = true makes that loss last"
+    return "; ".join(_list_losses(laws, group, pressure)) or "try shorter elements there, or smaller steps"
+
+
+def _list_losses(laws: PairLaws, group: Integer | Bool, pressure: Real) -> list[str]:
+    """What some pairs lose where they part and have back where they meet, with what makes it last, or go to zero."""
+    losses = []
+    if find_losing(laws)[group].any():
+        lost = "tensile strength and cohesion are" if (laws.tensile_strength[group] > 0).any() else "cohesion is"
+        losses.append(f"{lost} lost at once where faces part, and back where they meet: cohesion_lost = true makes "
+                      "that loss last")
+    if find_unwetted(laws, pressure)[group].any():
+        losses.append("faces part under the fluid's pressure, at which closed ones still have friction, as it is in "
+                      'open parts alone: with pressurised = "all" friction goes to zero there')
+    return losses
 
 
 def find_losing(laws: PairLaws) -> Bool:
@@ -89,14 +100,22 @@ def find_losing(laws: PairLaws) -> Bool:
     return losing & ~laws.brittle & find_linear(laws)
 
 
-def _blame_loss(problem: Problem, losing: Bool, proposal: Proposal) -> ConvergenceError:
+def find_unwetted(laws: PairLaws, pressure: Real) -> Bool:
+    """The pairs (m,) whose friction is not zero where they part, as a fluid of this pressure (m,) is in open parts
+    alone: they lose it there, and have it back where they meet."""
+    rough = np.zeros(laws.count, dtype=bool)
+    for group in laws.strengths:
+        rough[group.pairs] = group.parameters.get("friction", 0.0) > 0
+    return rough & (pressure > 0) & ~laws.fluid_inside & find_linear(laws)
+
+
+def _blame_loss(problem: Problem, losing: Bool, proposal: Proposal, pressure: Real) -> ConvergenceError:
     """The error where pairs that lose their strength go on changing: what the search made of them last, a cycle or
     pairs of the wrong sign in a body that hangs on two of them, is chance."""
     return ConvergenceError(
         "no admissible modes",
-        f"{_describe_changed(problem, proposal)}; tensile strength and cohesion are lost at once where faces part, and "
-        "back where they meet, so that no modes may fulfil the laws: cohesion_lost = true makes that loss last; where "
-        "elements are longer than the distance to the nearest face, use shorter ones",
+        f"{_describe_changed(problem, proposal)}; {'; '.join(_list_losses(problem.laws, losing, pressure))}; then no "
+        "modes may fulfil the laws; where elements are longer than the distance to the nearest face, use shorter ones",
         _list_places(problem, np.flatnonzero(losing)),
     )
 

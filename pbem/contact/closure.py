@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbem.arrays import Real
+from pbem.contact.at_rest import close_joint
 from pbem.contact.laws import OPEN, STICK, ModeState, PairLaws, PairState
 
 # Up to here, of sigma/(K V), what a joint stores is in a series.
@@ -21,9 +22,7 @@ def find_closure(laws: PairLaws, p_n: Real, pressure: Real) -> tuple[Real, Real]
     Joints that stiffen bear what the fluid inside leaves to them. Under tension they are linear, with their initial
     stiffness.
     """
-    borne = p_n + _relieve(laws, pressure)
-    less = 1.0 + laws.compliance_n * laws.stiffening * np.maximum(-borne, 0.0)
-    return laws.compliance_n * borne / less, laws.compliance_n / less**2
+    return close_joint(laws.compliance_n, laws.stiffening, p_n + _relieve(laws, pressure))
 
 
 def measure_stiffening(laws: PairLaws, p_n: Real, pressure: Real) -> Real:

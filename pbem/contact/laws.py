@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
+from pbem.contact.at_rest import bear_in_situ, close_joint
 from pbem.contact.declaration import (
     BROKEN,
     COMMON,
@@ -25,6 +26,7 @@ from pbem.contact.declaration import (
     list_variables,
 )
 from pbem.contact.friction_bound import Strength
+from pbem.contact.leaders import find_leaders
 from pbem.contact.strength import choose_strength
 from pbem.mesh.mesh import Mesh
 from pbem.model.model import Contact, Interface, Law, Model
@@ -57,6 +59,7 @@ class PairLaws:
     leader: the pair whose mode each pair takes; itself, but in the corner of a narrow wedge (see pbem.model.sliver).
     rest: the opening of pairs that stick and carry nothing, 0 but where a stage has closed faces that were apart.
     stiffening: 1/length, one over the largest closure of joints that stiffen as they close; 0 of linear ones.
+    at_rest_n, at_rest_s: what joints add to opening (part of the gap) and slip under the in-situ stress at first.
     """
 
     strengths: tuple[StrengthGroup, ...]
@@ -73,9 +76,11 @@ class PairLaws:
     leader: Integer
     rest: Real = field(default_factory=lambda: np.zeros(0))
     stiffening: Real = field(default_factory=lambda: np.zeros(0))
+    at_rest_n: Real = field(default_factory=lambda: np.zeros(0))
+    at_rest_s: Real = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        for name in ("rest", "stiffening"):
+        for name in ("rest", "stiffening", "at_rest_n", "at_rest_s"):
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, repeat_value(0.0, len(self.gap)))
 
@@ -171,7 +176,8 @@ def find_joint(model: Model, name: str) -> Interface | Contact:
 def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
     """Laws of every pair, and a soft trial stiffness from modulus and length (theory, 52)."""
     pairs = mesh.pairs
-    laws = [find_joint(model, name).law for name in mesh.interface_names]
+    joints = [find_joint(model, name) for name in mesh.interface_names]
+    laws = [joint.law for joint in joints]
     material = np.array([region.material.plane_modulus for region in model.regions])
     node_region = mesh.node_region
     modulus = np.minimum(material[node_region[pairs.first]], material[node_region[pairs.second]])
@@ -182,7 +188,7 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
     def spread(values: list, kind: type = float) -> np.ndarray:
         return fold_uniform(np.array(values, dtype=kind)[pairs.interface])
 
-    return PairLaws(
+    return _settle_joints(model, mesh, PairLaws(
         strengths=_group_strengths(laws, pairs.interface, model.law_texts, places),
         tensile_strength=fold_uniform(spread_values([law.tensile_strength for law in laws], pairs.interface, places)),
         gap=fold_uniform(pairs.distance + spread_values(
@@ -195,33 +201,23 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
         compliance_s=spread([1 / law.tangential_stiffness if law.tangential_stiffness else 0.0 for law in laws]),
         stiffness=SOFTNESS * modulus / length,
         own_stiffness=modulus / np.where(pairs.weight > 0, pairs.weight, length),
-        leader=_find_leaders(model, mesh),
+        leader=find_leaders(mesh, model.ties, joints),
         stiffening=spread([
             1 / closure if isinstance(closure := law.parameters.get("closure"), float) else 0.0 for law in laws
         ]),
-    )
+    ))
 
 
-def _find_leaders(model: Model, mesh: Mesh) -> Integer:
-    """For every pair itself, or the nearest pair of its curve outside of the tied bits, if it lies in one."""
-    pairs = mesh.pairs
-    leader = np.arange(pairs.count)
-    tied = np.zeros(pairs.count, dtype=bool)
-    numbers: dict[str, int] = {}
-    for number, name in enumerate(mesh.interface_names):
-        joint = find_joint(model, name)
-        numbers |= dict.fromkeys((joint.first, joint.second) if isinstance(joint, Contact) else (name,), number)
-    bounds = np.searchsorted(pairs.interface, np.arange(len(mesh.interface_names) + 1))
-    own = [(np.arange(*bounds[numbers[tie.curve]:][:2]), tie) for tie in model.ties if tie.curve in numbers]
-    for at, tie in own:
-        # By place: the pairs of a contact lie on either of its curves.
-        tied[at] |= np.abs(pairs.position[at] - tie.corner) < tie.end - tie.start
-    for at, _ in own:
-        free, bound = at[~tied[at]], at[tied[at]]
-        if len(free):
-            away = np.abs(pairs.arc_length[bound][:, None] - pairs.arc_length[free])
-            leader[bound] = free[np.argmin(away, axis=1)]
-    return leader
+def _settle_joints(model: Model, mesh: Mesh, laws: PairLaws) -> PairLaws:
+    """Laws with joints as they are under the in-situ stress; it is a load where faces lie apart or would be pulled off,
+    and where it is not in equilibrium."""
+    if not model.initial_stress or not (laws.compliance_n.any() or laws.compliance_s.any()):
+        return laws
+    p_n, p_s, balanced = bear_in_situ(model, mesh)
+    bears = balanced & ~laws.parted & (laws.bonded | (laws.gap <= 0) & (p_n <= 0))
+    closed, slid = close_joint(laws.compliance_n, laws.stiffening, p_n)[0], laws.compliance_s * p_s
+    closed, slid = (np.where(bears, each, 0.0) for each in (closed, slid))
+    return replace(laws, gap=laws.gap + closed, at_rest_n=closed, at_rest_s=slid)
 
 
 def _group_strengths(
@@ -352,8 +348,7 @@ def start_memory(laws: PairLaws) -> Memory:
     internal = lay_out(laws)
     for variable, at, parameters in _list_parts(laws):
         internal[variable.name][at] = variable.start(parameters)
-    zeros = np.zeros(laws.count)
-    return Memory(modes, zeros, internal, zeros, laws.gap).lose(laws.brittle & is_open)
+    return Memory(modes, 0.0 - laws.at_rest_s, internal, np.zeros(laws.count), laws.gap).lose(laws.brittle & is_open)
 
 
 def lay_out(laws: PairLaws) -> dict[str, NDArray[Any]]:

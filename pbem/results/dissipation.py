@@ -73,12 +73,16 @@ class PairWork:
 
 
 def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairRecord:
-    """Before any load; traction (nodes,) of the in-situ stress, which the pairs bear and joints do not feel."""
+    """Before any load; traction (nodes,) of the in-situ stress, which the pairs bear."""
     memory = start_memory(laws)
     n, borne = mesh.pairs.normal, traction[mesh.pairs.first]
     p_n, p_s = (np.conj(n) * borne).real, (np.conj(1j * n) * borne).real
     zeros = np.zeros(laws.count)
-    return PairRecord(memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap, zeros, zeros, memory.internal, zeros)
+    bond = np.where(laws.at_rest_n != 0, measure_stiffening(laws, p_n, zeros), 0.0)
+    return PairRecord(
+        memory.modes.mode, p_n, p_s, laws.gap, zeros, laws.gap - laws.at_rest_n, -laws.at_rest_s, zeros,
+        memory.internal, bond,
+    )  # fmt: skip
 
 
 def record_pairs(laws: PairLaws, contact: ContactState, pressure: Real) -> PairRecord:

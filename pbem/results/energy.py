@@ -41,6 +41,8 @@ from pbem.solve.problem.step import Step
 
 # A step within which faces ran away released at least this part of the energy that was stored.
 LEAST_RELEASED = 0.01
+# What rounding sets free, of the energy that the tractions of the pairs store in their surroundings.
+ROUNDING = 1e-9
 # Interfaces that took part in it have at least this part of what was released.
 LEAST_PART = 0.01
 
@@ -145,9 +147,14 @@ class EnergyBalance:
         self, old: EnergyState, new: EnergyState, moved: Complex, pairs: PairWork, at_hand: float
     ) -> Runaway | None:
         """What was set free in the step, if growing loads do not explain it; at_hand: energy stored and supplied."""
+        if not at_hand:
+            return None
         released = float(pairs.surplus.sum())
-        # Where nothing is stored and nothing is supplied, as in a stage without loads, it is rounding.
-        if not at_hand or not released > max(LEAST_RELEASED * at_hand, self._measure_increments(old, new, moved)):
+        # Where nothing is stored and nothing is supplied, as in a stage without loads, it is rounding: as large as that
+        # of what the tractions of the pairs store in their surroundings.
+        borne = self._stored.pair_weight @ ((new.pairs.p_n**2 + new.pairs.p_s**2) / self.laws.own_stiffness)
+        least = max(LEAST_RELEASED * at_hand, ROUNDING * float(borne), self._measure_increments(old, new, moved))
+        if not released > least:
             return None
         names = self._mesh.interface_names
         by_name = np.bincount(self._mesh.pairs.interface, pairs.surplus, minlength=len(names))

@@ -116,6 +116,7 @@ class StoredEnergy:
         ]  # fmt: skip
         self._is_tool = np.array([each.rigid for each in model.regions])[self._faces.region]
         self._in_situ = self._sample_in_situ()
+        self._pairs_at_rest = record_pairs_at_rest(self.laws, self._mesh, self._in_situ[: self._mesh.nodes])
 
     @property
     def pair_weight(self) -> Real:
@@ -124,8 +125,9 @@ class StoredEnergy:
         return whole if self.there is None else np.where(self.there.bared, 0.0, whole)
 
     def add_up(self, state: EnergyState) -> float:
-        """All that is stored: in the regions, in springs and in elastic joints."""
-        return state.stored + state.springs + measure_stored(self.pair_weight, state.pairs)
+        """All that is stored beyond what was before any load: in the regions, in springs and in elastic joints."""
+        joints = measure_stored(self.pair_weight, state.pairs) - measure_stored(self.pair_weight, self._pairs_at_rest)
+        return state.stored + state.springs + joints
 
     @property
     def tools(self) -> Real:
@@ -146,8 +148,7 @@ class StoredEnergy:
 
     def describe_rest(self) -> EnergyState:
         nothing = repeat_value(0.0, len(self.weight), complex)
-        pairs = record_pairs_at_rest(self.laws, self._mesh, self._in_situ[: self._mesh.nodes])
-        return self._compose(self._in_situ, nothing, 0, 0.0, pairs)
+        return self._compose(self._in_situ, nothing, 0, 0.0, self._pairs_at_rest)
 
     def describe(self, step: Step) -> EnergyState:
         pressure = evaluate_load(self._model, self._mesh, self.outer, step.stage, step.factor).pressure

@@ -1,0 +1,45 @@
+"""What contact pairs bear of the in-situ stress before any load, and what it has done to their elastic joints.
+
+In-situ stress has no displacement: joints have closed, and given way along the faces, as far as they do under it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbem.arrays import Bool, Complex, Integer, Real
+from pbem.mesh.mesh import Mesh
+from pbem.model.in_situ import AT_REST
+from pbem.model.model import Model
+
+# Both sides of a pair bear the same traction if it differs by less than this part of the largest one.
+SAME = 1e-6
+
+
+def bear_in_situ(model: Model, mesh: Mesh) -> tuple[Real, Real, Bool]:
+    """p_n, p_s (m,) of the pairs under the in-situ stress, and whether (m,) it is the same on both of their sides."""
+    pairs = mesh.pairs
+    first, second = (_find_traction(model, mesh, mesh.node_region[each]) for each in (pairs.first, pairs.second))
+    largest = float(np.abs(np.concatenate([first, second])).max(initial=0.0))
+    along = np.conj(pairs.normal) * first
+    return along.real, along.imag, np.abs(first - second) <= SAME * largest
+
+
+def _find_traction(model: Model, mesh: Mesh, region: Integer) -> Complex:
+    """Traction (m,) across the pairs' normals of the in-situ stress in given regions (m,)."""
+    pairs = mesh.pairs
+    traction = np.zeros(pairs.count, dtype=complex)
+    for number, each in enumerate(model.regions):
+        initial, own = model.initial_stress.get(each.material.name, AT_REST), np.flatnonzero(region == number)
+        if not initial.is_zero and len(own):
+            sxx, syy, sxy = initial.evaluate(pairs.position[own]).T
+            x, y = pairs.normal[own].real, pairs.normal[own].imag
+            traction[own] = sxx * x + sxy * y + 1j * (sxy * x + syy * y)
+    return traction
+
+
+def close_joint(compliance: Real, stiffening: Real, borne: Real) -> tuple[Real, Real]:
+    """What joints add to the opening (m,), negative under compression, and its derivative by the traction borne (m,)
+    (theory, 112); stiffening: 1/length, 0 of linear joints. Under tension they are linear."""
+    less = 1.0 + compliance * stiffening * np.maximum(-borne, 0.0)
+    return compliance * borne / less, compliance / less**2

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbem import ConvergenceError, open_results, run
 from pbem.case.build import parse_model
 from pbem.contact.damped import Damped
 from pbem.contact.laws import OPEN, SLIP, STICK, Memory, commit, plastic_slip, start_memory
@@ -165,6 +166,19 @@ def test_pairs_that_stay_as_they_are_are_not_asked(order: tuple[int, ...]) -> No
         if found.rest:
             solution = solve_step(problem, tangent, memory, load, Listener())
             np.testing.assert_array_equal(modes and modes.mode, solution.modes.mode)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0)])
+@pytest.mark.parametrize("weakens", ["", ", friction_dynamic = 0.2, slip_distance = 0.01"])
+def test_a_bonded_block_slides_at_its_limit_load(order: tuple[int, ...], weakens: str, tmp_path: Path) -> None:
+    """Groups of pairs that settle together hold none whose mode cannot change."""
+    text = GLUED.format(curves="\n".join(CURVES[k] for k in order), shear=0.4)
+    (tmp_path / "glued.toml").write_text(text.replace("friction = 0.25", f"friction = 0.25{weakens}"))
+    with pytest.raises(ConvergenceError) as error:
+        run(tmp_path / "glued.toml", tmp_path / "glued.h5")
+    assert error.value.reason == "limit load"
+    reached = open_results(tmp_path / "glued.h5").steps.factor[-1]
+    assert reached == pytest.approx(0.25 / 0.4, rel=0.02)
 
 
 @pytest.mark.parametrize(("young", "gap"), [(1e4, 0.1), (1e5, 0.1), (2e6, 0.01), (2e6, 1e-3), (2e7, 0.3)])

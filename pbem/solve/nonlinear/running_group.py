@@ -14,7 +14,7 @@ import numpy as np
 from pbem.arrays import Bool, Integer, Real
 from pbem.contact.complementarity import take_subset
 from pbem.contact.constraints import ConstraintMap
-from pbem.contact.laws import SLIP, Memory, ModeState, find_pivoting, follow_leaders
+from pbem.contact.laws import SLIP, Memory, ModeState, find_changing, find_pivoting, follow_leaders
 from pbem.contact.loads import Load
 from pbem.contact.modes import Linearisation, Proposal
 from pbem.contact.pivoting import OperationCount
@@ -41,9 +41,9 @@ class RunningGroup:
     def __init__(self, problem: Problem, tangent: TangentOperator) -> None:
         laws, settling = problem.laws, tangent.settling
         self._interface = problem.mesh.pairs.interface
-        self._runs: Bool = find_running(laws) & ~laws.follows
-        self._joins: Bool = (self._runs | find_pivoting(laws)) & ~laws.follows
-        self._beside: Bool = self._joins & ~laws.bonded & ~laws.brittle
+        self._runs: Bool = find_running(laws) & find_changing(laws)
+        self._joins: Bool = (self._runs | find_pivoting(laws)) & find_changing(laws)
+        self._beside: Bool = self._joins & ~laws.brittle
         self._cheap = settling.with_neighbours and bool(self._runs.any())
         self._restart()
 

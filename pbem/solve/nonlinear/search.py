@@ -26,7 +26,7 @@ from typing import TypeVar
 import numpy as np
 
 from pbem.arrays import Bool, Integer
-from pbem.contact.laws import find_linear, find_pivoting
+from pbem.contact.laws import find_changing, find_linear, find_pivoting
 from pbem.contact.modes import Frozen, Proposal
 from pbem.contact.pivoting import OperationCount
 from pbem.contact.subset import Settled
@@ -102,8 +102,8 @@ class Search:
 
     most_pivoted: the largest group of pairs that is solved by pivoting. interface (m,): of each pair, in order along
     it; given where larger groups cost little: then ever more neighbours join the pairs that change beside a group which
-    has been solved. excluded (m,): pairs that are in no such group, as they take the mode of another one or their law
-    is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
+    has been solved. excluded (m,): pairs that are in no such group, as their mode cannot change by itself, or as their
+    law is not linear. varying: whether any law is not linear, so that its friction changes with slip. sweeps: whether
     groups of neighbouring elements may settle by themselves (pbem.solve.tangent.sweeps); smooths: whether laws may be
     smoothed (pbem.solve.nonlinear.smooth_search). wary: whether changes that
     stall, and a full tangent that leads away, are met with caution where friction changes with slip. most_futile: see
@@ -359,7 +359,7 @@ def list_searches(problem: Problem, tangent: TangentOperator, softened: bool = F
     interface = problem.mesh.pairs.interface if settling.with_neighbours else None
     # Pivoting solves laws that are linear in each mode. Friction that changes with slip runs on from state to state: it
     # is followed by Newton's steps with the bound of the last iteration, at first as far as these lead.
-    varying, excluded = not bool(linear.all()), problem.laws.follows | ~find_pivoting(problem.laws)
+    varying, excluded = not bool(linear.all()), ~find_changing(problem.laws) | ~find_pivoting(problem.laws)
     futile = FUTILE_IF_SOFTENED if softened and not varying and not settling.nearby else FUTILE
     effort = EFFORT * problem.model.solver.newton_max_iterations
     # Where no groups settle by themselves, blocks that cracks enclose are laid by smoothed laws nevertheless.

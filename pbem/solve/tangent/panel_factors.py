@@ -1,28 +1,30 @@
 """LU factors of a dense matrix whose columns are dealt to several ranks in panels, in the place of the matrix.
 
 Panel by panel the rank that has it eliminates with row interchanges and passes it on, and every rank brings its own
-columns up to date (theory, source 38). Almost all is products of matrices, as wide as the processor likes them; with
-ScaLAPACK solutions for many right-hand sides take four times as long.
+columns up to date (theory, source 38); the rank that has the next panel begins with that, so that nobody waits for it.
+Almost all is products of matrices, as wide as the processor likes them; with ScaLAPACK solutions for many right-hand
+sides take four times as long.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 from mpi4py import MPI
-from scipy.linalg import blas, lapack
+from scipy.linalg import lapack
 
 from pbem.arrays import Integer, Real
 from pbem.errors import ConvergenceError
 from pbem.parallel import add_up, gather_rows
 from pbem.solve.petsc.linear import OPERATIONS_OF_A_CALL, OPERATIONS_OF_AN_ENTRY, SINGLE
 from pbem.solve.petsc.refactoring import FactorWork
+from pbem.solve.tangent.panel_passing import Coming, Passing, receive_ahead
+from pbem.solve.tangent.part_products import divide_by_triangle, take_off_product
 
 # Columns of a panel: each rank has at least so many panels, as it idles with the last one.
 WIDEST, LEAST, PANELS = 192, 16, 8
-# Products are taken from a matrix by blocks of so many rows and columns, which the processor's cache holds.
-ROWS_AT_ONCE, COLUMNS_AT_ONCE = 384, 512
 # Of so many right-hand sides it pays that each rank solves for some of them, to which all panels have to come.
 MANY = 16
 
@@ -43,7 +45,6 @@ class PanelFactors:
         # Transposed: of this rank's columns, one after the other; every column is contiguous.
         self._columns = np.zeros((0, rows))
         self._pivots, self._order = np.zeros(rows, dtype=np.int32), np.arange(rows)
-        self._spare = np.empty(ROWS_AT_ONCE * COLUMNS_AT_ONCE)
         self.work = FactorWork(0.0, 0.0, 0.0, 0.0)
 
     @property
@@ -71,17 +72,19 @@ class PanelFactors:
 
     def factorise(self) -> None:
         """Factorise the filled matrix. Raises ConvergenceError ("singular tangent") on all ranks alike."""
-        for panel in range(len(self._cuts) - 1):
-            first, last = self._cuts[panel], self._cuts[panel + 1]
-            lower = self._eliminate(panel)
-            right, own = self._count_before(panel + 1), self._count_before(panel)
-            for part in (self._columns[:own], self._columns[right:]):
-                if len(part):
-                    lapack.dlaswp(part.T, self._pivots, k1=first, k2=last - 1, overwrite_a=1)
-            if right < len(self._columns):
-                solved = _divide(self._columns[right:, first:last], lower[:, : last - first], lower=True)
-                self._columns[right:, first:last] = solved
-                self._take_off(self._columns[right:, last:], solved, lower[:, last - first :])
+        panels, passing = len(self._cuts) - 1, Passing(self.comm)
+        coming = self._eliminate(0, passing)
+        for panel in range(panels):
+            lower = self._take_panel(panel, coming)
+            own, right = self._count_before(panel), self._count_before(panel + 1)
+            self._swap(slice(0, own), panel)
+            if panel + 1 < panels:
+                # The next panel first, as all wait for what comes of it.
+                after = self._count_before(panel + 2)
+                self._update(slice(right, after), panel, lower)
+                coming, right = self._eliminate(panel + 1, passing), after
+            self._update(slice(right, len(self._columns)), panel, lower)
+        passing.finish()
         order = list(range(self.rows))
         for row, pivot in enumerate(self._pivots.tolist()):
             order[row], order[pivot] = order[pivot], order[row]
@@ -92,25 +95,46 @@ class PanelFactors:
             2 / 3 * entries * self.rows + OPERATIONS_OF_AN_ENTRY * entries, call, 2.0 * entries, call
         )
 
-    def _eliminate(self, panel: int) -> Real:
-        """Factors of a panel (w, rows from its first on), transposed, on every rank; and its pivots."""
+    def _eliminate(self, panel: int, passing: Passing) -> Coming:
+        """Factors of a panel (w, rows from its first on), transposed, in its place and on their way to all ranks.
+
+        With them the pivots (w + 1,), the last of which says whether elimination has failed.
+        """
         first, last = self._cuts[panel], self._cuts[panel + 1]
-        root, own = panel % self.comm.size, self._count_before(panel)
-        found, failed = np.empty((last - first, self.rows - first)), 0
+        found, pivots = np.empty((last - first, self.rows - first)), np.zeros(last - first + 1, dtype=np.int32)
+        root = panel % self.comm.size
         if root == self.comm.rank:
-            taken = np.ascontiguousarray(self._columns[own : own + len(found), first:])
-            factors, pivots, failed = lapack.dgetrf(taken.T, overwrite_a=1)
-            found[:] = factors.T
-            self._columns[own : own + len(found), first:] = found
-            self._pivots[first:last] = pivots + first
-        if self.comm.bcast(failed, root=root):
+            at = self._count_before(panel)
+            found[:] = self._columns[at : at + len(found), first:]
+            _, pivots[:-1], pivots[-1] = lapack.dgetrf(found.T, overwrite_a=1)
+            self._columns[at : at + len(found), first:] = found
+        return passing.send((pivots, found), root)
+
+    def _take_panel(self, panel: int, coming: Coming) -> Real:
+        """The factors of a panel, on every rank, when its pivots are known."""
+        pivots, found = coming.wait()
+        if pivots[-1]:
             self._columns = np.zeros((0, self.rows))
             raise ConvergenceError(
                 "singular tangent", "the tangent operator has no LU factors; a body is probably free to move"
             )
-        self.comm.Bcast(self._pivots[first:last], root=root)
-        self.comm.Bcast(found, root=root)
+        first, last = self._cuts[panel], self._cuts[panel + 1]
+        self._pivots[first:last] = pivots[:-1] + first
         return found
+
+    def _swap(self, columns: slice, panel: int) -> None:
+        """Interchange rows of some of this rank's columns as elimination in a panel did."""
+        part = self._columns[columns]
+        if len(part):
+            lapack.dlaswp(part.T, self._pivots, k1=self._cuts[panel], k2=self._cuts[panel + 1] - 1, overwrite_a=1)
+
+    def _update(self, columns: slice, panel: int, lower: Real) -> None:
+        """Bring some of this rank's columns, which are right of a panel, up to date with it."""
+        first, last = self._cuts[panel], self._cuts[panel + 1]
+        self._swap(columns, panel)
+        part = self._columns[columns]
+        divide_by_triangle(part[:, first:last], lower[:, : last - first], lower=True)
+        take_off_product(part[:, last:], part[:, first:last], lower[:, last - first :])
 
     def solve_columns(self, rhs: Real) -> Real:
         """This rank's rows (local_rows, k) of the solutions for its rows of many right-hand sides."""
@@ -122,7 +146,7 @@ class PanelFactors:
         mine = cuts[self.comm.rank].stop - cuts[self.comm.rank].start
         lengths = [rows.stop - rows.start for rows in self._rows_of]
         parts = self._exchange([[rhs[:, cut].T] for cut in cuts], [(mine, length) for length in lengths])
-        values = np.concatenate(parts, axis=1)[:, self._order]
+        values = np.take(np.concatenate(parts, axis=1), self._order, axis=1)
         self._solve_many(values)
         here = lengths[self.comm.rank]
         found = self._exchange([[values[:, rows]] for rows in self._rows_of],
@@ -131,17 +155,15 @@ class PanelFactors:
 
     def _solve_many(self, values: Real) -> None:
         """Put the solutions in the place of this rank's right-hand sides (k, rows), in the order of the pivots."""
-        panels = len(self._cuts) - 1
-        for panel in range(panels):
+        panels = range(len(self._cuts) - 1)
+        for panel, lower in zip(panels, self._pass_on(panels, below=True), strict=True):
             first, last = self._cuts[panel], self._cuts[panel + 1]
-            lower = self._pass_on(panel, slice(first, self.rows))
-            solved = values[:, first:last] = _divide(values[:, first:last], lower[:, : last - first], lower=True)
-            self._take_off(values[:, last:], solved, lower[:, last - first :])
-        for panel in reversed(range(panels)):
+            divide_by_triangle(values[:, first:last], lower[:, : last - first], lower=True)
+            take_off_product(values[:, last:], values[:, first:last], lower[:, last - first :])
+        for panel, upper in zip(panels[::-1], self._pass_on(panels[::-1], below=False), strict=True):
             first, last = self._cuts[panel], self._cuts[panel + 1]
-            upper = self._pass_on(panel, slice(0, last))
-            solved = values[:, first:last] = _divide(values[:, first:last], upper[:, first:], lower=False)
-            self._take_off(values[:, :first], solved, upper[:, :first])
+            divide_by_triangle(values[:, first:last], upper[:, first:], lower=False)
+            take_off_product(values[:, :first], values[:, first:last], upper[:, :first])
 
     def _solve_few(self, values: Real) -> Real:
         """The solutions (k, rows) for right-hand sides that all ranks know; panels stay where they are."""
@@ -157,30 +179,30 @@ class PanelFactors:
                 if panel % size == own:
                     at = self._count_before(panel)
                     columns = self._columns[at : at + last - first]
-                    given = (values if lower else solved)[:, first:last] - total
-                    solved[:, first:last] = _divide(given, columns[:, first:last], lower)
+                    given = np.ascontiguousarray((values if lower else solved)[:, first:last]) - total
+                    divide_by_triangle(given, columns[:, first:last], lower)
+                    solved[:, first:last] = given
                     rest = slice(last, self.rows) if lower else slice(0, first)
                     taken[:, rest] += solved[:, first:last] @ columns[:, rest]
         return add_up(self.comm, solved)
 
-    def _pass_on(self, panel: int, rows: slice) -> Real:
-        """Some rows of a panel's columns (w, rows), transposed, on every rank."""
-        root, own = panel % self.comm.size, self._count_before(panel)
-        shape = (self._cuts[panel + 1] - self._cuts[panel], rows.stop - rows.start)
-        mine = root == self.comm.rank
-        found = np.ascontiguousarray(self._columns[own : own + shape[0], rows]) if mine else np.empty(shape)
-        self.comm.Bcast(found, root=root)
-        return found
+    def _pass_on(self, panels: Sequence[int], below: bool) -> Iterator[Real]:
+        """The panels' columns (w, rows), transposed, on every rank: of their first row and all below it, or all above
+        it and their own.
+        """
+        passing = Passing(self.comm)
+        for (found,) in receive_ahead(self._send(panel, below, passing) for panel in panels):
+            yield found
+        passing.finish()
 
-    def _take_off(self, values: Real, left: Real, right: Real) -> None:
-        """values (k, r) -= left (k, w) @ right (w, r), by blocks."""
-        for begin in range(0, values.shape[1], COLUMNS_AT_ONCE):
-            some = right[:, begin : begin + COLUMNS_AT_ONCE]
-            for at in range(0, len(values), ROWS_AT_ONCE):
-                rows = left[at : at + ROWS_AT_ONCE]
-                product = self._spare[: len(rows) * some.shape[1]].reshape(len(rows), some.shape[1])
-                np.matmul(rows, some, out=product)
-                values[at : at + ROWS_AT_ONCE, begin : begin + COLUMNS_AT_ONCE] -= product
+    def _send(self, panel: int, below: bool, passing: Passing) -> Coming:
+        first, last = self._cuts[panel], self._cuts[panel + 1]
+        rows = slice(first, self.rows) if below else slice(0, last)
+        root, at = panel % self.comm.size, self._count_before(panel)
+        shape = (last - first, rows.stop - rows.start)
+        mine = root == self.comm.rank
+        found = np.ascontiguousarray(self._columns[at : at + last - first, rows]) if mine else np.empty(shape)
+        return passing.send((found,), root)
 
     def _count_before(self, panel: int) -> int:
         """How many of this rank's columns are in panels before this one."""
@@ -208,10 +230,3 @@ class PanelFactors:
     def destroy(self) -> None:
         """Free the storage."""
         self._columns = np.zeros((0, self.rows))
-
-
-def _divide(values: Real, panel: Real, lower: bool) -> Real:
-    """values (k, w) by the triangle (unit lower, or upper) at the top of a panel (w, w), transposed: X T = values."""
-    triangle, given = np.ascontiguousarray(panel).T, np.ascontiguousarray(values).T
-    found: Real = blas.dtrsm(1.0, triangle, given, lower=int(lower), diag=int(lower)).T
-    return found

@@ -88,33 +88,34 @@ class PairSolution:
 
 def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
     """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k, c) for each of c solutions (theory, 59)."""
-    count = len(split.a_offset)
-    varied = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)) | (split.b_offset != 0).any(axis=1))
-    active = number_components(varied)
-    rhs = given - (split.a_offset.ravel() + coupling[:, active] @ split.b_offset[varied].ravel())[:, None]
-    unknowns, rcond, residual = np.zeros(given.shape), 1.0, 0.0
-    rest = np.ones(2 * count, dtype=bool)
-    if len(active):
-        changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
-        own = number_components(changed)
-        first, second = coupling[:, own[::2]], coupling[:, own[1::2]]
-        effect = np.empty((2 * count, len(own)))
-        for j in range(2):
-            along = split.b_tangent[changed, :, j]
-            effect[:, j::2] = first * along[:, 0] + second * along[:, 1]
-        matrix = effect[own]
-        for i in range(2):
-            for j in range(2):
-                matrix[np.arange(i, len(own), 2), np.arange(j, len(own), 2)] += split.a_tangent[changed, i, j]
+    changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
+    own, unknowns, rcond, residual = number_components(changed), np.zeros(given.shape), 1.0, 0.0
+    constant = given - split.a_offset.ravel()[:, None]
+    rhs = constant - coupling @ np.repeat(split.b_offset.ravel()[:, None], given.shape[1], axis=1)
+    rest = np.ones(len(given), dtype=bool)
+    rest[own] = False
+    if len(changed):
+        tangent = split.take(changed)
+        matrix = _couple(coupling[np.ix_(own, own)], tangent)
         unknowns[own], rcond = _solve_dense(matrix, rhs[own])
         size = float(np.linalg.norm(rhs[own]))
         residual = float(np.linalg.norm(matrix @ unknowns[own] - rhs[own])) / size if size > 0 else 0.0
-        rest[own] = False
-        rhs = rhs - effect @ unknowns[own]
+        rhs = constant - coupling @ split.find_b(unknowns)
     others = np.flatnonzero(rest[::2])
     solved = np.linalg.solve(split.a_tangent[others], rhs[rest].reshape(len(others), 2, given.shape[1]))
     unknowns[rest] = solved.reshape(2 * len(others), given.shape[1])
     return PairSolution(unknowns, rcond, residual)
+
+
+def _couple(coupling: Real, split: Split) -> Real:
+    """Q_1 T + W Q_2 T (2 k, 2 k) of k pairs, in the order of Fortran."""
+    first, second = coupling[:, ::2], coupling[:, 1::2]
+    matrix, pairs = np.empty(coupling.shape, order="F"), np.arange(len(split.a_offset))
+    for j in range(2):
+        matrix[:, j::2] = first * split.b_tangent[:, 0, j] + second * split.b_tangent[:, 1, j]
+        for i in range(2):
+            matrix[2 * pairs + i, 2 * pairs + j] += split.a_tangent[:, i, j]
+    return matrix
 
 
 def respond_pairs(coupling: Real, split: Split, at: Integer, a_offset: Real, b_offset: Real) -> Real:

@@ -20,7 +20,7 @@ from scipy import sparse
 from pbem.arrays import Integer, Real
 from pbem.bem.operator import RegionRows, RowOperator
 from pbem.clock import clock
-from pbem.parallel import gather_parts
+from pbem.parallel import gather_parts, gather_rows
 from pbem.solve.petsc.linear import LinearSolver, choose_method
 from pbem.solve.problem.problem import Problem
 from pbem.solve.tangent.panel_factors import PanelFactors
@@ -211,32 +211,42 @@ class Reference:
         problem = self.problem
         whole = np.zeros((problem.unknowns, rhs.shape[1]))
         whole[self.kept] = gather_parts(problem.comm, kept.ravel()).reshape(-1, rhs.shape[1])
-        left = rhs[self.crack_rows]
-        for block in self.operator.blocks:
-            at = np.flatnonzero(~self.kept[self.own][block.rows])
-            if len(at):
-                product = self._multiply_rows(block, at, whole)
-                left[np.searchsorted(self.crack_rows, block.rows[at])] -= product
+        left = rhs[self.crack_rows] - self._multiply_cracks(whole)
         result = np.empty((self.rows, rhs.shape[1]))
         result[self.kept_rows] = kept
         result[self.crack_rows] = np.matmul(self.free_blocks, left.reshape(-1, 2, rhs.shape[1])).reshape(left.shape)
         return result
 
-    def _multiply_rows(self, block: RegionRows, rows: Integer, whole: Real) -> Real:
-        """Rows of eliminated unknowns in a block of B M x, for many x (unknowns, c) without these unknowns.
+    def _multiply_cracks(self, whole: Real) -> Real:
+        """This rank's rows of A_cf x (crack rows, c), for many x (unknowns, c) without the eliminated unknowns.
 
-        For so many that it pays B M is formed first, which is half as wide as B.
+        For so many that it pays A_cf is formed first, which is half as wide as B, and every rank multiplies some of
+        them by all of its rows, as cracks may lie on few ranks.
         """
         assert self.present is not None
         if whole.shape[1] < FORMED:
-            result: Real = take_rows(block.matrix, rows) @ (self.present[block.columns] @ whole)
+            result = np.zeros((len(self.crack_rows), whole.shape[1]))
+            for block, rows, places in self._list_crack_rows():
+                result[places] += take_rows(block.matrix, rows) @ (self.present[block.columns] @ whole)
             return result
-        numbers = np.flatnonzero(self.kept)
-        result = np.zeros((len(rows), whole.shape[1]))
+        comm = self.problem.comm
+        share = np.linspace(0, whole.shape[1], comm.size + 1).astype(int)
+        counts = comm.allgather(len(self.crack_rows))
+        mine, numbers = whole[:, share[comm.rank] : share[comm.rank + 1]], np.flatnonzero(self.kept)
+        product = np.zeros((sum(counts), mine.shape[1]))
         for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
             columns = numbers[begin : begin + COLUMNS_AT_ONCE]
-            result += form_columns(self.operator, block, self.present, columns, rows) @ whole[columns]
-        return result
+            formed = np.zeros((len(self.crack_rows), len(columns)))
+            for block, rows, places in self._list_crack_rows():
+                formed[places] += form_columns(self.operator, block, self.present, columns, rows)
+            product += gather_rows(comm, formed) @ mine[columns]
+        before = sum(counts[: comm.rank])
+        return gather_rows(comm, product.T)[:, before : before + len(self.crack_rows)].T
+
+    def _list_crack_rows(self) -> list[tuple[RegionRows, Integer, Integer]]:
+        """Blocks with rows of eliminated unknowns, these rows in the block, and their places among crack_rows."""
+        found = [(block, np.flatnonzero(~self.kept[self.own][block.rows])) for block in self.operator.blocks]
+        return [(block, at, np.searchsorted(self.crack_rows, block.rows[at])) for block, at in found if len(at)]
 
     def destroy(self) -> None:
         """Free PETSc's storage."""

@@ -77,7 +77,7 @@ class PanelFactors:
         panels, passing = len(self._cuts) - 1, Passing(self.comm)
         coming = self._eliminate(0, passing)
         for panel in range(panels):
-            lower = self._take_panel(panel, coming)
+            lower = self._take_panel(panel, coming, passing)
             own, right = self._count_before(panel), self._count_before(panel + 1)
             self._swap(slice(0, own), panel)
             if panel + 1 < panels:
@@ -112,10 +112,11 @@ class PanelFactors:
             self._columns[at : at + len(found), first:] = found
         return passing.send((pivots, found), root)
 
-    def _take_panel(self, panel: int, coming: Coming) -> Real:
+    def _take_panel(self, panel: int, coming: Coming, passing: Passing) -> Real:
         """The factors of a panel, on every rank, when its pivots are known."""
         pivots, found = coming.wait()
         if pivots[-1]:
+            passing.finish()  # before what was sent is freed
             self._columns = np.zeros((0, self.rows))
             raise ConvergenceError(
                 "singular tangent", "the tangent operator has no LU factors; a body is probably free to move"

@@ -21,7 +21,7 @@ from pbem.results.views import create_array, create_group
 GROUPS = 600
 
 
-def fill_groups(file: h5py.File) -> None:
+def fill_groups(file: h5py.Group) -> None:
     """Many small groups, as of a field of cracks."""
     for number in range(GROUPS):
         group = create_group(file.id, f"g{number}")
@@ -60,6 +60,25 @@ def test_hdf5_keeps_nothing_for_objects_to_come(tmp_path: Path) -> None:
     assert count_kept() < 0.5 * plain  # some belongs to the file that is open
     store.close()
     expect_groups(tmp_path / "a.h5")
+
+
+def test_few_headers_stay_in_memory(tmp_path: Path) -> None:
+    """HDF5 keeps headers of a file's objects, in far more room than they take there."""
+    kept: list[int] = []
+
+    def fill(file: h5py.File) -> None:
+        for number in range(4):
+            fill_groups(file.create_group(f"part{number}"))
+        kept.append(file.id.get_mdc_size()[0])
+
+    with h5py.File(tmp_path / "plain.h5", "w", libver=("v108", "v110")) as file:
+        fill(file)
+    store = create_store(tmp_path / "a.h5", False, fill)
+    for number in range(GROUPS):
+        store.file[f"part0/g{number}"].create_dataset("d", data=np.arange(6.0))
+    kept.append(store.file.id.get_mdc_size()[0])
+    store.close()
+    assert max(kept[1:]) < 0.3 * kept[0]
 
 
 def test_nothing_is_left_to_free_after_a_commit(tmp_path: Path) -> None:

@@ -28,6 +28,8 @@ WITHIN = 1e-3
 FLAT = 1e-9
 # Directions that differ by less (radians) are one.
 SAME_WAY = 1e-9
+# Of so many points and elements the angles are found at once: all of a large model would take gigabytes.
+SEEN = 100_000
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,8 @@ def _is_inside(points: Complex, outline: Elements) -> Bool:
     """Whether points lie inside of a closed outline: by the angles under which they see its elements."""
     corners, (low, high) = np.stack([points.real, points.imag], axis=1), outline.bounds()
     inside = ((corners >= low.min(axis=0)) & (corners <= high.max(axis=0))).all(axis=1)
-    near = np.flatnonzero(inside)
-    if len(near):
-        inside[near] = np.rint(outline.subtend(points[near]).sum(axis=0) / (2 * np.pi)) != 0
+    near, step = np.flatnonzero(inside), max(1, SEEN // outline.count)
+    for begin in range(0, len(near), step):
+        some = near[begin : begin + step]
+        inside[some] = np.rint(outline.subtend(points[some]).sum(axis=0) / (2 * np.pi)) != 0
     return inside

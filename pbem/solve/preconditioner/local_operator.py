@@ -77,7 +77,10 @@ class LocalOperator:
             part = formed.reshape(len(nodes), 2, -1)[begin : begin + TURNED]
             part[:] = less.turn[nodes[begin : begin + TURNED]] @ part  # type: ignore[union-attr]
         at = np.searchsorted(number_components(nodes), around[rows])
-        return formed if len(at) == len(formed) else formed[at]
+        for begin in range(0, len(at) if len(at) < len(formed) else 0, TURNED):  # where they are: rows only move up
+            some = at[begin : begin + TURNED]
+            formed[begin : begin + len(some)] = formed[some]
+        return formed[: len(at)]
 
     def _add_products(
         self, formed: Real, region: int, seen: Integer, nodes: Integer, own: Integer,

@@ -214,24 +214,27 @@ class SchwarzPreconditioner:
             return
         # In large groups the eliminated follow their own residual alone: what the others do to them GMRES sees in its
         # next iteration, and no other equation contains them.
+        apart = len(inverse.group.nearest) > 0
         own = np.zeros(len(around), dtype=bool)
-        own[inside] = not len(inverse.group.nearest)
+        own[inside] = not apart
         rows = np.flatnonzero(~first | own)
         left = np.flatnonzero(~local)
         whole = self._local.form(elements, around, rows, left, constraints, free, less)
         rest = ~first[rows]
         # Rows wanted: of the own unknowns that are left, and of the eliminated ones what the others do to them.
-        at = np.flatnonzero(~rest)
-        effect = np.zeros((len(inside), len(left)))
-        effect[np.searchsorted(inside, rows[at])] = whole[at]
-        back = less.inverse[around[inside[::2]] // 2]
-        wanted = -(back @ effect.reshape(len(back), 2, -1)).reshape(effect.shape)
         kept = np.flatnonzero(~local[inside])
-        wanted[kept, np.searchsorted(left, inside[kept])] = 1.0
-        inverse.solved = kept if len(inverse.group.nearest) else np.arange(len(inside))
+        inverse.solved = kept if apart else np.arange(len(inside))
+        wanted = np.zeros((len(inverse.solved), len(left)))
+        if not apart:
+            at = np.flatnonzero(~rest)
+            wanted[np.searchsorted(inside, rows[at])] = whole[at]
+            back = less.inverse[around[inside[::2]] // 2]
+            wanted = -(back @ wanted.reshape(len(back), 2, -1)).reshape(wanted.shape)
+        wanted[np.searchsorted(inverse.solved, kept), np.searchsorted(left, inside[kept])] = 1.0
+        if not rest.all():
+            whole = whole[rest]
         matrix, found = invert_rows(
-            whole if rest.all() else whole[rest], wanted[inverse.solved],
-            lambda: self._local.form(elements, around, rows[rest], left, constraints, free, less),
+            whole, wanted, lambda: self._local.form(elements, around, rows[rest], left, constraints, free, less)
         )
         if matrix is not None:
             # All groups together are much of what is stored: of large models in single precision.

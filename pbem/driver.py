@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -320,10 +321,11 @@ def _store(
     watch: Watch, signals: StopSignals, one: Pass, kept: KeptProblems | None, last: Step | None,
 ) -> Decision:
     """Store the steps as they come, and judge their errors. last: the step before them, if any."""
-    with clock.piece("estimate"):
-        rules = writer.tip_rules if writer else None
-        estimator = make_estimator(model, mesh, last, watch.comm, kept, signals, rules)
     try:
+        steps = _begin(steps)
+        with clock.piece("estimate"):
+            rules = writer.tip_rules if writer else None
+            estimator = make_estimator(model, mesh, last, watch.comm, kept, signals, rules)
         last = store_steps(steps, model.output_every, interior, writer, watch, estimator, watch.comm) or last
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
@@ -332,6 +334,18 @@ def _store(
     for note in estimator.list_notes() if writer else ():
         watch.note(note)
     return _conclude(writer, model, mesh, estimator, watch, one, last)
+
+
+def _begin(steps: Iterator[Step]) -> Iterator[Step]:
+    """The same steps, of which the first is there: only then the second mesh is made, which takes room as well."""
+    begun = list(islice(steps, 1))
+
+    def go_on() -> Iterator[Step]:
+        while begun:
+            yield begun.pop()
+        yield from steps
+
+    return go_on()
 
 
 def _find_ends(comm: Comm, model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:

@@ -15,6 +15,7 @@ from pbem.contact.constraints import ConstraintMap
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
+from pbem.solve.preconditioner import schwarz
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.preconditioner.schwarz import SchwarzPreconditioner
 from pbem.solve.preconditioner.subdomains import Subdomain
@@ -215,3 +216,20 @@ def test_groups_may_overlap_all_others(many_groups: None, monkeypatch: pytest.Mo
     exact = assemble_tangent(assemble("cracks", "dense"))
     residual = np.random.default_rng(2).normal(size=problem.unknowns)
     np.testing.assert_allclose(exact @ apply(preconditioner, residual), residual, rtol=0, atol=1e-9)
+
+
+def test_constraint_maps_are_compared_some_rows_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    before, matrix = (sparse.random(60, 30, 0.1, "csr", random_state=seed) for seed in (1, 2))
+    monkeypatch.setattr(schwarz, "COMPARED", 7)
+    largest = np.maximum(abs(before).max(axis=0).toarray(), abs(matrix).max(axis=0).toarray()).ravel()
+    change = abs(matrix - before).max(axis=0).toarray().ravel()
+    expected = np.divide(change, largest, out=np.zeros(30), where=change > 0)
+    np.testing.assert_array_equal(schwarz._measure_changes(before, matrix), expected)
+
+
+def test_of_a_constraint_map_the_columns_that_are_seen_are_taken() -> None:
+    matrix = sparse.random(60, 30, 0.1, "csr", random_state=3)
+    chosen = np.arange(30) % 3 == 1
+    taken = schwarz._take_columns(matrix, chosen)
+    np.testing.assert_array_equal(taken.toarray(), np.where(chosen, matrix.toarray(), 0.0))
+    assert taken.nnz == matrix.tocsc()[:, chosen].nnz

@@ -19,6 +19,8 @@ from pbem.arrays import Integer, Real
 SINGULAR = 1e-13
 # Directions that are looked for at once, and how often.
 DIRECTIONS, MOST_ROUNDS = 12, 3
+# Rows that are summed at a time.
+SUMMED = 64
 
 
 def invert_rows(matrix: Real, wanted: Real, form: Callable[[], Real]) -> tuple[Real | None, int]:
@@ -26,7 +28,7 @@ def invert_rows(matrix: Real, wanted: Real, form: Callable[[], Real]) -> tuple[R
 
     matrix: in C order; it is overwritten. form: makes it once more where it is singular. None where that does not help.
     """
-    size, found = float(np.abs(matrix).sum(axis=1).max(initial=0.0)), 0
+    size, found = _find_norm(matrix), 0
     left, right = np.zeros((len(matrix), 0)), np.zeros((len(matrix), 0))
     for left_over in reversed(range(MOST_ROUNDS if size else 0)):
         # The transposed matrix is factorised where it is: of large groups every copy is tens of megabytes.
@@ -41,6 +43,13 @@ def invert_rows(matrix: Real, wanted: Real, form: Callable[[], Real]) -> tuple[R
         matrix = form()
         matrix += size * (right @ left.T)
     return None, found
+
+
+def _find_norm(matrix: Real) -> float:
+    """The largest sum of sizes of the entries of a row, of some rows at a time."""
+    parts = (np.abs(matrix[begin : begin + SUMMED]) for begin in range(0, len(matrix), SUMMED))
+    # Of NaN no maximum would be left by Python's.
+    return float(np.array([part.sum(axis=1).max() for part in parts]).max(initial=0.0))
 
 
 def _find_singular(factors: Real, pivots: NDArray[np.int32], size: float) -> tuple[Real, Real]:

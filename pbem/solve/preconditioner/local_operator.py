@@ -19,8 +19,8 @@ from pbem.mesh.numbering import list_nodes, number_components, split_components
 from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination
 
-# Nodes whose equations are turned at a time.
-TURNED = 64
+# Nodes whose equations are formed at a time: of a large group all of them would take twice what is wanted of them.
+FORMED = 64
 # Anchors that act by no more than this part do not act.
 NOTHING = 1e-12
 
@@ -56,31 +56,42 @@ class LocalOperator:
 
         rows, left: places in around (k,), the unknowns of elements, rising.
         """
-        mesh, columns = self._mesh, around[left]
+        columns = around[left]
         if not len(columns):  # where all pairs stick nothing is left
             return np.zeros((len(rows), 0))
-        nodes = np.unique(around[rows] // 2)
-        formed = np.zeros((2 * len(nodes), len(left)))
+        column, row, value = take_entries(constraints, columns)
+        node = around[rows] // 2
+        nodes, result = np.unique(node), np.empty((len(rows), len(left)))
+        for begin in range(0, len(nodes), FORMED):
+            some = nodes[begin : begin + FORMED]
+            formed = self._form_nodes(elements, some, columns, (row, column, value), free)
+            if less is not None:
+                formed = (less.turn[some] @ formed.reshape(len(some), 2, -1)).reshape(formed.shape)
+            own = slice(*np.searchsorted(node, [some[0], some[-1] + 1]))
+            result[own] = formed[np.searchsorted(number_components(some), around[rows[own]])]
+        return result
+
+    def _form_nodes(
+        self, elements: Integer, nodes: Integer, columns: Integer, entries: tuple[Integer, Integer, Real],
+        free: sparse.csr_matrix,
+    ) -> Real:
+        """Rows of the tangent operator of some nodes (k,), rising, on some of its columns: (2 k, columns).
+
+        entries: of the constraint map in these columns, see `_add_products`.
+        """
+        mesh = self._mesh
+        formed = np.zeros((2 * len(nodes), len(columns)))
         row, column, value = take_entries(free, number_components(nodes))
         place, known = find_places(columns, column)
         formed[row[known], place[known]] = value[known]
-        column, row, value = take_entries(constraints, columns)
         # The unknowns also move nodes beyond, where the other side of a pair is in none of these groups.
-        sources = np.unique(self._node_element[row // 2 % mesh.nodes])
+        sources = np.unique(self._node_element[entries[0] // 2 % mesh.nodes])
         for region in np.unique(mesh.region[elements]):
             own = np.flatnonzero(self._node_region[nodes] == region)
             seen = sources[mesh.region[sources] == region]
-            if not len(own) or not len(seen):
-                continue
-            self._add_products(formed, int(region), seen, nodes, own, (row, column, value))
-        for begin in range(0, len(nodes) if less is not None else 0, TURNED):
-            part = formed.reshape(len(nodes), 2, -1)[begin : begin + TURNED]
-            part[:] = less.turn[nodes[begin : begin + TURNED]] @ part  # type: ignore[union-attr]
-        at = np.searchsorted(number_components(nodes), around[rows])
-        for begin in range(0, len(at) if len(at) < len(formed) else 0, TURNED):  # where they are: rows only move up
-            some = at[begin : begin + TURNED]
-            formed[begin : begin + len(some)] = formed[some]
-        return formed[: len(at)]
+            if len(own) and len(seen):
+                self._add_products(formed, int(region), seen, nodes, own, entries)
+        return formed
 
     def _add_products(
         self, formed: Real, region: int, seen: Integer, nodes: Integer, own: Integer,

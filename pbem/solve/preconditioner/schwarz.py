@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pbem.arrays import Integer, Real
+from pbem.arrays import Bool, Integer, Real
 from pbem.bem.group_sizes import MOST_LEFT_OF_BODIES, MOST_TIMES
 from pbem.bem.rigid_motions import RigidMotions
 from pbem.clock import clock
@@ -33,6 +33,8 @@ Single = NDArray[np.float32]
 
 # Unknowns that are left in the matrix of a group of cracks and the nearest elements around it, at most.
 MOST_LEFT = 900
+# Rows of two constraint maps that are compared at a time.
+COMPARED = 65_536
 # Models with so many unknowns keep the inverses of groups in single precision.
 SINGLE = 20_000
 
@@ -99,10 +101,14 @@ class SchwarzPreconditioner:
         self._take_groups(groups)
 
     def _take_groups(self, groups: Sequence[Subdomain]) -> None:
-        """beyond: nodes, rising, that the groups see and that are not this rank's."""
+        """beyond: nodes, rising, that the groups see and that are not this rank's. _seen: unknowns (of the model) that
+        they see."""
         self.inverses = [self._place(group) for group in groups]
         elements = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(group.around for group in groups)]))
-        self.beyond = np.setdiff1d(list_nodes(self._mesh, elements), self._nodes)
+        seen = list_nodes(self._mesh, elements)
+        self.beyond = np.setdiff1d(seen, self._nodes)
+        self._seen = np.zeros(2 * self._mesh.nodes, dtype=bool)
+        self._seen[number_components(seen)] = True
         # Of the own nodes' equations, and of those beyond.
         self._turn = np.zeros((0, 2, 2)) if self._less is None else self._choose_turn(self._less)
 
@@ -119,7 +125,7 @@ class SchwarzPreconditioner:
     def update(self, constraints: ConstraintMap) -> int:
         """Form the inverses of the groups that see a change of the constraint map; returns their number."""
         change = self._take_map(constraints)
-        by_column = constraints.matrix.tocsc()
+        by_column = _take_columns(constraints.matrix, self._seen)
         assert self._less is not None
         count, self.singular = 0, 0
         with clock.piece("preconditioner"):
@@ -138,15 +144,17 @@ class SchwarzPreconditioner:
 
     def _take_map(self, constraints: ConstraintMap) -> Real:
         """Take another constraint map; by which part of itself each of its columns (unknowns,) has changed."""
-        matrix, former = constraints.matrix, self._less
+        matrix = constraints.matrix
+        former = None if self._less is None else (self._less.local, self._less.first)
         change = _measure_changes(self._formed, matrix)
         self._formed = matrix
         change[self._local.find_anchored(constraints)] = np.inf
         self._free = (self.free @ matrix).tocsr()
+        self._less = None
         less = self._less = eliminate_tractions(matrix, self._free, self._node_crack)
         self._turn = self._choose_turn(less)
         if former is not None:
-            change[((less.local != former.local) | (less.first != former.first)).ravel()] = np.inf
+            change[((less.local != former[0]) | (less.first != former[1])).ravel()] = np.inf
         return change
 
     def apply(self, residual: Real, result: Real) -> None:
@@ -301,10 +309,20 @@ def _measure_changes(before: sparse.csr_matrix | None, matrix: sparse.csr_matrix
     """By which part of itself each column (unknowns,) of a constraint map differs from what it was before."""
     if before is None:
         return np.full(matrix.shape[1], np.inf)
-    change = _find_largest(matrix - before)
+    change = np.zeros(matrix.shape[1])
+    for begin in range(0, matrix.shape[0], COMPARED):
+        part = slice(begin, begin + COMPARED)
+        change = np.maximum(change, _find_largest(matrix[part] - before[part]))
     changed = change > 0
     change[changed] /= np.maximum(_find_largest(before), _find_largest(matrix))[changed]
     return change
+
+
+def _take_columns(matrix: sparse.csr_matrix, chosen: Bool) -> sparse.csc_matrix:
+    """The matrix by columns, all of them empty but the chosen ones (unknowns,)."""
+    at = np.flatnonzero(chosen[matrix.indices])
+    row = np.searchsorted(matrix.indptr, at, side="right") - 1
+    return sparse.coo_matrix((matrix.data[at], (row, matrix.indices[at])), shape=matrix.shape).tocsc()
 
 
 def _find_largest(matrix: sparse.csr_matrix) -> Real:

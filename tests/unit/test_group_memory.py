@@ -1,0 +1,63 @@
+"""What is made for a moment while the inverse of a large group of the preconditioner is formed."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbem.contact.constraints import build_constraints
+from pbem.contact.loads import collect_outer_nodes, evaluate_load
+from pbem.mesh.generate import generate_mesh
+from pbem.mesh.numbering import list_nodes, number_components
+from pbem.solve.preconditioner.elimination import eliminate_tractions
+from pbem.solve.preconditioner.inversion import invert_rows
+from pbem.solve.preconditioner.local_operator import LocalOperator
+from tests.unit.case_sample import build
+from tests.unit.test_map_memory import SCALE, draw
+from tests.unit.test_uniform import FIELD
+
+
+def measure_peak(action: Callable[[], Any]) -> tuple[Any, int]:
+    """What an action gives, and the bytes of all that there was at once, that included."""
+    gc.collect()
+    tracemalloc.start()
+    found = action()
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return found, most
+
+
+def test_of_a_group_only_the_rows_that_are_wanted_are_held() -> None:
+    model = build(FIELD.replace("count = 12", "count = 110").replace("12, 12", "43, 43"))
+    mesh = generate_mesh(model)
+    outer, gap = collect_outer_nodes(model, mesh), np.zeros(mesh.pairs.count)
+    load = evaluate_load(model, mesh, outer, 0, 1.0)
+    matrix = build_constraints(mesh, outer, gap, draw(model, mesh, 1), load, SCALE).matrix
+    local = LocalOperator(mesh, [region.material for region in model.regions], 1.0, ())
+    free = (local.free @ matrix).tocsr()
+    less = eliminate_tractions(matrix, free, mesh.node_crack)
+    elements = np.arange(mesh.elements)
+    around, by_column = number_components(list_nodes(mesh, elements)), matrix.tocsc()
+    left, rows = np.flatnonzero(~less.local.ravel()), np.flatnonzero(~less.first.ravel())
+    formed, most = measure_peak(lambda: local.form(elements, around, rows, left, by_column, free, less))
+    # They are those of the whole tangent operator, turned.
+    exact = local.form(elements, around, np.arange(len(around)), np.arange(len(around)), by_column, free, None)
+    turned = np.einsum("nij,njk->nik", less.turn, exact.reshape(mesh.nodes, 2, -1)).reshape(exact.shape)
+    np.testing.assert_allclose(formed, turned[np.ix_(rows, left)], rtol=0, atol=1e-12 * np.abs(exact).max())
+    assert len(rows) < 0.8 * len(around)
+    assert most < 1.5 * formed.nbytes
+
+
+@pytest.mark.parametrize("size", [600])
+def test_a_matrix_is_inverted_where_it_is(size: int) -> None:
+    random = np.random.default_rng(2)
+    matrix, wanted = random.standard_normal((size, size)), random.standard_normal((size // 2, size))
+    given, rows = matrix.copy(), wanted.copy()
+    (found, _), most = measure_peak(lambda: invert_rows(given, rows, matrix.copy))
+    np.testing.assert_allclose(found @ matrix, wanted, rtol=0, atol=1e-9)
+    assert most < 0.3 * matrix.nbytes

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.at_rest import bear_in_situ, close_joint
+from pbem.contact.at_rest import SAME, bear_in_situ, close_joint
+from pbem.contact.cohesive import Cohesive
 from pbem.contact.declaration import (
     BROKEN,
     COMMON,
@@ -209,14 +210,18 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
 
 
 def _settle_joints(model: Model, mesh: Mesh, laws: PairLaws) -> PairLaws:
-    """Laws with joints as they are under the in-situ stress; it is a load where faces lie apart or would be pulled off,
-    and where it is not in equilibrium."""
+    """Laws with joints as they are under the in-situ stress; it is a load where faces lie apart or are pulled off,
+    where it is not in equilibrium, and for cohesive laws, which count all jumps."""
     if not model.initial_stress or not (laws.compliance_n.any() or laws.compliance_s.any()):
         return laws
     p_n, p_s, balanced = bear_in_situ(model, mesh)
-    bears = balanced & ~laws.parted & (laws.bonded | (laws.gap <= 0) & (p_n <= 0))
+    rounding = SAME * float(np.hypot(p_n, p_s).max(initial=0.0))
+    held = (laws.gap <= 0) & (p_n <= laws.tensile_strength + rounding)
+    for group in laws.strengths:
+        held[group.pairs] &= not isinstance(group.law, Cohesive)
+    bears = balanced & ~laws.parted & (laws.bonded | held)
     closed, slid = close_joint(laws.compliance_n, laws.stiffening, p_n)[0], laws.compliance_s * p_s
-    closed, slid = (np.where(bears, each, 0.0) for each in (closed, slid))
+    closed, slid = (np.where(bears, each, 0.0)[laws.leader] for each in (closed, slid))
     return replace(laws, gap=laws.gap + closed, at_rest_n=closed, at_rest_s=slid)
 
 
@@ -341,7 +346,8 @@ def stick_creeping(laws: PairLaws, modes: ModeState) -> ModeState:
 
 def start_memory(laws: PairLaws) -> Memory:
     """Before any load closed pairs stick, or slip if nothing resists or they creep; pairs with a gap are open."""
-    is_open = laws.parted | (laws.gap > 0) & ~laws.bonded
+    # Joints that bear tension at rest have a gap and are closed.
+    is_open = laws.parted | (laws.gap > 0) & (laws.at_rest_n <= 0) & ~laws.bonded
     sticks = resists_slip(laws) & ~find_creeping(laws)
     closed = np.where(sticks | laws.bonded, STICK, SLIP)
     modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8)[laws.leader], np.ones(laws.count))

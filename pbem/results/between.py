@@ -52,7 +52,9 @@ class BetweenNodes:
         count = laws.count
         penetration, tension, cone = np.zeros(count), np.zeros(count), np.zeros(count)
         for plain, rooted in zip(self._plain, self._rooted, strict=True):
-            opening = self._read(contact.opening - read_dilation(laws, contact.internal), rooted)
+            # Gaps, and what joints have closed by at rest, do not vanish at tips.
+            displaced = contact.opening - laws.gap - read_dilation(laws, contact.internal)
+            opening = self._read(displaced, rooted) + self._read(laws.gap, plain)
             p_n, p_s, path = (
                 self._read(each, plain) for each in (contact.traction_n, contact.traction_s, contact.slip_path)
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import pbem
+from pbem.solve.problem.step import SilentReporter
 
 # Of the joint: initial stiffness, largest closure of one that stiffens; in-situ stress down the column, and across.
 STIFFNESS, CLOSURE, ACROSS = 2e3, 4e-3, 2.0
@@ -103,3 +105,48 @@ def test_a_joint_that_is_pulled_open_gives_back_its_closure(angle: float, tmp_pa
     blocks = 1 / 1e3 + 2 / 4e3
     np.testing.assert_allclose(joint.traction_n[-1], 0.0, atol=1e-9)
     np.testing.assert_allclose(joint.opening[-1], 6e-3 - ACROSS * (blocks + 1 / STIFFNESS), rtol=1e-8)
+
+
+@pytest.mark.parametrize("across", [0.0, 0.5])
+def test_strength_holds_faces_that_are_pulled_at_rest(
+    across: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the normal traction is zero but for rounding, in any orientation."""
+    monkeypatch.setitem(LAWS, "strong", {"law": "coulomb", "friction": 0.5, "cohesion": 1.0, "tensile_strength": 1.0})
+    monkeypatch.setattr(sys.modules[__name__], "ACROSS", -across)
+    for angle in (0.0, 33.0, 71.0):
+        results = pbem.run(make_column("strong", angle, 1.0, 1.0, 0.3, [{"steps": 1}]), tmp_path / f"{angle}.h5")
+        assert np.abs(results.displacement[-1]).max() < 1e-12
+
+
+def test_a_crack_at_rest_gives_no_note_of_overlap(tmp_path: Path) -> None:
+    """What a joint has closed by does not vanish at the tips, as jumps do between the nodes."""
+    notes: list[str] = []
+
+    class Noting(SilentReporter):
+        def note(self, text: str) -> None:
+            notes.append(text)
+
+    case = {
+        "materials": {"rock": {"young": 1e3, "poisson": 0.2}},
+        "curves": {"crack": {"points": [[-1, 0], [1, 0]], "elements": 8}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["crack"]}},
+        "interfaces": {"crack": {"friction": 0.5, "normal_stiffness": 2e3, "tangential_stiffness": 2e3}},
+        "initial_stress": {"rock": {"sxx": -1.0, "syy": -2.0}},
+        "stages": [{"steps": 1}],
+    }
+    results = pbem.run(case, tmp_path / "crack.h5", reporter=Noting())
+    np.testing.assert_allclose(results.contact["crack"].opening[0], -1e-3, rtol=1e-9)
+    assert not [note for note in notes if "overlap" in note]
+
+
+def test_cohesive_joints_store_nothing_at_rest_along_their_faces(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They take the in-situ shear as a load, as their law counts all jumps: energies are those of that load."""
+    monkeypatch.setitem(LAWS, "cohesive", {
+        "law": "cohesive", "friction": 0.5, "tensile_strength": 1.0, "cohesion": 1.0, "fracture_energy": 1e-2,
+        "fracture_energy_shear": 1e-2,
+    })  # fmt: skip
+    results = pbem.run(make_column("cohesive", 0.0, 1.0, 1.0, 0.3, [{"steps": 1}]), tmp_path / "cohesive.h5")
+    assert abs(results.energy.elastic[-1]) < 1e-2

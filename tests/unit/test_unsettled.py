@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbem.contact.laws import OPEN, STICK
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.solve.nonlinear.unsettled import describe_unsettled, find_losing, find_unwetted
@@ -65,7 +66,9 @@ def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, f
     assert (find_unwetted(problem.laws, pressure) == unwetted).all()
     violation = np.zeros(count)
     violation[[3, 5]] = 1.0, 2.0
-    proposal, none = Proposal(draw_modes(count), violation), Settled(None, True, 4, ~WRONG & False)
+    modes = draw_modes(count)
+    modes.mode[[3, 5]] = OPEN
+    proposal, none = Proposal(modes, violation), Settled(None, True, 4, ~WRONG & False)
     ended, cycled = (describe_unsettled(problem, reason, proposal, np.array([3, 5]), none, pressure)
                      for reason in ("no admissible modes", "mode cycle"))
     assert ended.reason == "no admissible modes"
@@ -73,6 +76,13 @@ def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, f
     for error in (ended, cycled):
         assert ('pressurised = "all"' in str(error)) == unwetted
         assert "cohesion" not in str(error)
+    # Not where pairs that stay closed change between stick and slip, nor where a mesh is unsound.
+    modes.mode[[3, 5]] = STICK
+    assert describe_unsettled(problem, "mode cycle", proposal, np.array([3, 5]), none, pressure).reason == "mode cycle"
+    modes.mode[[3, 5]] = OPEN
+    wrong = replace(none, wrong=WRONG)
+    unsound = describe_unsettled(problem, "mode cycle", proposal, np.array([3, 5]), wrong, pressure)
+    assert unsound.reason == "unsound mesh"
 
 
 def test_of_many_pairs_those_are_named_that_change() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.laws import PairLaws, find_linear
+from pbem.contact.laws import OPEN, PairLaws, find_linear
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
@@ -45,10 +45,13 @@ def describe_unsettled(
     """
     if not proposal.changed.any():
         return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
+    parting = find_unwetted(problem.laws, pressure) & proposal.changed & (proposal.modes.mode == OPEN)
     if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
-        losing = (find_losing(problem.laws) | find_unwetted(problem.laws, pressure)) & proposal.changed
+        losing = find_losing(problem.laws) & proposal.changed
+        if not losing.any() and not (failed is not None and failed.wrong.any()):
+            losing = parting
         if losing.any():
-            return _blame_loss(problem, losing, proposal, pressure)
+            return _blame_loss(problem, losing, proposal, parting)
     if failed is not None and failed.wrong.any():
         return ConvergenceError(
             "unsound mesh",
@@ -67,25 +70,28 @@ def describe_unsettled(
         return ConvergenceError(
             reason,
             f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these {those}: "
-            f"{_name(problem, changing)}; {_advise(problem.laws, changing, pressure)}",
+            f"{_name(problem, changing)}; {_advise(problem.laws, changing, parting)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
                             _list_places(problem, np.flatnonzero(proposal.changed)))
 
 
-def _advise(laws: PairLaws, group: Integer, pressure: Real) -> str:
+def _advise(laws: PairLaws, group: Integer, parting: Bool) -> str:
     """Why pairs have no modes, and what to do, where they lose what they have back at once; else what may help."""
-    return "; ".join(_list_losses(laws, group, pressure)) or "try shorter elements there, or smaller steps"
+    return "; ".join(_list_losses(laws, group, parting)) or "try shorter elements there, or smaller steps"
 
 
-def _list_losses(laws: PairLaws, group: Integer | Bool, pressure: Real) -> list[str]:
-    """What some pairs lose where they part and have back where they meet, with what makes it last, or go to zero."""
+def _list_losses(laws: PairLaws, group: Integer | Bool, parting: Bool) -> list[str]:
+    """What some pairs lose where they part and have back where they meet, with what makes it last, or go to zero.
+
+    parting (m,): pairs with friction that want to open under a fluid that is in open parts alone.
+    """
     losses = []
     if find_losing(laws)[group].any():
         lost = "tensile strength and cohesion are" if (laws.tensile_strength[group] > 0).any() else "cohesion is"
         losses.append(f"{lost} lost at once where faces part, and back where they meet: cohesion_lost = true makes "
                       "that loss last")
-    if find_unwetted(laws, pressure)[group].any():
+    if parting[group].any():
         losses.append("faces part under the fluid's pressure, at which closed ones still have friction, as it is in "
                       'open parts alone: with pressurised = "all" friction goes to zero there')
     return losses
@@ -109,12 +115,13 @@ def find_unwetted(laws: PairLaws, pressure: Real) -> Bool:
     return rough & (pressure > 0) & ~laws.fluid_inside & find_linear(laws)
 
 
-def _blame_loss(problem: Problem, losing: Bool, proposal: Proposal, pressure: Real) -> ConvergenceError:
+def _blame_loss(problem: Problem, losing: Bool, proposal: Proposal, parting: Bool) -> ConvergenceError:
     """The error where pairs that lose their strength go on changing: what the search made of them last, a cycle or
     pairs of the wrong sign in a body that hangs on two of them, is chance."""
+    losses = "; ".join(_list_losses(problem.laws, losing | parting, parting))
     return ConvergenceError(
         "no admissible modes",
-        f"{_describe_changed(problem, proposal)}; {'; '.join(_list_losses(problem.laws, losing, pressure))}; then no "
+        f"{_describe_changed(problem, proposal)}; {losses}; then no "
         "modes may fulfil the laws; where elements are longer than the distance to the nearest face, use shorter ones",
         _list_places(problem, np.flatnonzero(losing)),
     )

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbem.arrays import Integer
 from pbem.case.build import parse_model
 from pbem.contact.laws import OPEN, SLIP, STICK, ModeState
+from pbem.contact.modes import Linearisation
 from pbem.mesh.generate import generate_mesh
+from pbem.mesh.numbering import number_components
 from pbem.parallel import world
 from pbem.solve.preconditioner import subdomains as groups
 from pbem.solve.problem.problem import Problem
@@ -104,6 +107,33 @@ def test_nearby_elements_answer_nearly_as_the_whole_model_does(stuck: bool, many
     tangent._settling = replace(tangent.settling, nearby=False)
     exact = tangent.respond(constraints, load, law, pairs, directions)
     assert np.abs(found - exact).max() < 0.1 * np.abs(exact).max()
+    tangent.destroy()
+
+
+def test_pairs_in_any_order_have_the_same_answers(many_groups: None) -> None:
+    """Pairs are in the order of the interfaces, their nodes in that of the cracks of their regions."""
+    problem = assemble()
+    tangent = problem.make_tangent()
+    assert isinstance(tangent, KrylovTangent)
+    load, law = problem.evaluate_load(0, 1.0), linearise_pairs(problem, draw_modes(problem.mesh.pairs.count), -1.0)
+    constraints = problem.constrain(law, load)
+    tangent.solve(constraints, load, law)
+    pairs = np.arange(20, 30)
+    spread = np.zeros_like(law.tangent)
+    spread[pairs] = complete_states(law.tangent[pairs], problem.traction_scale)
+    offsets = problem.constrain(Linearisation(spread, np.zeros_like(law.offset), law.leader), load).matrix
+    nodes = problem.mesh.pairs.slave[pairs]
+    elements = np.unique(problem.mesh.node_element[nodes])
+    others = np.random.default_rng(2).permutation(len(nodes))
+    place = number_components(others)
+
+    def ask(own: Integer) -> tuple[Real, Real]:
+        preconditioner = tangent.preconditioner
+        return (preconditioner.respond(constraints.matrix, offsets, elements, number_components(own)),
+                preconditioner.form_block(constraints.matrix, elements, own))
+
+    for found, expected in zip(ask(nodes[others]), ask(nodes), strict=True):
+        np.testing.assert_allclose(found, expected[np.ix_(place, place)], rtol=0, atol=1e-9 * np.abs(expected).max())
     tangent.destroy()
 
 

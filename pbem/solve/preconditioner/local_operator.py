@@ -61,9 +61,13 @@ class LocalOperator:
             return np.zeros((len(rows), 0))
         column, row, value = take_entries(constraints, columns)
         node = around[rows] // 2
+        assert (np.diff(rows) > 0).all() and (np.diff(left) > 0).all()
         nodes, result = np.unique(node), np.empty((len(rows), len(left)))
-        for begin in range(0, len(nodes), FORMED):
-            some = nodes[begin : begin + FORMED]
+        # The rows of a rigid body are made all at once.
+        rigid = any(self._materials[region].rigid is not None for region in np.unique(self._mesh.region[elements]))
+        step = max(1, len(nodes)) if rigid else FORMED
+        for begin in range(0, len(nodes), step):
+            some = nodes[begin : begin + step]
             formed = self._form_nodes(elements, some, columns, (row, column, value), free)
             if less is not None:
                 formed = (less.turn[some] @ formed.reshape(len(some), 2, -1)).reshape(formed.shape)

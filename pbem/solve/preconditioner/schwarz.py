@@ -263,7 +263,8 @@ class SchwarzPreconditioner:
         less = self._less
         assert less is not None
         around = number_components(list_nodes(self._mesh, elements))
-        at = np.searchsorted(around, unknowns)
+        asked = np.searchsorted(around, unknowns)
+        at = np.sort(asked)  # pairs need not be in the order of their nodes
         local, first = less.local.ravel()[around], less.first.ravel()[around]
         wanted = np.zeros(len(around), dtype=bool)
         wanted[at] = True
@@ -279,14 +280,17 @@ class SchwarzPreconditioner:
         turned[rows[~rest]] = (-forces - whole @ result[left])[~rest]
         back = less.inverse[around[::2] // 2]
         result += (back @ turned.reshape(len(back), 2, -1)).reshape(result.shape)
-        return np.asarray(result[at])
+        return np.asarray(result[np.ix_(asked, np.searchsorted(at, asked))])
 
     def form_block(self, constraints: sparse.csr_matrix, elements: Integer, nodes: Integer) -> Real:
         """Rows of the tangent operator of a constraint map and its columns, of some nodes of elements: (2 k, 2 k)."""
         around = list_nodes(self._mesh, elements)
-        at = number_components(np.searchsorted(around, nodes))
+        asked = number_components(np.searchsorted(around, nodes))
+        at = np.sort(asked)
         free = (self.free @ constraints).tocsr()
-        return self._local.form(elements, number_components(around), at, at, constraints.tocsc(), free, None)
+        formed = self._local.form(elements, number_components(around), at, at, constraints.tocsc(), free, None)
+        place = np.searchsorted(at, asked)
+        return formed[np.ix_(place, place)]
 
     def _narrow(self, inverse: LocalInverse, less: Elimination) -> tuple[Integer, Integer, Integer]:
         """Elements of a group and around it, few enough; their unknowns, and the places of the own ones among these."""

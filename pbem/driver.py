@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -322,10 +322,12 @@ def _store(
 ) -> Decision:
     """Store the steps as they come, and judge their errors. last: the step before them, if any."""
     try:
-        steps = _begin(steps)
-        with clock.piece("estimate"):
+        # Only once the first step is there, as the second mesh takes room as well.
+        begun = list(islice(steps, 1))
+        with clock.piece("estimate"), _rescue(begun, model, interior, writer, watch.comm):
             rules = writer.tip_rules if writer else None
             estimator = make_estimator(model, mesh, last, watch.comm, kept, signals, rules)
+        steps = chain(_pour_out(begun), steps)
         last = store_steps(steps, model.output_every, interior, writer, watch, estimator, watch.comm) or last
     except ConvergenceError:
         watch.check()  # a law that failed has answered with no strength
@@ -336,16 +338,25 @@ def _store(
     return _conclude(writer, model, mesh, estimator, watch, one, last)
 
 
-def _begin(steps: Iterator[Step]) -> Iterator[Step]:
-    """The same steps, of which the first is there: only then the second mesh is made, which takes room as well."""
-    begun = list(islice(steps, 1))
+@contextmanager
+def _rescue(
+    begun: list[Step], model: Model, interior: InteriorField | None, writer: ResultWriter | None, comm: Comm
+) -> Iterator[None]:
+    """Where the block ends otherwise than well, the step that is there is stored first, if one rank alone can do that.
+    """
+    try:
+        yield
+    except BaseException:
+        if begun and comm.size == 1:
+            with suppress(Exception):  # what ended the run must be what the user hears of
+                store_without_errors(_pour_out(begun), model.output_every, interior, writer, comm)
+        raise
 
-    def go_on() -> Iterator[Step]:
-        while begun:
-            yield begun.pop()
-        yield from steps
 
-    return go_on()
+def _pour_out(begun: list[Step]) -> Iterator[Step]:
+    """Steps that are kept nowhere else once they are taken."""
+    while begun:
+        yield begun.pop(0)
 
 
 def _find_ends(comm: Comm, model: Model, mesh: Mesh, contact: ContactState) -> tuple[ContactEnd, ...]:

@@ -32,3 +32,18 @@ def test_the_second_mesh_is_made_once_the_first_step_is_there(tmp_path: Path, mo
     results = pbem.run(case, tmp_path / "field.h5", reporter=Noting())
     assert events[:2] == ["step 1", "second mesh"] and events.count("second mesh") == 1
     assert len(results.steps.factor) == len(events) - 1
+
+
+def test_the_first_step_is_kept_where_there_is_no_room_for_the_second_mesh(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*given: Any) -> Any:
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(driver, "make_estimator", fail)
+    monkeypatch.setattr(driver, "MOST_UNKNOWNS", 0)
+    case = tmp_path / "field.toml"
+    case.write_text(FIELD)
+    with pytest.raises(MemoryError, match="no room"):
+        pbem.run(case, tmp_path / "field.h5")
+    assert len(pbem.open_results(tmp_path / "field.h5").steps.factor) == 1

@@ -64,8 +64,8 @@ def count_groups(mesh: Mesh) -> Groups:
             found.kept + parts * own * left,
             found.entries + parts * rows * 2 * rows,
             found.operations + parts * (2 / 3 * left**3 + 2 * own * left**2),
-            # Rows with the eliminated ones, those without, the inverse and what it is solved for.
-            max(found.largest, rows * left + left**2 + 2 * own * left),
+            # The matrix, with the eliminated rows of small groups beside it; the inverse and what it is solved for.
+            max(found.largest, left**2 + 2 * own * left + (rows * left if size <= GROUP_ELEMENTS else 0.0)),
         )
     return found
 

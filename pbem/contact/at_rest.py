@@ -43,3 +43,14 @@ def close_joint(compliance: Real, stiffening: Real, borne: Real) -> tuple[Real, 
     (theory, 112); stiffening: 1/length, 0 of linear joints. Under tension they are linear."""
     less = 1.0 + compliance * stiffening * np.maximum(-borne, 0.0)
     return compliance * borne / less, compliance / less**2
+
+
+def settle_joints(
+    model: Model, mesh: Mesh, limit: Real, compliance: tuple[Real, Real], stiffening: Real
+) -> tuple[Real, Real]:
+    """What joints have closed by and given way along the faces (m,), both 0 where the stress is a load: where it is not
+    the same on both sides, or pulls by more than the limit (m,); compliance: normal and tangential ones."""
+    p_n, p_s, balanced = bear_in_situ(model, mesh)
+    bears = balanced & (p_n <= limit + SAME * float(np.hypot(p_n, p_s).max(initial=0.0)))
+    closed = close_joint(compliance[0], stiffening, p_n)[0]
+    return np.where(bears, closed, 0.0), np.where(bears, compliance[1] * p_s, 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.at_rest import SAME, bear_in_situ, close_joint
+from pbem.contact.at_rest import settle_joints
 from pbem.contact.cohesive import Cohesive
 from pbem.contact.declaration import (
     BROKEN,
@@ -210,18 +210,15 @@ def collect_laws(model: Model, mesh: Mesh) -> PairLaws:
 
 
 def _settle_joints(model: Model, mesh: Mesh, laws: PairLaws) -> PairLaws:
-    """Laws with joints as they are under the in-situ stress; it is a load where faces lie apart or are pulled off,
-    where it is not in equilibrium, and for cohesive laws, which count all jumps."""
+    """Laws with joints as they are under the in-situ stress; it is a load on cohesive ones, which count all jumps."""
     if not model.initial_stress or not (laws.compliance_n.any() or laws.compliance_s.any()):
         return laws
-    p_n, p_s, balanced = bear_in_situ(model, mesh)
-    rounding = SAME * float(np.hypot(p_n, p_s).max(initial=0.0))
-    held = (laws.gap <= 0) & (p_n <= laws.tensile_strength + rounding)
-    for group in laws.strengths:
-        held[group.pairs] &= not isinstance(group.law, Cohesive)
-    bears = balanced & ~laws.parted & (laws.bonded | held)
-    closed, slid = close_joint(laws.compliance_n, laws.stiffening, p_n)[0], laws.compliance_s * p_s
-    closed, slid = (np.where(bears, each, 0.0)[laws.leader] for each in (closed, slid))
+    held = (laws.gap <= 0) & ~laws.parted
+    for group in (each for each in laws.strengths if isinstance(each.law, Cohesive)):
+        held[group.pairs] = False
+    limit = np.where(laws.bonded & ~laws.parted, np.inf, np.where(held, laws.tensile_strength, -np.inf))
+    found = settle_joints(model, mesh, limit, (laws.compliance_n, laws.compliance_s), laws.stiffening)
+    closed, slid = (each[laws.leader] for each in found)
     return replace(laws, gap=laws.gap + closed, at_rest_n=closed, at_rest_s=slid)
 
 
@@ -316,10 +313,8 @@ def find_linear(laws: PairLaws) -> Bool:
 
 def find_pivoting(laws: PairLaws) -> Bool:
     """The pairs (m,) whose contact is a complementarity problem, step by step."""
-    pivots = np.zeros(laws.count, dtype=bool)
-    for group in laws.strengths:
-        pivots[group.pairs] = group.law.pivots
-    return pivots
+    own = [group.pairs for group in laws.strengths if group.law.pivots]
+    return np.isin(np.arange(laws.count), np.concatenate(own) if own else [])
 
 
 def find_changing(laws: PairLaws) -> Bool:
@@ -346,8 +341,7 @@ def stick_creeping(laws: PairLaws, modes: ModeState) -> ModeState:
 
 def start_memory(laws: PairLaws) -> Memory:
     """Before any load closed pairs stick, or slip if nothing resists or they creep; pairs with a gap are open."""
-    # Joints that bear tension at rest have a gap and are closed.
-    is_open = laws.parted | (laws.gap > 0) & (laws.at_rest_n <= 0) & ~laws.bonded
+    is_open = laws.parted | (laws.gap > 0) & (laws.at_rest_n <= 0) & ~laws.bonded  # joints may bear tension at rest
     sticks = resists_slip(laws) & ~find_creeping(laws)
     closed = np.where(sticks | laws.bonded, STICK, SLIP)
     modes = ModeState(np.where(is_open, OPEN, closed).astype(np.int8)[laws.leader], np.ones(laws.count))

@@ -91,7 +91,7 @@ def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
     changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
     own, unknowns, rcond, residual = number_components(changed), np.zeros(given.shape), 1.0, 0.0
     constant = given - split.a_offset.ravel()[:, None]
-    rhs = constant - coupling @ np.repeat(split.b_offset.ravel()[:, None], given.shape[1], axis=1)
+    rhs = constant - (coupling @ split.b_offset.ravel())[:, None]
     rest = np.ones(len(given), dtype=bool)
     rest[own] = False
     if len(changed):

@@ -27,6 +27,13 @@ def run_hierarchical(
     return results
 
 
+def expect_on_all(snippet: Launch, ranks: int, code: str, timeout: float) -> None:
+    """A piece of Python, in which `world` is there, comes to its end on so many ranks, and says nothing else."""
+    ended = "\nfor rank in world.gather(world.rank) or ():\n    print('ended on', rank)\n"
+    done = snippet(ranks, code + ended, timeout=timeout)
+    assert done.stdout.splitlines() == [f"ended on {rank}" for rank in range(ranks)], done.stderr
+
+
 def expect_same_search(results: Sequence[Results]) -> None:
     """Products and statuses are the same, and there are several statuses; fields agree to the tolerance of products."""
     alone = results[0]

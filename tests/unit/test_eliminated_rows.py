@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable
-
 import pytest
+
+from tests.parallel.on_ranks import Launch, expect_on_all
 
 # The residual is that of the operator itself; more than `FORMED` right-hand sides, and fewer. Cracks come last, so that
 # of several ranks the first have none of their rows.
@@ -56,14 +55,9 @@ for columns in (1, 2, FORMED - 1, FORMED, 2 * FORMED + 3):
     # Every row's own terms.
     size = np.abs(given) + np.abs(found).max() * np.abs(constraints).max()
     assert np.linalg.norm(residual) <= 1e-12 * np.linalg.norm(size), (columns, np.abs(residual).max())
-for rank in world.gather(world.rank) or ():
-    print("solved on", rank)
 """
-
-Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_solutions_with_eliminated_pairs_fulfil_all_equations(ranks: int, mpirun_snippet: Launch) -> None:
-    done = mpirun_snippet(ranks, SOLVE, timeout=180.0)
-    assert done.stdout.splitlines() == [f"solved on {rank}" for rank in range(ranks)], done.stderr
+    expect_on_all(mpirun_snippet, ranks, SOLVE, timeout=180.0)

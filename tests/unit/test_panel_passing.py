@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-from collections.abc import Callable
-
 import pytest
+
+from tests.parallel.on_ranks import Launch, expect_on_all
 
 # The first rank's word that it goes on comes before the others are ready to receive: with a sender that waits nobody
 # would ever go on.
@@ -35,14 +34,9 @@ def send_all():
 assert [set(values.ravel()) for (values,) in receive_ahead(send_all())] == [{float(each)} for each in range(7)]
 assert list(receive_ahead(())) == []
 passing.finish()
-for rank in world.gather(world.rank) or ():
-    print("passed on to", rank)
 """
-
-Launch = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
 def test_who_sends_goes_on(ranks: int, mpirun_snippet: Launch) -> None:
-    done = mpirun_snippet(ranks, PASS, timeout=60.0)
-    assert done.stdout.splitlines() == [f"passed on to {rank}" for rank in range(ranks)], done.stderr
+    expect_on_all(mpirun_snippet, ranks, PASS, timeout=60.0)

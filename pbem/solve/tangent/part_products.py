@@ -7,6 +7,7 @@ are contiguous; BLAS, which expects columns to be so, has their transposes.
 from __future__ import annotations
 
 import ctypes
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -14,8 +15,9 @@ from scipy.linalg import cython_blas
 
 from pbem.arrays import Real
 
-# BLAS has integers of 32 or 64 bits, as SciPy was built. Of 64 bits it reads the lower 32 first, where it takes those.
-Whole = ctypes.c_int64
+# BLAS has integers of 32 or 64 bits, as SciPy was built. Of 64 bits the lower 32 come first on most machines, and serve
+# where it takes those; on the others it takes 32 unless SciPy was built otherwise.
+Whole = ctypes.c_int64 if sys.byteorder == "little" else ctypes.c_int32
 ONE, MINUS_ONE = ctypes.byref(ctypes.c_double(1.0)), ctypes.byref(ctypes.c_double(-1.0))
 
 

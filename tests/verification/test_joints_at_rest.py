@@ -143,10 +143,17 @@ def test_a_crack_at_rest_gives_no_note_of_overlap(tmp_path: Path) -> None:
 def test_cohesive_joints_store_nothing_at_rest_along_their_faces(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """They take the in-situ shear as a load, as their law counts all jumps: energies are those of that load."""
+    """They take the in-situ stress as a load, as their law counts all jumps: energies are those of blocks and joint in
+    series, which give way to it."""
     monkeypatch.setitem(LAWS, "cohesive", {
         "law": "cohesive", "friction": 0.5, "tensile_strength": 1.0, "cohesion": 1.0, "fracture_energy": 1e-2,
         "fracture_energy_shear": 1e-2,
     })  # fmt: skip
-    results = pbem.run(make_column("cohesive", 0.0, 1.0, 1.0, 0.3, [{"steps": 1}]), tmp_path / "cohesive.h5")
-    assert abs(results.energy.elastic[-1]) < 1e-2
+    energy = pbem.run(make_column("cohesive", 0.0, 1.0, 1.0, 0.0, [{"steps": 1}]), tmp_path / "pressed.h5").energy
+    blocks, joint = 1 / 1e3 + 2 / 4e3, 1 / STIFFNESS
+    left = ACROSS * blocks / (blocks + joint)
+    stored = 0.5 * (left**2 - ACROSS**2) * blocks + 0.5 * left**2 * joint
+    assert energy.elastic[-1] == pytest.approx(stored, rel=1e-8) == energy.external[-1]
+    # With shear between walls that hold all motions.
+    energy = pbem.run(make_column("cohesive", 0.0, 1.0, 1.0, 0.3, [{"steps": 1}]), tmp_path / "sheared.h5").energy
+    assert abs(energy.elastic[-1]) < -stored and energy.external[-1] == pytest.approx(energy.elastic[-1], rel=1e-8)

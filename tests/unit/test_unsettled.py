@@ -10,7 +10,7 @@ import pytest
 from pbem.contact.laws import OPEN, STICK
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
-from pbem.solve.nonlinear.unsettled import describe_unsettled, find_losing, find_unwetted
+from pbem.solve.nonlinear.unsettled import describe_unsettled, find_friction_under_fluid, find_losing
 from tests.unit.test_nearby import draw_modes
 from tests.unit.test_sweeps import assemble, write_network
 
@@ -52,18 +52,18 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
     assert describe_unsettled(problem, "mode cycle", settled, group, wrong, dry).reason == "mode cycle"
 
 
-@pytest.mark.parametrize(("law", "fluid", "unwetted"), [
+@pytest.mark.parametrize(("law", "fluid", "rough"), [
     ("friction = 0.4", 0.3, True),
     ("friction = 0.4", 0.0, False),
     ("friction = 0.0", 0.3, False),
     ('friction = 0.4, pressurised = "all"', 0.3, False),
 ])  # fmt: skip
-def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, fluid: float, unwetted: bool) -> None:
+def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, fluid: float, rough: bool) -> None:
     """Faces part at a compression of the pressure, where friction times the pressure holds closed ones."""
     problem = assemble(write_network(teeth=2, law=law))
     count = problem.mesh.pairs.count
     pressure = np.full(count, fluid)
-    assert (find_unwetted(problem.laws, pressure) == unwetted).all()
+    assert (find_friction_under_fluid(problem.laws, pressure) == rough).all()
     violation = np.zeros(count)
     violation[[3, 5]] = 1.0, 2.0
     modes = draw_modes(count)
@@ -72,9 +72,9 @@ def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, f
     ended, cycled = (describe_unsettled(problem, reason, proposal, np.array([3, 5]), none, pressure)
                      for reason in ("no admissible modes", "mode cycle"))
     assert ended.reason == "no admissible modes"
-    assert cycled.reason == ("no admissible modes" if unwetted else "mode cycle")
+    assert cycled.reason == ("no admissible modes" if rough else "mode cycle")
     for error in (ended, cycled):
-        assert ('pressurised = "all"' in str(error)) == unwetted
+        assert ('pressurised = "all"' in str(error)) == rough
         assert "cohesion" not in str(error)
     # Not where pairs that stay closed change between stick and slip, nor where a mesh is unsound.
     modes.mode[[3, 5]] = STICK

@@ -45,7 +45,7 @@ def describe_unsettled(
     """
     if not proposal.changed.any():
         return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
-    parting = find_unwetted(problem.laws, pressure) & proposal.changed & (proposal.modes.mode == OPEN)
+    parting = find_friction_under_fluid(problem.laws, pressure) & proposal.changed & (proposal.modes.mode == OPEN)
     if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
         losing = find_losing(problem.laws) & proposal.changed
         if not losing.any() and not (failed is not None and failed.wrong.any()):
@@ -106,7 +106,7 @@ def find_losing(laws: PairLaws) -> Bool:
     return losing & ~laws.brittle & find_linear(laws)
 
 
-def find_unwetted(laws: PairLaws, pressure: Real) -> Bool:
+def find_friction_under_fluid(laws: PairLaws, pressure: Real) -> Bool:
     """The pairs (m,) whose friction is not zero where they part, as a fluid of this pressure (m,) is in open parts
     alone: they lose it there, and have it back where they meet."""
     rough = np.zeros(laws.count, dtype=bool)

@@ -20,7 +20,7 @@ from pbem.model.material import Material
 from pbem.solve.preconditioner.elimination import Elimination
 
 # Nodes whose equations are formed at a time: of a large group all of them would take twice what is wanted of them.
-FORMED = 64
+NODES_AT_ONCE = 64
 # Anchors that act by no more than this part do not act.
 NOTHING = 1e-12
 
@@ -65,7 +65,7 @@ class LocalOperator:
         nodes, result = np.unique(node), np.empty((len(rows), len(left)))
         # The rows of a rigid body are made all at once.
         rigid = any(self._materials[region].rigid is not None for region in np.unique(self._mesh.region[elements]))
-        step = max(1, len(nodes)) if rigid else FORMED
+        step = max(1, len(nodes)) if rigid else NODES_AT_ONCE
         for begin in range(0, len(nodes), step):
             some = nodes[begin : begin + step]
             formed = self._form_nodes(elements, some, columns, (row, column, value), free)

@@ -14,9 +14,10 @@ import traceback
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from pbem.blas_kernels import CORE_TYPE, choose_kernels
 from pbem.bundled import find_case
 from pbem.check_command import add_check_options, check
-from pbem.environment import PREFIX, find_launch, split_petsc_options
+from pbem.environment import PREFIX, WITHOUT_OTHERS, find_launch, split_petsc_options
 from pbem.errors import PbemError, printable
 from pbem.export_command import NOTES as EXPORT_NOTES
 from pbem.export_command import add_export_arguments, export
@@ -143,12 +144,26 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
                 parser.error(f"PETSc options ({PREFIX}{next(iter(petsc))}) are for `pbem run` and `pbem sweep`")
     except SystemExit as end:
         return int(end.code or 0)
+    if options.command in ("run", "sweep"):
+        _prepare_libraries()
     if options.command == "run":
         return run_case(options, petsc)
     if options.command == "sweep":
         return run_sweep(options, petsc)
     # The other commands are not parallel: under a launcher the first rank does them alone.
     return options.action(options) if rank == 0 else 0
+
+
+def _prepare_libraries() -> None:
+    """Tell OpenBLAS and Open MPI what they do not find out by themselves; what the user has told them stays.
+
+    Libraries that are loaded, as those of a program that calls this one, read nothing any more.
+    """
+    if "numpy" not in sys.modules and CORE_TYPE not in os.environ and (kernels := choose_kernels()):
+        os.environ[CORE_TYPE] = kernels
+    if "mpi4py.MPI" not in sys.modules and not find_launch(os.environ).variable:
+        for name, value in WITHOUT_OTHERS.items():
+            os.environ.setdefault(name, value)
 
 
 def _names_a_case(argument: str) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pbem.blas_kernels import note_old_kernels
 from pbem.wording import count
 
 # Rank and number of ranks as launchers write them. What was started last comes first: mpirun within a job step of
@@ -27,6 +28,9 @@ LAUNCHERS = (
 RANK_ONLY = ("PMIX_RANK", "PALS_RANKID", "ALPS_APP_PE")
 # From here up Slurm's step numbers stand for the batch script, an interactive shell and the like, not for srun.
 SPECIAL_STEPS = 4294967280
+
+# What Open MPI need not look for where a process is alone: networks (0.2 s), and a daemon to start others by.
+WITHOUT_OTHERS = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_ess_singleton_isolated": "1"}
 
 # Of options on the command line that are PETSc's.
 PREFIX = "-pbem_"
@@ -51,7 +55,7 @@ class Site:
 
     host: name of the node; online: its cores; cores: numbers of those that the process may use; limit: time on
     cores per time that its control group is granted, None without limit; group: that control group; threads: what
-    the user has set, by the name of the variable.
+    the user has set, by the name of the variable; kernels: what is to be said of OpenBLAS's, "" if nothing.
     """
 
     host: str
@@ -60,6 +64,7 @@ class Site:
     limit: float | None = None
     group: str = ""
     threads: tuple[tuple[str, int], ...] = ()
+    kernels: str = ""
 
 
 def find_launch(environ: Mapping[str, str]) -> Launch:
@@ -112,6 +117,7 @@ def read_site(environ: Mapping[str, str]) -> Site:
         limit=limit,
         group=group,
         threads=find_threads(environ),
+        kernels=note_old_kernels() or "",
     )
 
 
@@ -217,13 +223,19 @@ def note_threads(sites: Sequence[Site]) -> str | None:
     )
 
 
+def note_kernels(sites: Sequence[Site]) -> str | None:
+    """What to tell of kernels of OpenBLAS that do not fit the processor; None if they fit."""
+    said = next((site.kernels for site in sites if site.kernels), "")
+    return f"node {sites[0].host}: {said}" if said else None
+
+
 def judge_nodes(nodes: Sequence[Sequence[Site]], allowed: bool) -> tuple[str | None, tuple[str, ...]]:
     """The refusal, or None, and the notes for the ranks of all nodes; each kind is said of the first node it befalls.
 
     allowed: the user wants it so; what would be a refusal is a note then.
     """
     found = {}
-    for judge in (refuse_threads, note_ranks, note_threads):
+    for judge in (refuse_threads, note_ranks, note_threads, note_kernels):
         said = [text for text in map(judge, nodes) if text]
         if said:
             found[judge] = said[0] + (f" (also on {count(len(said) - 1, 'more node')})" if len(said) > 1 else "")

@@ -27,6 +27,9 @@ trap 'kill "$checker" 2>/dev/null || true; rm -f "$types"' EXIT
 workers=$(($(env -u OMP_NUM_THREADS -u OMP_THREAD_LIMIT nproc) + 1))
 # One thread for each process: those of BLAS would wait for each other on cores that other processes use.
 export OMP_NUM_THREADS=${OMP_NUM_THREADS:-1}
+# Where OpenBLAS does not know the processor, its products take several times as long; pbem run sees to that by itself.
+kernels=${OPENBLAS_CORETYPE-$(.venv/bin/python -m pbem.blas_kernels)}
+[ -z "$kernels" ] || export OPENBLAS_CORETYPE=$kernels
 # The tests start hundreds of processes: where Python may not keep what it compiles, that is a third of their time.
 unset PYTHONDONTWRITEBYTECODE
 check .venv/bin/python -m pytest -n $((workers < 4 ? workers : 4)) --dist loadfile "$@"

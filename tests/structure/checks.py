@@ -18,7 +18,7 @@ ORDER = (
     "pages", "cli", "__main__", "__init__",
 )
 # Beside the path: they import no part of it, so that every part may import them ...
-BASE = ("version", "arrays", "errors", "wording", "environment", "parallel", "exact", "clock",
+BASE = ("version", "arrays", "errors", "wording", "blas_kernels", "environment", "parallel", "exact", "clock",
         "heap", "loading", "uniform", "linear_programme")
 # ... but mechanics knows nothing of processes, and results are read without them.
 MAY_BE_PARALLEL = (

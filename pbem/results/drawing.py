@@ -29,9 +29,10 @@ def plot(
 
     curve: one name or more. field: for a map ux, uy, u, sxx, syy, sxy, s1, s2, shear or mises; along a curve opening,
     slip, traction_n, traction_s, an internal variable of the law, or at nodes ux, uy, u, tx, ty, normal, shear, hoop; a
-    list for several. step: index of a stored step, negative from the end. x: arc_length, angle (about the centre of a
-    circle), x or y. xlim, ylim: limits of the axes. ax: axes to draw into, whose figure is returned. how: options of
-    lines along a curve in given axes, passed to `pbem.results.curve_plot.draw_quantity` (line, color, marks, text).
+    list for several, or a text with commas between. step: index of a stored step, negative from the end. x: arc_length,
+    angle (about the centre of a circle), x or y. xlim, ylim: limits of the axes. ax: axes to draw into, whose figure is
+    returned. how: options of lines along a curve in given axes, passed to `pbem.results.curve_plot.draw_quantity`
+    (line, color, marks, text).
 
     Raises ValueError for an unknown curve, field or x, IndexError for a step that is not stored, ResultFileError if no
     step is stored.
@@ -49,7 +50,7 @@ def plot(
     with style():
         if curve is not None:
             names = _list_texts("curve", curve)
-            fields = None if field is None else _list_texts("field", field)
+            fields = None if field is None else _list_fields(field)
             return _plot_curves(results, find_curves(results, names), fields, at, x, xlim, ylim, ax, how)
         if isinstance(field, str):
             return draw_field(results, field, at, axes=ax)
@@ -72,6 +73,11 @@ def _list_texts(name: str, value: Any) -> list[str]:
     if not isinstance(listed, list | tuple) or not listed or not all(isinstance(each, str) for each in listed):
         raise ValueError(f"{name}: found {value!r}; expected a name, or a list of them")
     return list(listed)
+
+
+def _list_fields(value: Any) -> list[str]:
+    """Quantities along curves; a text may have commas between several, as `--field` of the command."""
+    return [each.strip() for text in _list_texts("field", value) for each in text.split(",")]
 
 
 def _check_limits(name: str, limits: Any) -> None:

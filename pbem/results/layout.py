@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbem.arrays import Integer
-from pbem.contact.laws import find_joint
+from pbem.contact.laws import collect_laws, find_joint
 from pbem.contact.strength import list_model_variables, list_own_variables
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
@@ -203,6 +203,9 @@ def _write_interfaces(group: h5py.Group, together: h5py.Group, model: Model, mes
     order = join_pairs(interfaces)
     together["interface"] = np.repeat(np.arange(len(counts)), counts).astype("i4")
     together["node"] = mesh.pairs.slave[order].astype("i4")
+    gap = collect_laws(model, mesh).gap[order]
+    if gap.any():
+        together["gap"] = gap
     fixed = {
         "position": to_columns(mesh.pairs.position[order] + model.origin),
         "normal": to_columns(mesh.pairs.normal[order]), "arc_length": mesh.pairs.arc_length[order],

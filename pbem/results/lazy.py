@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pbem.arrays import Integer, Real
 from pbem.results.contents import Elements
 from pbem.results.opening import freeze, open_quietly
-from pbem.results.pair_weights import JUMPS, find_nodes, weigh_pairs
+from pbem.results.pair_weights import JUMPS, find_nodes, integrate_jump, weigh_pairs
 from pbem.results.trace_names import is_piece, number_piece
 from pbem.wording import suggest
 
@@ -81,14 +81,28 @@ class Contact:
     def integrate(self, quantity: str) -> Real:
         """(k,): integral of opening, slip, traction_n or traction_s over the curve.
 
-        Uses the quadrature of the elements; next to crack tips slip and opening have the square-root shape. On a curved
-        contact the component is integrated, which does not give a force. Raises ValueError for an unknown quantity.
+        Uses the quadrature of the elements; next to crack tips slip and opening, but for a gap, have the square-root
+        shape. On a curved contact the component is integrated, which does not give a force. Raises ValueError for an
+        unknown quantity.
         """
         if not isinstance(quantity, str) or quantity not in INTEGRABLE:
             raise ValueError(f"found {quantity!r}{suggest(str(quantity), INTEGRABLE)}; expected one of: "
                              f"{', '.join(INTEGRABLE)}")
-        plain, rooted = self._weights
-        return np.asarray(getattr(self, quantity) @ (rooted if quantity in JUMPS else plain))
+        values = getattr(self, quantity)
+        if quantity not in JUMPS:
+            return np.asarray(values @ self._weights[0])
+        return integrate_jump(values, self._gap if quantity == "opening" else np.zeros(values.shape[1]), self._weights)
+
+    @cached_property
+    def _gap(self) -> Real:
+        with open_quietly(self.path) as file:
+            return self._find_gap(file)
+
+    def _find_gap(self, file: h5py.File) -> Real:
+        """The part (m,) of the opening that is there without displacements; 0 in files of earlier versions."""
+        together = file["all/contact"]
+        own = together["interface"][...] == [str(name) for name in file["contact"].attrs["names"]].index(self.name)
+        return np.asarray(together["gap"][...][own]) if "gap" in together else np.zeros(int(own.sum()))
 
     @cached_property
     def _weights(self) -> tuple[Real, Real]:
@@ -134,6 +148,9 @@ class JoinedContact(Contact):
 
     def _find_nodes(self, file: h5py.File, position: Real) -> Integer:
         return np.concatenate([piece._find_nodes(file, position) for piece in self.pieces])
+
+    def _find_gap(self, file: h5py.File) -> Real:
+        return np.concatenate([piece._find_gap(file) for piece in self.pieces])
 
     @cached_property
     def starts(self) -> list[float]:
@@ -227,6 +244,13 @@ class AllPairs:
             if "node" not in together:
                 return freeze(find_nodes(file["nodes/position"][...], self.position))
             return freeze(together["node"][...].astype(np.int64))
+
+    @cached_property
+    def gap(self) -> Real:
+        """(m,): the part of the opening that is there without displacements; 0 in files of earlier versions."""
+        with open_quietly(self.path) as file:
+            together = file["all/contact"]
+            return freeze(together["gap"][...] if "gap" in together else np.zeros(len(together["interface"])))
 
     @cached_property
     def laws(self) -> tuple[str, ...]:

@@ -203,7 +203,11 @@ def _describe_loads(model: Model) -> list[str]:
             for name, force in stage.point_forces.items() if any(force)
         ], 4)
         pressure = {name: value for name, value in stage.pressure.items() if value}
-        parts += shorten([f"fluid pressure {value:g} in {name}" for name, value in pressure.items()], 4)
+        walls = _list_walls(model, stage)
+        parts += shorten([
+            f"wall pressure {value:g} on {name}" if name in walls else f"fluid pressure {value:g} in {name}"
+            for name, value in pressure.items()
+        ], 4)
         lines.append(", ".join(parts))
         lines += [f"    {text}" for text in shorten(_describe_boundary(model, stage), 12)]
         swelling = [f"{name}: strain without stress {each.describe(model.origin)}"
@@ -212,6 +216,12 @@ def _describe_loads(model: Model) -> list[str]:
     for name, stress in model.initial_stress.items():
         lines.append("in-situ stress of {}: sxx, syy, sxy = {}, {}, {}".format(name, *stress.describe(model.origin)))
     return lines
+
+
+def _list_walls(model: Model, stage: Stage) -> set[str]:
+    """Interfaces of which a region is gone: a pressure acts on what is left, there is no fluid between faces."""
+    gone = stage.construction.removed
+    return {name for name, joint in model.interfaces.items() if joint.first in gone or joint.second in gone}
 
 
 def describe_remote(stage: Stage, origin: complex) -> tuple[float | str, ...]:

@@ -26,6 +26,13 @@ def weigh_pairs(elements: Elements, position: Real, order: int, node: Integer) -
     return plain[node], rooted[node]
 
 
+def integrate_jump(values: Real, gap: Real, weights: tuple[Real, Real]) -> Real:
+    """Integral (...,) of openings or slips (..., m). gap (m,): the part that does not vanish at tips: the gap of
+    openings, what joints have closed by at rest included, 0 of slips. weights: as `weigh_pairs` returns them."""
+    plain, rooted = weights
+    return np.asarray(values @ rooted + gap @ (plain - rooted))
+
+
 def weigh_mesh_pairs(mesh: Mesh) -> tuple[Real, Real]:
     """The same weights (m,) of all pairs of a mesh, in its order."""
     vertices = np.stack([mesh.start, mesh.end], axis=1)

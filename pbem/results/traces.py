@@ -46,7 +46,9 @@ def list_traces(results: Results, step: int = -1) -> list[TraceTotals]:
     slip, opening = pairs.at("slip", step), pairs.at("opening", step)
     modulus = _find_moduli(results)[pairs.interface]
     length = np.bincount(trace, plain, count)
-    integral, volume = np.bincount(trace, rooted * slip, count), np.bincount(trace, rooted * opening, count)
+    integral = np.bincount(trace, rooted * slip, count)
+    # Gaps do not vanish at tips.
+    volume = np.bincount(trace, rooted * opening + (plain - rooted) * pairs.gap, count)
     moment = np.bincount(trace, modulus * rooted * slip, count)
     largest = [np.zeros(count), np.zeros(count)]
     for values, kept in zip((slip, opening), largest, strict=True):

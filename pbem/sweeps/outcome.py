@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from pbem.arrays import Integer, Real
+from pbem.contact.laws import collect_laws
 from pbem.mesh.generate import generate_mesh
 from pbem.mesh.mesh import Faces, Mesh, list_faces, sort_pairs
 from pbem.model.model import Model
@@ -151,6 +152,11 @@ class Outcome(SilentReporter):
     def weights(self) -> tuple[Real, Real]:
         """Of all pairs (m,), for tractions and for jumps: lengths, as `integrate` of results has them."""
         return weigh_mesh_pairs(self.mesh)
+
+    @cached_property
+    def gap(self) -> Real:
+        """The part (m,) of the openings that is there without displacements."""
+        return collect_laws(self.model, self.mesh).gap
 
     @cached_property
     def _pairs(self) -> Mapping[str, Integer]:

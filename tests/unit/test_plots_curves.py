@@ -198,3 +198,14 @@ def test_options_of_other_kinds_are_told(results: Results, options: dict[str, ob
         results.plot(**options)
     with pytest.raises(ValueError, match="points: expected numbers"):
         results.evaluate(10**400)  # type: ignore[arg-type]
+
+
+def test_quantities_with_commas_are_those_of_a_list(results: Results) -> None:
+    joined, listed = (results.plot(curve="joint", field=field) for field in ("opening, slip", ["opening", "slip"]))
+
+    def read_lines(figure: Figure) -> list[np.ndarray]:
+        return [np.asarray(line.get_ydata()) for axes in figure.axes for line in axes.get_lines()]
+
+    assert read_lines(listed) and len(read_lines(joined)) == len(read_lines(listed))
+    for one, other in zip(read_lines(joined), read_lines(listed), strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -11,7 +11,7 @@ import numpy as np
 import pbem
 from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.model.in_situ import LinearStress
-from pbem.model.model import Condition
+from pbem.model.model import Condition, Construction
 from pbem.results.describe import describe_errors, describe_results
 from pbem.results.estimates import list_datasets
 from pbem.results.model_text import describe_model
@@ -54,6 +54,15 @@ def test_loads_that_belong_to_no_curve_are_described() -> None:
             "fluid pressure 0.25 in crack") in text
     assert "in-situ stress of soft: sxx, syy, sxy = 1, 2, 3" in text
     assert find_row(text, "conditions", "bottom") == "bottom tx = 0 ty = 0, spring 70"
+
+
+def test_pressure_on_what_a_removed_region_leaves_is_no_fluid() -> None:
+    joint = MODEL.interfaces["joint"]
+    gone = Construction(removed=(joint.first,))
+    stages = [replace(MODEL.stages[1], pressure={"joint": 0.25}, construction=each) for each in (Construction(), gone)]
+    before, after = (describe_model(replace(MODEL, stages=(each,)), MESH) for each in stages)
+    assert "fluid pressure 0.25 in joint" in before
+    assert "wall pressure 0.25 on joint" in after and "fluid pressure" not in after
 
 
 def test_hundreds_of_cracks_do_not_fill_the_screen(tmp_path: Path) -> None:

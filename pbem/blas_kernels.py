@@ -11,18 +11,28 @@ from __future__ import annotations
 
 import ctypes
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 CORE_TYPE = "OPENBLAS_CORETYPE"
 LIBRARY = "libopenblas.so.0"
 
+# Seconds. The answer takes hundredths; where memory is short, OpenBLAS may wait for some without end.
+PATIENCE = 5.0
+ASK = (
+    f"import ctypes; ask = ctypes.CDLL({LIBRARY!r}).openblas_get_corename; ask.restype = ctypes.c_char_p; "
+    "print(ask().decode())"
+)
+
 # Kernels by what they need of the processor, the best first. What Linux lists it also lets programs use.
 NEEDED = {
     "SkylakeX": frozenset({"avx512f", "avx512cd", "avx512dq", "avx512bw", "avx512vl"}),
     "Haswell": frozenset({"avx2", "fma"}),
 }
-# Kernels that do without AVX2 and FMA: the first is taken for a processor that is not known.
+# Kernels that do without AVX2 and FMA, by the names of OpenBLAS (driver/others/dynamic.c); the first is what it takes
+# for a processor that it does not know.
 OLD = frozenset({
     "prescott", "generic", "katmai", "coppermine", "northwood", "banias", "atom", "core2", "penryn", "dunnington",
     "nehalem", "sandybridge", "athlon", "opteron", "opteron_sse3", "barcelona", "bobcat", "bulldozer", "nano",
@@ -33,7 +43,7 @@ def choose_kernels(cpuinfo: Path = Path("/proc/cpuinfo"), ask: Callable[[], str]
     """The name of better kernels than OpenBLAS would take by itself on this processor; "" if its own choice is well.
 
     cpuinfo: what Linux says of the processor; ask: the name of OpenBLAS's own choice, by default of the library itself,
-    in a process aside, as it could not choose anew once it is loaded here.
+    in a process of its own, as it could not choose anew once it is loaded here.
     """
     better = next((name for name, flags in NEEDED.items() if flags <= _read_flags(cpuinfo)), "")
     return better if better and (ask or _ask_aside)().lower() in OLD else ""
@@ -41,7 +51,12 @@ def choose_kernels(cpuinfo: Path = Path("/proc/cpuinfo"), ask: Callable[[], str]
 
 def name_kernels() -> str:
     """The kernels that OpenBLAS uses in this process; "" if it is not loaded. The library is not loaded by this."""
-    return _ask(os.RTLD_NOLOAD | os.RTLD_NOW)
+    try:
+        ask = ctypes.CDLL(LIBRARY, mode=os.RTLD_NOLOAD | os.RTLD_NOW).openblas_get_corename
+    except (OSError, AttributeError):
+        return ""
+    ask.restype = ctypes.c_char_p
+    return (ask() or b"").decode(errors="replace")
 
 
 def note_old_kernels() -> str | None:
@@ -64,35 +79,22 @@ def note_old_kernels() -> str | None:
 def _read_flags(cpuinfo: Path) -> frozenset[str]:
     """Flags of the first processor listed; none on other systems and other processors."""
     try:
-        lines = cpuinfo.read_text().splitlines()
-    except (OSError, UnicodeDecodeError):
+        with cpuinfo.open(encoding="utf-8", errors="replace") as lines:  # of large nodes the rest takes long
+            return frozenset(next((line for line in lines if line.startswith("flags")), "").partition(":")[2].split())
+    except OSError:
         return frozenset()
-    return frozenset(next((line for line in lines if line.startswith("flags")), "").partition(":")[2].split())
-
-
-def _ask(mode: int) -> str:
-    try:
-        name = ctypes.CDLL(LIBRARY, mode=mode).openblas_get_corename
-    except (OSError, AttributeError):
-        return ""
-    name.restype = ctypes.c_char_p
-    return (name() or b"").decode(errors="replace")
 
 
 def _ask_aside() -> str:
-    """The name in a child that ends at once. To be called early: a process with threads must not fork."""
-    reader, writer = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            os.write(writer, _ask(os.RTLD_NOW).encode())
-        finally:
-            os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, errors="replace") as said:
-        name = said.read()
-    os.waitpid(child, 0)
-    return name
+    """The name in a process of its own; "" if that cannot be started, or finds no OpenBLAS."""
+    try:
+        said = subprocess.run(
+            [sys.executable, "-I", "-S", "-c", ASK], capture_output=True, text=True, errors="replace",
+            timeout=PATIENCE, check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return said.stdout.strip()
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ import numpy as np
 from make_crack_field import scatter_cracks
 
 import pbem
+from pbem.blas_kernels import name_kernels, note_old_kernels
 from pbem.case.build import read_model
 from pbem.mesh.generate import generate_mesh
 from pbem.parallel import world
@@ -150,6 +151,7 @@ def main() -> None:
         assert peaks is not None and start is not None and worked is not None
         print(f"{unknowns} unknowns, {2 * pairs} of them of contact; {world.size} ranks; {len(recorder.steps)} steps")
         print_figures(recorder, whole, assembly, {threads: seconds for threads, (seconds, _) in lu.items()})
+        print(note_old_kernels() or f"kernels of OpenBLAS: {name_kernels() or 'not known'}")
         print("seconds of the processor: ranks", *(f"{value:.2f}" for value in worked), "LU",
               *(f"{value:.2f}" for _, value in lu.values()))
         print("memory of each rank, MB: start", *(f"{value:.0f}" for value in start), "peak",

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,22 @@ def test_where_nothing_is_known_of_the_processor_openblas_chooses(tmp_path: Path
 
     assert choose_kernels(tmp_path / "none", ask) == ""
     assert choose_kernels(write_flags(tmp_path, "fp asimd"), ask) == ""
+
+
+@pytest.mark.parametrize("program", ["/no/such/program", "", "/bin/false"])
+def test_where_openblas_cannot_be_asked_its_own_choice_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str
+) -> None:
+    monkeypatch.setattr("pbem.blas_kernels.sys.executable", program)
+    assert choose_kernels(write_flags(tmp_path, AVX512)) == ""
+
+
+def test_an_answer_that_does_not_come_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pbem.blas_kernels.ASK", "import time; time.sleep(60)")
+    monkeypatch.setattr("pbem.blas_kernels.PATIENCE", 0.2)
+    begin = time.monotonic()
+    assert choose_kernels(write_flags(tmp_path, AVX512)) == ""
+    assert time.monotonic() - begin < 30
 
 
 def run_python(text: str, **variables: str) -> list[str]:

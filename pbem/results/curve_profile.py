@@ -116,6 +116,8 @@ def _read_pairs(results: Results, contact: Contact, quantity: str, step: int, ab
     arc, position = contact.arc_length, contact.position
     ends = find_crack_ends(results, contact) if kind and contact.second is None else []
     arcs, points, jumps = [arc], [position], [values]
+    # Gaps are there up to the tip; the rest vanishes there.
+    gap = contact.gap if quantity == "opening" else np.zeros(len(values))
     for first, element, arc_at_tip, rooted in ends:
         # From the node beside the tip; the shape there is that of the tip's elements.
         node = 0 if first else len(arc) - 1
@@ -125,7 +127,8 @@ def _read_pairs(results: Results, contact: Contact, quantity: str, step: int, ab
         own = results.elements.geometry.select(np.array([element]))
         fractions = abs(along - arc_at_tip) / own.lengths[0]
         places = own.place_fractions((fractions if first else 1.0 - fractions)[None])[0]
-        drawn = along, np.stack([places.real, places.imag], axis=1), values[node] * (np.sqrt(t) if rooted else t)
+        shape = np.sqrt(t) if rooted else t
+        drawn = along, np.stack([places.real, places.imag], axis=1), gap[node] + (values[node] - gap[node]) * shape
         for parts, part in zip((arcs, points, jumps), drawn, strict=True):
             parts.insert(0 if first else len(parts), part)
     line = np.concatenate(points)

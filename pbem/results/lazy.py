@@ -91,18 +91,17 @@ class Contact:
         values = getattr(self, quantity)
         if quantity not in JUMPS:
             return np.asarray(values @ self._weights[0])
-        return integrate_jump(values, self._gap if quantity == "opening" else np.zeros(values.shape[1]), self._weights)
+        return integrate_jump(values, self.gap if quantity == "opening" else np.zeros(values.shape[1]), self._weights)
 
     @cached_property
-    def _gap(self) -> Real:
+    def gap(self) -> Real:
+        """(m,): the part of the opening that is there without displacements; 0 in files of earlier versions."""
         with open_quietly(self.path) as file:
-            return self._find_gap(file)
+            return freeze(self._find_gap(file))
 
     def _find_gap(self, file: h5py.File) -> Real:
-        """The part (m,) of the opening that is there without displacements; 0 in files of earlier versions."""
-        together = file["all/contact"]
-        own = together["interface"][...] == [str(name) for name in file["contact"].attrs["names"]].index(self.name)
-        return np.asarray(together["gap"][...][own]) if "gap" in together else np.zeros(int(own.sum()))
+        stored = self._select(file, "gap")
+        return np.zeros(len(self.arc_length)) if stored is None else np.asarray(stored)
 
     @cached_property
     def _weights(self) -> tuple[Real, Real]:
@@ -114,11 +113,16 @@ class Contact:
 
     def _find_nodes(self, file: h5py.File, position: Real) -> Integer:
         """The nodes (m,) that the pairs belong to."""
+        stored = self._select(file, "node")
+        return find_nodes(position, self.position) if stored is None else np.asarray(stored, dtype=np.int64)
+
+    def _select(self, file: h5py.File, name: str) -> NDArray[Any] | None:
+        """Of what is stored for all pairs under a name what belongs to this one's (m,); None in files without it."""
         together = file["all/contact"]
-        if "node" not in together:
-            return find_nodes(position, self.position)
-        own = together["interface"][...] == [str(name) for name in file["contact"].attrs["names"]].index(self.name)
-        return np.asarray(together["node"][...][own], dtype=np.int64)
+        if name not in together:
+            return None
+        number = [str(each) for each in file["contact"].attrs["names"]].index(self.name)
+        return np.asarray(together[name][...][together["interface"][...] == number])
 
     @property
     def internal(self) -> Mapping[str, Real]:

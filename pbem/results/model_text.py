@@ -219,9 +219,9 @@ def _describe_loads(model: Model) -> list[str]:
 
 
 def _list_walls(model: Model, stage: Stage) -> set[str]:
-    """Interfaces of which a region is gone: a pressure acts on what is left, there is no fluid between faces."""
+    """Interfaces that have lost the region on one side: a pressure acts on the other, there is no fluid between."""
     gone = stage.construction.removed
-    return {name for name, joint in model.interfaces.items() if joint.first in gone or joint.second in gone}
+    return {name for name, joint in model.interfaces.items() if (joint.first in gone) != (joint.second in gone)}
 
 
 def describe_remote(stage: Stage, origin: complex) -> tuple[float | str, ...]:

@@ -27,8 +27,11 @@ def weigh_pairs(elements: Elements, position: Real, order: int, node: Integer) -
 
 
 def integrate_jump(values: Real, gap: Real, weights: tuple[Real, Real]) -> Real:
-    """Integral (...,) of openings or slips (..., m). gap (m,): the part that does not vanish at tips: the gap of
-    openings, what joints have closed by at rest included, 0 of slips. weights: as `weigh_pairs` returns them."""
+    """Integral (...,) of openings or slips (..., m) over lengths.
+
+    gap (m,): the part that does not vanish at tips: of openings the gap, what joints have closed by at rest included;
+    0 of slips. weights: as `weigh_pairs` returns them.
+    """
     plain, rooted = weights
     return np.asarray(values @ rooted + gap @ (plain - rooted))
 

@@ -39,14 +39,18 @@ OLD = frozenset({
 })
 
 
-def choose_kernels(cpuinfo: Path = Path("/proc/cpuinfo"), ask: Callable[[], str] | None = None) -> str:
+def choose_kernels(cpuinfo: Path = Path("/proc/cpuinfo"), ask: Callable[[str], str] | None = None) -> str:
     """The name of better kernels than OpenBLAS would take by itself on this processor; "" if its own choice is well.
 
-    cpuinfo: what Linux says of the processor; ask: the name of OpenBLAS's own choice, by default of the library itself,
-    in a process of its own, as it could not choose anew once it is loaded here.
+    cpuinfo: what Linux says of the processor. ask: what OpenBLAS takes where the given kernels are named, "" for none;
+    by default the library itself is asked, in a process of its own, as it could not choose anew once it is loaded here.
+    A library that was built without some kernels takes others.
     """
-    better = next((name for name, flags in NEEDED.items() if flags <= _read_flags(cpuinfo)), "")
-    return better if better and (ask or _ask_aside)().lower() in OLD else ""
+    fit = _list_fit(cpuinfo)
+    ask = ask or _ask_aside
+    if not fit or ask("").lower() not in OLD:
+        return ""
+    return next((name for name in fit if ask(name).lower() == name.lower()), "")
 
 
 def name_kernels() -> str:
@@ -66,14 +70,19 @@ def note_old_kernels() -> str | None:
     """
     if CORE_TYPE in os.environ:
         return None
-    used = name_kernels()
-    better = choose_kernels(ask=lambda: used)
-    if not better:
+    used, fit = name_kernels(), _list_fit(Path("/proc/cpuinfo"))
+    if not fit or used.lower() not in OLD:
         return None
     return (
-        f"OpenBLAS does not know this processor and uses its kernels of {used!r}: factorisations take several times as "
-        f"long; set {CORE_TYPE}={better} before Python starts, or install a newer OpenBLAS"
+        f"OpenBLAS uses its kernels of {used!r}, although the processor has better ones: factorisations take several "
+        f"times as long; set {CORE_TYPE}={fit[0]} before Python starts, or install a newer OpenBLAS"
     )
+
+
+def _list_fit(cpuinfo: Path) -> list[str]:
+    """Kernels that the processor can run, the best first."""
+    flags = _read_flags(cpuinfo)
+    return [name for name, needed in NEEDED.items() if needed <= flags]
 
 
 def _read_flags(cpuinfo: Path) -> frozenset[str]:
@@ -85,13 +94,17 @@ def _read_flags(cpuinfo: Path) -> frozenset[str]:
         return frozenset()
 
 
-def _ask_aside() -> str:
-    """The name in a process of its own; "" if that cannot be started, or finds no OpenBLAS."""
+def _ask_aside(named: str) -> str:
+    """The name in a process of its own; "" if that cannot be started, or finds no OpenBLAS. named: "" for none."""
+    if not sys.executable:  # in a program that has Python within
+        return ""
+    own = {name: value for name, value in os.environ.items() if name != CORE_TYPE}
+    own |= {"OPENBLAS_NUM_THREADS": "1"} | ({CORE_TYPE: named} if named else {})
     try:
         said = subprocess.run(
-            [sys.executable, "-I", "-S", "-c", ASK], capture_output=True, text=True, errors="replace",
-            timeout=PATIENCE, check=False,
-        )
+            [sys.executable, "-I", "-S", "-c", ASK], env=own, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            errors="replace", timeout=PATIENCE, check=False,
+        )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired):
         return ""
     return said.stdout.strip()

@@ -17,7 +17,7 @@ from typing import Any
 from pbem.blas_kernels import CORE_TYPE, choose_kernels
 from pbem.bundled import find_case
 from pbem.check_command import add_check_options, check
-from pbem.environment import PREFIX, WITHOUT_OTHERS, find_launch, split_petsc_options
+from pbem.environment import PREFIX, find_launch, split_petsc_options
 from pbem.errors import PbemError, printable
 from pbem.export_command import NOTES as EXPORT_NOTES
 from pbem.export_command import add_export_arguments, export
@@ -145,7 +145,7 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     except SystemExit as end:
         return int(end.code or 0)
     if options.command in ("run", "sweep"):
-        _prepare_libraries()
+        _choose_kernels()
     if options.command == "run":
         return run_case(options, petsc)
     if options.command == "sweep":
@@ -154,16 +154,10 @@ def _dispatch(arguments: list[str], petsc: dict[str, str], rank: int) -> int:
     return options.action(options) if rank == 0 else 0
 
 
-def _prepare_libraries() -> None:
-    """Tell OpenBLAS and Open MPI what they do not find out by themselves; what the user has told them stays.
-
-    Libraries that are loaded, as those of a program that calls this one, read nothing any more.
-    """
+def _choose_kernels() -> None:
+    """Tell OpenBLAS which kernels fit a processor that it does not know, unless the user has, or it is loaded."""
     if "numpy" not in sys.modules and CORE_TYPE not in os.environ and (kernels := choose_kernels()):
         os.environ[CORE_TYPE] = kernels
-    if "mpi4py.MPI" not in sys.modules and not find_launch(os.environ).variable:
-        for name, value in WITHOUT_OTHERS.items():
-            os.environ.setdefault(name, value)
 
 
 def _names_a_case(argument: str) -> bool:

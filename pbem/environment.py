@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 import platform
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,7 +31,7 @@ RANK_ONLY = ("PMIX_RANK", "PALS_RANKID", "ALPS_APP_PE")
 SPECIAL_STEPS = 4294967280
 
 # What Open MPI need not look for where a process is alone: networks (0.2 s), and a daemon to start others by.
-WITHOUT_OTHERS = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_ess_singleton_isolated": "1"}
+WITHOUT_OTHERS = {"OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "self", "OMPI_MCA_ess_singleton_isolated": "1"}
 
 # Of options on the command line that are PETSc's.
 PREFIX = "-pbem_"
@@ -87,6 +88,23 @@ def _find_slurm_step(environ: Mapping[str, str]) -> Sequence[tuple[str, str]]:
     if not step.isdigit() or int(step) >= SPECIAL_STEPS or "SLURM_PTY_PORT" in environ:
         return ()
     return (("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"), ("SLURM_PROCID", "SLURM_NTASKS"))
+
+
+@contextmanager
+def skip_networks(environ: MutableMapping[str, str]) -> Iterator[None]:
+    """Let Open MPI, if the block loads it, look for no others where no launcher has started this process.
+
+    Afterwards the variables are as before: what this process launches may need networks. Where the user has set one of
+    them, none is touched.
+    """
+    chosen = find_launch(environ).variable or not WITHOUT_OTHERS.keys().isdisjoint(environ)
+    added = {} if chosen else WITHOUT_OTHERS
+    environ.update(added)
+    try:
+        yield
+    finally:
+        for name in added:
+            environ.pop(name, None)
 
 
 def refuse_copies(launch: Launch, world: int, library: str) -> str | None:

@@ -167,8 +167,9 @@ def _make_picture(
         return TracePicture(results, options.traces, TraceOptions(box, options.label or (), limits, page), steps)
     if kind == "curve":
         from pbem.results.curve_picture import CurveOptions, CurvePicture
+        from pbem.results.curve_profile import split_quantities
 
-        quantities = [each.strip() for each in options.field.split(",")] if options.field else None
+        quantities = split_quantities(options.field) if options.field else None
         return CurvePicture(results, options.curve, CurveOptions(
             quantities=quantities, abscissa=options.x or "arc_length", xlim=options.xlim, ylim=options.ylim, page=page,
         ), steps)  # fmt: skip

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbem.bundled import find_case
-from pbem.environment import find_launch
+from pbem.environment import find_launch, skip_networks
 from pbem.errors import ConvergenceError, LaunchError, LawError, PbemError, StopError, StorageError
 from pbem.loading import load_at_once
 from pbem.terminal import INTERRUPTED, NOT_CONVERGED, UNEXPECTED, WRONG_INPUT, discard_output, say, tell
@@ -31,7 +31,8 @@ RUN_NOTES = """\
 PETSc: any PETSc option is accepted with the prefix pbem_ and overrides the [petsc] table of the case, e.g.
   pbem run CASE -pbem_ksp_rtol 1e-10 -pbem_ksp_monitor
 
-Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores
+Environment: OMP_NUM_THREADS, 1 on several ranks unless set; PBEM_ALLOW_OVERSUBSCRIPTION=1 runs more threads than cores;
+OPENBLAS_CORETYPE, chosen where OpenBLAS does not know the processor, unless set
 
 exit code: 0 finished; 1 unexpected error; 2 the case, the command line or the launch is wrong, nothing was written;
 3 not converged at the smallest step, the file holds every step reached (see `pbem help convergence`);
@@ -134,7 +135,7 @@ def _describe_rest(target: Path) -> str:
 def load_driver() -> Callable[..., Results]:
     """Import what computes; raises LaunchError on all ranks alike if MPI, PETSc or another library cannot be loaded."""
     try:
-        with load_at_once():
+        with load_at_once(), skip_networks(os.environ):
             from pbem.parallel import refuse_together, wait_for_all, world
     except (ImportError, RuntimeError) as error:  # RuntimeError: mpi4py has not found the library of MPI
         raise LaunchError(f"MPI cannot be loaded: {error}; {_advise_to_load(error)}") from error

@@ -48,7 +48,7 @@ class Profile:
 
     title: of the quantity, as a picture shows it; is_length: its unit. place (m,): abscissae of the nodes, values,
     mode (m,): their status, None of nodes without contact. line_place, line_values (p,): the line through them, which
-    goes on to zero at tips. closed: the curve has no ends.
+    goes on to the gap at tips, to zero without one. closed: the curve has no ends.
     """
 
     name: str
@@ -68,6 +68,11 @@ def list_quantities(results: Results, name: str) -> list[str]:
     pairs = [*PAIR_QUANTITIES, *contact.internal] if contact else []
     nodes = list(NODE_QUANTITIES) if name in results.nodes.curve_names else []
     return [*pairs, *(each for each in nodes if each not in pairs)]
+
+
+def split_quantities(text: str) -> list[str]:
+    """The names of quantities in a text with commas between; what is empty names none, as after a last comma."""
+    return [name for each in text.split(",") if (name := each.strip())] or [text]
 
 
 def check_curve(results: Results, name: str) -> None:
@@ -117,7 +122,7 @@ def _read_pairs(results: Results, contact: Contact, quantity: str, step: int, ab
     ends = find_crack_ends(results, contact) if kind and contact.second is None else []
     arcs, points, jumps = [arc], [position], [values]
     # Gaps are there up to the tip; the rest vanishes there.
-    gap = contact.gap if quantity == "opening" else np.zeros(len(values))
+    gap = contact.gap if ends and quantity == "opening" else np.zeros(len(values))
     for first, element, arc_at_tip, rooted in ends:
         # From the node beside the tip; the shape there is that of the tip's elements.
         node = 0 if first else len(arc) - 1

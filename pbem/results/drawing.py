@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from pbem.errors import ResultFileError
 from pbem.results.curve_picture import CurveOptions, CurvePicture, find_curves
 from pbem.results.curve_plot import LINE_STYLES, draw_quantity
+from pbem.results.curve_profile import split_quantities
 from pbem.results.field_plot import draw_field
 from pbem.results.plot_style import style
 from pbem.results.plots import draw_results
@@ -77,7 +78,7 @@ def _list_texts(name: str, value: Any) -> list[str]:
 
 def _list_fields(value: Any) -> list[str]:
     """Quantities along curves; a text may have commas between several, as `--field` of the command."""
-    return [each.strip() for text in _list_texts("field", value) for each in text.split(",")]
+    return [each for text in _list_texts("field", value) for each in split_quantities(text)]
 
 
 def _check_limits(name: str, limits: Any) -> None:

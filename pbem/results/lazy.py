@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pbem.arrays import Integer, Real
 from pbem.results.contents import Elements
 from pbem.results.opening import freeze, open_quietly
-from pbem.results.pair_weights import JUMPS, find_nodes, integrate_jump, weigh_pairs
+from pbem.results.pair_weights import find_nodes, weigh_pairs, weigh_values
 from pbem.results.trace_names import is_piece, number_piece
 from pbem.wording import suggest
 
@@ -88,14 +88,11 @@ class Contact:
         if not isinstance(quantity, str) or quantity not in INTEGRABLE:
             raise ValueError(f"found {quantity!r}{suggest(str(quantity), INTEGRABLE)}; expected one of: "
                              f"{', '.join(INTEGRABLE)}")
-        values = getattr(self, quantity)
-        if quantity not in JUMPS:
-            return np.asarray(values @ self._weights[0])
-        return integrate_jump(values, self.gap if quantity == "opening" else np.zeros(values.shape[1]), self._weights)
+        return weigh_values(quantity, getattr(self, quantity), self.gap, self._weights).sum(axis=-1)
 
     @cached_property
     def gap(self) -> Real:
-        """(m,): the part of the opening that is there without displacements; 0 in files of earlier versions."""
+        """Length (m,): the part of the opening that is there without displacements; 0 in files of earlier versions."""
         with open_quietly(self.path) as file:
             return freeze(self._find_gap(file))
 
@@ -251,7 +248,7 @@ class AllPairs:
 
     @cached_property
     def gap(self) -> Real:
-        """(m,): the part of the opening that is there without displacements; 0 in files of earlier versions."""
+        """Length (m,): the part of the opening that is there without displacements; 0 in files of earlier versions."""
         with open_quietly(self.path) as file:
             together = file["all/contact"]
             return freeze(together["gap"][...] if "gap" in together else np.zeros(len(together["interface"])))

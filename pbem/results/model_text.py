@@ -221,7 +221,10 @@ def _describe_loads(model: Model) -> list[str]:
 def _list_walls(model: Model, stage: Stage) -> set[str]:
     """Interfaces that have lost the region on one side: a pressure acts on the other, there is no fluid between."""
     gone = stage.construction.removed
-    return {name for name, joint in model.interfaces.items() if (joint.first in gone) != (joint.second in gone)}
+    return {
+        name for name, joint in model.interfaces.items()
+        if joint.second is not None and (joint.first in gone) != (joint.second in gone)
+    }  # fmt: skip
 
 
 def describe_remote(stage: Stage, origin: complex) -> tuple[float | str, ...]:

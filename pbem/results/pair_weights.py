@@ -10,7 +10,7 @@ from pbem.mesh.mesh import Mesh
 from pbem.mesh.shape_functions import integrate_shapes, tip_shapes
 from pbem.results.contents import Elements
 
-# Jumps, which vanish at the tips of cracks like the root of the distance.
+# Jumps, which vanish at the tips of cracks like the root of the distance, but for gaps.
 JUMPS = ("opening", "slip")
 
 
@@ -26,14 +26,16 @@ def weigh_pairs(elements: Elements, position: Real, order: int, node: Integer) -
     return plain[node], rooted[node]
 
 
-def integrate_jump(values: Real, gap: Real, weights: tuple[Real, Real]) -> Real:
-    """Integral (...,) of openings or slips (..., m) over lengths.
+def weigh_values(quantity: str, values: Real, gap: Real, weights: tuple[Real, Real]) -> Real:
+    """What each pair adds (..., m) to the integral of a quantity with these values (..., m): its unit times length.
 
-    gap (m,): the part that does not vanish at tips: of openings the gap, what joints have closed by at rest included;
-    0 of slips. weights: as `weigh_pairs` returns them.
+    gap (m,): lengths, the part of openings that does not vanish at tips: the gap, what joints have closed by at rest
+    included. weights: as `weigh_pairs` returns them.
     """
     plain, rooted = weights
-    return np.asarray(values @ rooted + gap @ (plain - rooted))
+    if quantity not in JUMPS:
+        return values * plain
+    return values * rooted + (gap * (plain - rooted) if quantity == "opening" else 0.0)
 
 
 def weigh_mesh_pairs(mesh: Mesh) -> tuple[Real, Real]:

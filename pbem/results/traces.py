@@ -9,7 +9,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.model.material import Material
-from pbem.results.pair_weights import weigh_pairs
+from pbem.results.pair_weights import weigh_pairs, weigh_values
 from pbem.results.reader import Results
 from pbem.results.trace_names import name_trace
 
@@ -47,8 +47,7 @@ def list_traces(results: Results, step: int = -1) -> list[TraceTotals]:
     modulus = _find_moduli(results)[pairs.interface]
     length = np.bincount(trace, plain, count)
     integral = np.bincount(trace, rooted * slip, count)
-    # Gaps do not vanish at tips.
-    volume = np.bincount(trace, rooted * opening + (plain - rooted) * pairs.gap, count)
+    volume = np.bincount(trace, weigh_values("opening", opening, pairs.gap, (plain, rooted)), count)
     moment = np.bincount(trace, modulus * rooted * slip, count)
     largest = [np.zeros(count), np.zeros(count)]
     for values, kept in zip((slip, opening), largest, strict=True):

@@ -155,7 +155,7 @@ class Outcome(SilentReporter):
 
     @cached_property
     def gap(self) -> Real:
-        """The part (m,) of the openings that is there without displacements."""
+        """Length (m,): the part of the openings that is there without displacements."""
         return collect_laws(self.model, self.mesh).gap
 
     @cached_property

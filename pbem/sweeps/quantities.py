@@ -13,7 +13,7 @@ from pbem.description.replacement import Part, split_key
 from pbem.errors import CaseError, Fault
 from pbem.model.model import Model
 from pbem.model.rigid_body import FORCES, MOTIONS
-from pbem.results.pair_weights import JUMPS, integrate_jump
+from pbem.results.pair_weights import weigh_values
 from pbem.results.rigid import COMPONENTS as RIGID
 from pbem.sweeps.outcome import FACTORS, AbsentNameError, Kind, Names, Outcome
 from pbem.wording import list_names, show, suggest
@@ -230,10 +230,8 @@ def _summarise(outcome: Outcome, members: tuple[str, ...], field: str, what: str
     if not len(pairs):
         return math.nan
     if what in ("mean", "integral"):
-        # Beside tips jumps have the root's shape, which the plain weights integrate wrongly.
-        plain, rooted = (each[pairs] for each in outcome.weights)
-        gap = outcome.gap[pairs] if field == "opening" else np.zeros(len(pairs))
-        whole = float(integrate_jump(values, gap, (plain, rooted)) if field in JUMPS else plain @ values)
+        plain, rooted = outcome.weights
+        whole = float(weigh_values(field, values, outcome.gap[pairs], (plain[pairs], rooted[pairs])).sum())
         return whole / float(weight.sum()) if what == "mean" else whole
     if what == "largest":
         return float(np.abs(values).max())

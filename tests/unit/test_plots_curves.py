@@ -201,7 +201,7 @@ def test_options_of_other_kinds_are_told(results: Results, options: dict[str, ob
 
 
 def test_quantities_with_commas_are_those_of_a_list(results: Results) -> None:
-    joined, listed = (results.plot(curve="joint", field=field) for field in ("opening, slip", ["opening", "slip"]))
+    joined, listed = (results.plot(curve="joint", field=field) for field in ("opening, slip,", ["opening", "slip"]))
 
     def read_lines(figure: Figure) -> list[np.ndarray]:
         return [np.asarray(line.get_ydata()) for axes in figure.axes for line in axes.get_lines()]

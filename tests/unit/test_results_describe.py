@@ -63,6 +63,9 @@ def test_pressure_on_what_a_removed_region_leaves_is_no_fluid() -> None:
     before, after = (describe_model(replace(MODEL, stages=(each,)), MESH) for each in stages)
     assert "fluid pressure 0.25 in joint" in before
     assert "wall pressure 0.25 on joint" in after and "fluid pressure" not in after
+    alone = replace(joint, second=None)  # a crack, whose region is gone
+    crack = replace(MODEL, stages=stages[1:], interfaces={**MODEL.interfaces, "joint": alone})
+    assert "wall pressure" not in describe_model(crack, MESH)
 
 
 def test_hundreds_of_cracks_do_not_fill_the_screen(tmp_path: Path) -> None:

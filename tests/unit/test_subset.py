@@ -109,11 +109,18 @@ def test_few_of_many_pairs_are_found_by_steps_without_pivoting() -> None:
     assert 0 < len(touching) < count // 2
 
 
-def test_cohesion_that_is_lost_where_faces_part_is_settled_or_seen_to_have_no_solution() -> None:
+@pytest.mark.parametrize(("friction", "cohesion", "pressure"), [
+    (0.3, (0.6, 0.3), 0.0), (0.7, (0.0, 0.0), 0.6),
+])  # fmt: skip
+def test_what_is_lost_where_faces_part_is_settled_or_seen_to_have_no_solution(
+    friction: float, cohesion: tuple[float, float], pressure: float
+) -> None:
+    """Cohesion and tensile strength, and friction under a fluid that is in open parts alone."""
     counts = {"settled": 0, "none": 0}
     for seed in range(60):
         random = np.random.default_rng(seed)
-        subset = pose(np.full(2, 0.3), np.array([0.6, 0.3]), tensile=float(random.choice([0.0, 0.3])))
+        tensile = float(random.choice([0.0, 0.3])) if any(cohesion) else 0.0
+        subset = pose(np.full(2, friction), np.array(cohesion), pressure, tensile)
         response = make_response(random, 2)
         admissible = try_all_modes(subset, response)
         found = settle(subset, response)

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbem.contact.laws import OPEN, STICK
+from pbem.contact.laws import OPEN, SLIP, STICK
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
+from pbem.errors import ConvergenceError
 from pbem.solve.nonlinear.unsettled import describe_unsettled, find_friction_under_fluid, find_losing
 from tests.unit.test_nearby import draw_modes
 from tests.unit.test_sweeps import assemble, write_network
@@ -30,15 +31,16 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
     assert (find_losing(problem.laws) == losing).all()
     violation = np.zeros(count)
     violation[[3, 5]] = 1.0, 2.0
+    modes = draw_modes(count)
     proposal = Proposal(draw_modes(count), violation)
     group = np.array([3, 5])
     wrong, none = (Settled(None, False, 4, each) for each in (WRONG, ~WRONG & False))
     dry = np.zeros(count)
     found = [
-        describe_unsettled(problem, "mode cycle", proposal, group, wrong, dry),
-        describe_unsettled(problem, "mode cycle", proposal, group, none, dry),
-        describe_unsettled(problem, "mode cycle", proposal, group[:0], None, dry),
-        describe_unsettled(problem, "no admissible modes", proposal, group, none, dry),
+        describe_unsettled(problem, "mode cycle", modes, proposal, group, wrong, dry),
+        describe_unsettled(problem, "mode cycle", modes, proposal, group, none, dry),
+        describe_unsettled(problem, "mode cycle", modes, proposal, group[:0], None, dry),
+        describe_unsettled(problem, "no admissible modes", modes, proposal, group, none, dry),
     ]
     if losing:
         assert {error.reason for error in found} == {"no admissible modes"}
@@ -47,9 +49,10 @@ def test_the_reason_where_strength_is_lost_and_returns(law: str, losing: bool) -
         assert [error.reason for error in found[:3]] == ["unsound mesh", "mode cycle", "mode cycle"]
         assert all("cohesion" not in str(error) for error in found)
     # What the user limits is the user's to change; and laws of slipping pairs may be what does not settle.
-    assert describe_unsettled(problem, "iteration limit", proposal, group[:0], None, dry).reason == "iteration limit"
+    limit = describe_unsettled(problem, "iteration limit", modes, proposal, group[:0], None, dry)
+    assert limit.reason == "iteration limit"
     settled = replace(proposal, violation=np.zeros(count))
-    assert describe_unsettled(problem, "mode cycle", settled, group, wrong, dry).reason == "mode cycle"
+    assert describe_unsettled(problem, "mode cycle", modes, settled, group, wrong, dry).reason == "mode cycle"
 
 
 @pytest.mark.parametrize(("law", "fluid", "rough"), [
@@ -66,23 +69,24 @@ def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, f
     assert (find_friction_under_fluid(problem.laws, pressure) == rough).all()
     violation = np.zeros(count)
     violation[[3, 5]] = 1.0, 2.0
-    modes = draw_modes(count)
-    modes.mode[[3, 5]] = OPEN
-    proposal, none = Proposal(modes, violation), Settled(None, True, 4, ~WRONG & False)
-    ended, cycled = (describe_unsettled(problem, reason, proposal, np.array([3, 5]), none, pressure)
-                     for reason in ("no admissible modes", "mode cycle"))
-    assert ended.reason == "no admissible modes"
-    assert cycled.reason == ("no admissible modes" if rough else "mode cycle")
-    for error in (ended, cycled):
-        assert ('pressurised = "all"' in str(error)) == rough
-        assert "cohesion" not in str(error)
+    group, none = np.array([3, 5]), Settled(None, True, 4, ~WRONG & False)
+
+    def describe(reason: str, before: int, after: int, found: Settled = none) -> ConvergenceError:
+        modes, next_ones = draw_modes(count), draw_modes(count)
+        modes.mode[group], next_ones.mode[group] = before, after
+        return describe_unsettled(problem, reason, modes, Proposal(next_ones, violation), group, found, pressure)
+
+    # Where closed faces pull and open ones overlap, which of the two comes last is chance.
+    for before, after in ((STICK, OPEN), (OPEN, STICK)):
+        ended, cycled = (describe(reason, before, after) for reason in ("no admissible modes", "mode cycle"))
+        assert ended.reason == "no admissible modes"
+        assert cycled.reason == ("no admissible modes" if rough else "mode cycle")
+        for error in (ended, cycled):
+            assert ('pressurised = "all"' in str(error)) == rough
+            assert "cohesion" not in str(error)
     # Not where pairs that stay closed change between stick and slip, nor where a mesh is unsound.
-    modes.mode[[3, 5]] = STICK
-    assert describe_unsettled(problem, "mode cycle", proposal, np.array([3, 5]), none, pressure).reason == "mode cycle"
-    modes.mode[[3, 5]] = OPEN
-    wrong = replace(none, wrong=WRONG)
-    unsound = describe_unsettled(problem, "mode cycle", proposal, np.array([3, 5]), wrong, pressure)
-    assert unsound.reason == "unsound mesh"
+    assert describe("mode cycle", SLIP, STICK).reason == "mode cycle"
+    assert describe("mode cycle", STICK, OPEN, replace(none, wrong=WRONG)).reason == "unsound mesh"
 
 
 def test_of_many_pairs_those_are_named_that_change() -> None:
@@ -91,15 +95,17 @@ def test_of_many_pairs_those_are_named_that_change() -> None:
     count = problem.mesh.pairs.count
     violation = np.zeros(count)
     violation[5] = 1.0
-    proposal = Proposal(draw_modes(count), violation)
+    modes = draw_modes(count)
+    proposal = Proposal(modes, violation)
     none = Settled(None, False, 4, np.zeros(count, dtype=bool))
     all_pairs, alone = (
-        str(describe_unsettled(problem, "no admissible modes", proposal, group, each, np.zeros(count)))
+        str(describe_unsettled(problem, "no admissible modes", modes, proposal, group, each, np.zeros(count)))
         for group, each in ((np.arange(count), none), (np.array([5]), Settled(None, True, 4, WRONG[1:])))
     )
     place = alone.split("laws of these 1: ")[1].split(";")[0]
     assert f"laws of these {count}, 1 of which changes: {place};" in all_pairs
+    assert "other pairs held" in alone and "other pairs" not in all_pairs
     violation[[5, 7, 8]] = 1.0
-    several = str(describe_unsettled(problem, "no admissible modes", Proposal(draw_modes(count), violation),
+    several = str(describe_unsettled(problem, "no admissible modes", modes, Proposal(modes, violation),
                                      np.arange(count), none, np.zeros(count)))
     assert f"laws of these {count}, 3 of which change: {place}, " in several

@@ -307,7 +307,7 @@ class _Run:
         self.blocks.move_on(outcome.pairs, outcome.floats)
         self.running.note(search, outcome.proposal, outcome.law_error)
         if search.taken >= self.most or (self.hurried and search.is_stuck()) or search.collapses():
-            raise end_search(self.hold, "iteration limit", outcome.proposal, search)
+            raise end_search(self.hold, "iteration limit", self.modes, outcome.proposal, search)
         if left:
             self.modes, self.normal_traction, self.slip, self.jump = self.kept
             return True
@@ -344,7 +344,7 @@ class _Run:
             chosen = limit_changes(self.modes, proposal, share)
             back = bool(proposal.changed.any()) and search.returns(chosen.fingerprint())
         if back and not go_on_warily(self.forcing, search):
-            raise end_search(self.hold, "mode cycle", proposal, search)
+            raise end_search(self.hold, "mode cycle", self.modes, proposal, search)
         return chosen
 
     def _move_on(self, found: _Iterated, cascade: Cascade | None) -> None:

@@ -25,8 +25,9 @@ from pbem.solve.problem.tangent import Solved, TangentOperator
 from pbem.solve.tangent.nearby import MOST_ASKED, settle_parts
 
 
-def end_search(hold: Hold, reason: str, proposal: Proposal, search: Search) -> ConvergenceError:
-    """The error of a search that does not settle, with the truest reason that is known; that of the first rank."""
+def end_search(hold: Hold, reason: str, modes: ModeState, proposal: Proposal, search: Search) -> ConvergenceError:
+    """The error of a search that does not settle in these modes, with the truest reason that is known; that of the
+    first rank."""
     search.unsettled = reason != "no admissible modes"
     if search.collapse:
         return ConvergenceError("limit load", search.collapse)
@@ -34,7 +35,7 @@ def end_search(hold: Hold, reason: str, proposal: Proposal, search: Search) -> C
 
     def describe() -> ConvergenceError:
         error = describe_unsettled(
-            hold.problem, "iteration limit" if spent else reason, proposal, search.failed_group, search.failed,
+            hold.problem, "iteration limit" if spent else reason, modes, proposal, search.failed_group, search.failed,
             np.zeros(hold.problem.laws.count) if hold.load is None else hold.load.pressure)
         if search.is_spent() and error.reason == "iteration limit":
             taken = "pivoting has taken all that so many iterations may (solver.newton_max_iterations)"
@@ -106,7 +107,7 @@ def pivot_group(
         return pivot_group(hold, tangent, constraints, modes, memory, load, law, solved, search)
     # Pairs that hold a body are moved on from state to state: their group is not to be judged by one of them.
     if ends and not broadcast(problem.comm, len(hold.pairs)):
-        raise end_search(hold, "no admissible modes", search.proposal, search)
+        raise end_search(hold, "no admissible modes", modes, search.proposal, search)
     if found.modes is None:
         return None
     settled = complete(found.modes)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbem.arrays import Bool, Integer, Real
-from pbem.contact.laws import OPEN, PairLaws, find_linear
+from pbem.contact.laws import OPEN, ModeState, PairLaws, find_linear
 from pbem.contact.modes import Proposal
 from pbem.contact.subset import Settled
 from pbem.errors import ConvergenceError
@@ -36,16 +36,18 @@ class Unsettled:
 
 
 def describe_unsettled(
-    problem: Problem, reason: str, proposal: Proposal, group: Integer, failed: Settled | None, pressure: Real
+    problem: Problem, reason: str, modes: ModeState, proposal: Proposal, group: Integer, failed: Settled | None,
+    pressure: Real,
 ) -> ConvergenceError:
     """The error of a search that ends, with its reason or a truer one.
 
-    group (s,): the pairs for which pivoting found no modes last, with what it found; none if it did not fail.
-    pressure (m,): of fluid.
+    modes, proposal: at last, and what they lead to. group (s,): the pairs for which pivoting found no modes last, with
+    what it found; none if it did not fail. pressure (m,): of fluid.
     """
     if not proposal.changed.any():
         return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
-    parting = find_friction_under_fluid(problem.laws, pressure) & proposal.changed & (proposal.modes.mode == OPEN)
+    crossing = proposal.changed & ((modes.mode == OPEN) != (proposal.modes.mode == OPEN))
+    parting = find_friction_under_fluid(problem.laws, pressure) & crossing
     if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
         losing = find_losing(problem.laws) & proposal.changed
         if not losing.any() and not (failed is not None and failed.wrong.any()):
@@ -62,6 +64,7 @@ def describe_unsettled(
         )
     if reason == "no admissible modes" and failed is not None:
         certainty = "fulfils" if failed.exhaustive else "was found that fulfils"
+        others = "" if len(group) == problem.laws.count else "with the statuses of all other pairs held "
         changing = group[proposal.changed[group]]
         if 0 < len(changing) < len(group):  # at last all pairs are tried, most of which have their modes
             those = f"{len(group)}, {len(changing)} of which {'changes' if len(changing) == 1 else 'change'}"
@@ -69,7 +72,7 @@ def describe_unsettled(
             those, changing = f"{len(group)}", group
         return ConvergenceError(
             reason,
-            f"with all other pairs settled no choice of stick, slip and open {certainty} the laws of these {those}: "
+            f"{others}no choice of stick, slip and open {certainty} the laws of these {those}: "
             f"{_name(problem, changing)}; {_advise(problem.laws, changing, parting)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
@@ -84,7 +87,8 @@ def _advise(laws: PairLaws, group: Integer, parting: Bool) -> str:
 def _list_losses(laws: PairLaws, group: Integer | Bool, parting: Bool) -> list[str]:
     """What some pairs lose where they part and have back where they meet, with what makes it last, or go to zero.
 
-    parting (m,): pairs with friction that want to open under a fluid that is in open parts alone.
+    parting (m,): pairs with friction that are to open, or to close again, under a fluid that is in open parts alone:
+    where closed ones pull and open ones overlap, which of the two comes last is chance.
     """
     losses = []
     if find_losing(laws)[group].any():
@@ -94,7 +98,7 @@ def _list_losses(laws: PairLaws, group: Integer | Bool, parting: Bool) -> list[s
     if parting[group].any():
         losses.append("faces part under the fluid's pressure, at which closed ones still have friction, as it is in "
                       'open parts alone: with pressurised = "all" friction goes to zero there')
-    return losses
+    return losses + ["it may take both"] * (len(losses) == 2)
 
 
 def find_losing(laws: PairLaws) -> Bool:

@@ -84,6 +84,15 @@ def test_the_reason_where_friction_is_lost_under_fluid_in_open_parts(law: str, f
         for error in (ended, cycled):
             assert ('pressurised = "all"' in str(error)) == rough
             assert "cohesion" not in str(error)
+    # Of a group that has none, whichever of its pairs changes last: one beside an opening, from stick to slip.
+    for beside in (OPEN, STICK):
+        modes = draw_modes(count)
+        modes.mode[group] = beside, STICK
+        slides = replace(modes, mode=np.where(np.arange(count) == 5, SLIP, modes.mode).astype(np.int8))
+        proposal = Proposal(slides, np.where(np.arange(count) == 5, 1.0, 0.0))
+        error = describe_unsettled(problem, "no admissible modes", modes, proposal, group, none, pressure)
+        assert ('pressurised = "all"' in str(error)) == (rough and beside == OPEN)
+        assert ("shorter elements" in str(error)) == (not (rough and beside == OPEN))
     # Not where pairs that stay closed change between stick and slip, nor where a mesh is unsound.
     assert describe("mode cycle", SLIP, STICK).reason == "mode cycle"
     assert describe("mode cycle", STICK, OPEN, replace(none, wrong=WRONG)).reason == "unsound mesh"

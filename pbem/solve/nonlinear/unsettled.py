@@ -46,8 +46,9 @@ def describe_unsettled(
     """
     if not proposal.changed.any():
         return ConvergenceError(reason, "the laws of slipping pairs do not settle; try more load steps")
-    crossing = proposal.changed & ((modes.mode == OPEN) != (proposal.modes.mode == OPEN))
-    parting = find_friction_under_fluid(problem.laws, pressure) & crossing
+    is_open, opens = modes.mode == OPEN, proposal.modes.mode == OPEN
+    parted = find_friction_under_fluid(problem.laws, pressure) & (is_open | opens)
+    parting = parted & proposal.changed & (is_open != opens)
     if reason != "iteration limit" and not (reason == "no admissible modes" and failed is not None):
         losing = find_losing(problem.laws) & proposal.changed
         if not losing.any() and not (failed is not None and failed.wrong.any()):
@@ -73,15 +74,20 @@ def describe_unsettled(
         return ConvergenceError(
             reason,
             f"{others}no choice of stick, slip and open {certainty} the laws of these {those}: "
-            f"{_name(problem, changing)}; {_advise(problem.laws, changing, parting)}",
+            f"{_name(problem, changing)}; {_advise(problem.laws, group, changing, parting, parted)}",
         )
     return ConvergenceError(reason, f"{_describe_changed(problem, proposal)}; try shorter elements there",
                             _list_places(problem, np.flatnonzero(proposal.changed)))
 
 
-def _advise(laws: PairLaws, group: Integer, parting: Bool) -> str:
-    """Why pairs have no modes, and what to do, where they lose what they have back at once; else what may help."""
-    return "; ".join(_list_losses(laws, group, parting)) or "try shorter elements there, or smaller steps"
+def _advise(laws: PairLaws, group: Integer, changing: Integer, parting: Bool, parted: Bool) -> str:
+    """Why pairs have no modes, and what to do, where they lose what they have back at once; else what may help.
+
+    Of those that change, else of the group: friction alone always has modes, and which of the pairs around the end of
+    an opening changes last, and how, is chance. parting: see `_list_losses`; parted (m,): those that are open, too.
+    """
+    losses = _list_losses(laws, changing, parting) or _list_losses(laws, group, parted)
+    return "; ".join(losses) or "try shorter elements there, or smaller steps"
 
 
 def _list_losses(laws: PairLaws, group: Integer | Bool, parting: Bool) -> list[str]:

@@ -16,12 +16,13 @@ from pbem.model.model import Model
 SAME = 1e-6
 
 
-def _bear_in_situ(model: Model, mesh: Mesh) -> tuple[Real, Real, Bool]:
-    """p_n, p_s (m,) of the pairs under the in-situ stress, and whether (m,) it is the same on both of their sides."""
+def bear_in_situ(model: Model, mesh: Mesh) -> tuple[Real, Real, Bool]:
+    """p_n, p_s (m,) of the pairs under the in-situ stress, and whether (m,) it is the same on both of their sides: of
+    sides that differ the mean."""
     pairs = mesh.pairs
     first, second = (_find_traction(model, mesh, mesh.node_region[each]) for each in (pairs.first, pairs.second))
     largest = float(np.abs(np.concatenate([first, second])).max(initial=0.0))
-    along = np.conj(pairs.normal) * first
+    along = np.conj(pairs.normal) * 0.5 * (first + second)
     return along.real, along.imag, np.abs(first - second) <= SAME * largest
 
 
@@ -50,7 +51,7 @@ def settle_joints(
 ) -> tuple[Real, Real]:
     """What joints have closed by and given way along the faces (m,), both 0 where the stress is a load: where it is not
     the same on both sides, or pulls by more than the limit (m,); compliance: normal and tangential ones."""
-    p_n, p_s, balanced = _bear_in_situ(model, mesh)
+    p_n, p_s, balanced = bear_in_situ(model, mesh)
     bears = balanced & (p_n <= limit + SAME * float(np.hypot(p_n, p_s).max(initial=0.0)))
     closed = close_joint(compliance[0], stiffening, p_n)[0]
     return np.where(bears, closed, 0.0), np.where(bears, compliance[1] * p_s, 0.0)

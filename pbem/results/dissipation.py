@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbem.arrays import Bool, Complex, Real
+from pbem.arrays import Bool, Real
 from pbem.contact.closure import find_closure, measure_stiffening
 from pbem.contact.declaration import BROKEN, SLIP_PATH, Passage, Slide
 from pbem.contact.laws import (
@@ -22,7 +22,6 @@ from pbem.contact.laws import (
     start_memory,
     take_values,
 )
-from pbem.mesh.mesh import Mesh
 from pbem.solve.problem.step import ContactState
 
 
@@ -72,11 +71,12 @@ class PairWork:
     taken: float
 
 
-def record_pairs_at_rest(laws: PairLaws, mesh: Mesh, traction: Complex) -> PairRecord:
-    """Before any load; traction (nodes,) of the in-situ stress, which the pairs bear."""
+def record_pairs_at_rest(laws: PairLaws, p_n: Real, p_s: Real) -> PairRecord:
+    """Before any load; p_n, p_s (m,): tractions of the in-situ stress, which the pairs bear, but for joints that take
+    it as a load: these begin without."""
     memory = start_memory(laws)
-    n, borne = mesh.pairs.normal, traction[mesh.pairs.first]
-    p_n, p_s = (np.conj(n) * borne).real, (np.conj(1j * n) * borne).real
+    p_n = np.where((laws.compliance_n > 0) & (laws.at_rest_n == 0), 0.0, p_n)
+    p_s = np.where((laws.compliance_s > 0) & (laws.at_rest_s == 0), 0.0, p_s)
     zeros = np.zeros(laws.count)
     bond = np.where(laws.at_rest_n != 0, measure_stiffening(laws, p_n, zeros), 0.0)
     return PairRecord(

@@ -15,7 +15,8 @@ plane without holes and cracks, with dead tractions far away, and the far stress
 again Betti's theorem, between the boundary and a large circle. The work in a step is (old + new)/2 times an increment:
 t times that of u on outer curves, b times that of I, s0 + far times that of S. Together they are the increment of W and
 the same sum over the pairs, tractions times jumps, as exactly as the discrete fields obey Betti's theorem from step to
-step; in one step from rest, exactly.
+step; in one step from rest, exactly. In-situ stress on faces that pairs do not bear from the start, as it is not the
+same on both sides, acts as a load: in the step from rest it does the work 1/2 sum t0 . u, less that of what pairs bear.
 
 Where faces lose strength as they slip or part, there may be no equilibria from the beginning of a step to its end: they
 run away. Loads that grow steadily do between t du and (t + dt) du: the trapezoid is off by half of dt du at most. What
@@ -95,7 +96,7 @@ class EnergyBalance:
 
     def add(self, step: Step) -> Energy:
         """The energies after the next step; `runaway` tells whether faces ran away in it (theory, 75)."""
-        before = self._reached
+        before, from_rest = self._reached, self._last is None
         old, lost = self._enter_stage(step.stage)
         new, self._last = self._stored.describe(step), step
         nodes = self._stored.outer.node
@@ -110,10 +111,12 @@ class EnergyBalance:
         pairs = measure_work(self.laws, self._stored.pair_weight, old.pairs, new.pairs, opened)
         fluid, bared = self._measure_bared(old, new)
         fluid += pairs.fluid + self._press(0.5 * (old.pairs.pressure + new.pairs.pressure), change)
+        relieved = self._relieve(old, new) if from_rest else 0.0
+        work += relieved
         # What springs take from the boundary they store, and what fluid does is work of its own.
         work += new.springs - old.springs + fluid
         self._state = new
-        self.runaway = self._find_runaway(old, new, moved, pairs, abs(before.elastic) + abs(work))
+        self.runaway = self._find_runaway(old, new, moved, pairs, abs(before.elastic) + abs(work), abs(relieved))
         dissipated, released = pairs.dissipated, 0.0
         if self.runaway is not None:
             dissipated, released = pairs.friction, self.runaway.released
@@ -144,16 +147,19 @@ class EnergyBalance:
         return old, held - stored.add_up(old)
 
     def _find_runaway(
-        self, old: EnergyState, new: EnergyState, moved: Complex, pairs: PairWork, at_hand: float
+        self, old: EnergyState, new: EnergyState, moved: Complex, pairs: PairWork, at_hand: float,
+        relieved: float = 0.0,
     ) -> Runaway | None:
-        """What was set free in the step, if growing loads do not explain it; at_hand: energy stored and supplied."""
+        """What was set free in the step, if growing loads do not explain it; at_hand: energy stored and supplied;
+        relieved: the size of the work of in-situ stress."""
         if not at_hand:
             return None
         released = float(pairs.surplus.sum())
         # Where nothing is stored and nothing is supplied, as in a stage without loads, it is rounding: as large as that
         # of what the tractions of the pairs store in their surroundings.
         borne = self._stored.pair_weight @ ((new.pairs.p_n**2 + new.pairs.p_s**2) / self.laws.own_stiffness)
-        least = max(LEAST_RELEASED * at_hand, ROUNDING * float(borne), self._measure_increments(old, new, moved))
+        by_loads = self._measure_increments(old, new, moved) + relieved
+        least = max(LEAST_RELEASED * at_hand, ROUNDING * float(borne), by_loads)
         if not released > least:
             return None
         names = self._mesh.interface_names
@@ -184,6 +190,13 @@ class EnergyBalance:
             work = np.abs(fallen * opened) + np.abs((new.pairs.p_s - old.pairs.p_s) * slid)
             total += float(self._stored.pair_weight @ np.where(self._stored.there.opening, work, 0.0))
         return 0.5 * total
+
+    def _relieve(self, old: EnergyState, new: EnergyState) -> float:
+        """Work, in the step from rest, of in-situ stress on faces that the pairs did not bear."""
+        weight, pairs = self._stored.facing, self._stored.pair_weight
+        on_faces = sum_work(weight, old.traction, new.displacement - old.displacement)
+        opened, slid = new.pairs.g_n - old.pairs.g_n, new.pairs.g_s - old.pairs.g_s
+        return 0.5 * (on_faces + float(pairs @ (old.pairs.p_n * opened + old.pairs.p_s * slid)))
 
     def _press(self, pressure: Real, moved: Complex) -> float:
         """What the fluid between different curves does as faces move besides what it does as pairs open; that on faces

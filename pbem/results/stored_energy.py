@@ -13,6 +13,7 @@ import numpy as np
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
 from pbem.contact.arrangement import Arrangement, find_arrangement
+from pbem.contact.at_rest import bear_in_situ
 from pbem.contact.laws import collect_laws
 from pbem.contact.loads import collect_outer_nodes, evaluate_ends, evaluate_load, evaluate_walls
 from pbem.mesh.mesh import Faces, Mesh, list_faces
@@ -116,7 +117,7 @@ class StoredEnergy:
         ]  # fmt: skip
         self._is_tool = np.array([each.rigid for each in model.regions])[self._faces.region]
         self._in_situ = self._sample_in_situ()
-        self._pairs_at_rest = record_pairs_at_rest(self.laws, self._mesh, self._in_situ[: self._mesh.nodes])
+        self._pairs_at_rest = record_pairs_at_rest(self.laws, *bear_in_situ(model, mesh)[:2])
 
     @property
     def pair_weight(self) -> Real:
@@ -133,6 +134,15 @@ class StoredEnergy:
     def tools(self) -> Real:
         """The weights of rigid tools alone."""
         return np.where(self._is_tool, self.weight, 0.0)
+
+    @property
+    def facing(self) -> Real:
+        """The weights of faces of interfaces, cracks and contacts, without those whose other side is gone."""
+        weight = np.array(self._elastic)
+        weight[self.outer.node] = 0.0
+        if self.there is not None:
+            weight[self.there.bare] = 0.0
+        return weight
 
     @property
     def _elastic(self) -> Real:

@@ -158,6 +158,33 @@ def test_release_of_in_situ_stress_in_a_finite_body() -> None:
     expect_energy(add_energies(model)[-1], lost, lost, 0.0, 1e-9)
 
 
+@pytest.mark.parametrize("law", [Law("bonded"), Law("bonded", normal_stiffness=1e3, tangential_stiffness=1e3)])
+@pytest.mark.parametrize(("stressed", "modulus"), [("one", 3e3), ("two", 2e3)])
+def test_in_situ_stress_of_one_block_is_relieved_at_the_joint(law: Law, stressed: str, modulus: float) -> None:
+    # The stressed block stretches by p/E, the other one has nothing to bear: stress out of balance at the joint works.
+    model = stack_blocks((Stage("wait", 1, {}, {}),), law, materials=COLUMN, top=UNHELD)
+    model = replace(model, initial_stress={stressed: LinearStress((0.0, -6.0, 0.0))})
+    lost = -0.5 * 6.0**2 / modulus * 2
+    expect_energy(add_energies(model)[-1], lost, lost, 0.0, 1e-9)
+
+
+def test_energies_do_not_depend_on_which_side_is_first() -> None:
+    # The upper block spreads under stress across, that the lower one does not have, and slides on it.
+    def relieve(first: str, second: str) -> Energy:
+        model = stack_blocks((Stage("press", 1, {"top": (0.0, -1e-3)}, {}),), Law("coulomb", 0.1))
+        regions = {each.name: each for each in model.regions}
+        model = replace(
+            model, regions=(regions[first], regions[second]), initial_stress={"hard": LinearStress((-6.0, -1.0, 0.0))},
+            interfaces={"joint": replace(model.interfaces["joint"], first=first, second=second)},
+        )  # fmt: skip
+        return add_energies(model)[-1]
+
+    energy = relieve("lower", "upper")
+    assert energy.dissipated > 1e-3 * abs(energy.elastic)
+    expect_energy(relieve("upper", "lower"), energy.external, energy.elastic, energy.dissipated, 1e-6)
+    assert abs(energy.external - energy.elastic - energy.dissipated) < 1e-6 * abs(energy.elastic)
+
+
 def test_excess_of_a_hole_far_stress() -> None:
     # A dilute array of holes has the compliance (1 + 3 c)/E': the excess of one is 3/2 of its area times S^2/E'.
     energy = add_energies(make_plane((2.0, 0.0, 0.0), hole=make_circle(1.5, 48)))[-1]
@@ -171,6 +198,14 @@ def test_excavation_of_a_hole() -> None:
     model = replace(make_plane((0.0, 0.0, 0.0), hole=make_circle(1.5, 48)), initial_stress=at_rest)
     change = 2.0 * math.pi * 1.5**2 * 2.0**2 / ROCK.plane_modulus
     expect_energy(add_energies(model)[-1], change, change, 0.0, 1e-6)
+
+
+def test_a_hole_filled_with_next_to_nothing_is_excavated() -> None:
+    filling = Material("foam", 1e-9 * ROCK.young, 0.2)
+    model = make_plane((0.0, 0.0, 0.0), hole=make_circle(1.5, 48), inclusion=filling)
+    change = 2.0 * math.pi * 1.5**2 * 2.0**2 / ROCK.plane_modulus
+    energy = add_energies(replace(model, initial_stress={"rock": LinearStress((2.0, 0.0, 0.0))}))[-1]
+    expect_energy(energy, change, change, 0.0, 1e-6)
 
 
 def test_a_filled_hole_is_no_excess() -> None:

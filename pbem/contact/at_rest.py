@@ -16,13 +16,16 @@ from pbem.model.model import Model
 SAME = 1e-6
 
 
-def bear_in_situ(model: Model, mesh: Mesh) -> tuple[Real, Real, Bool]:
-    """p_n, p_s (m,) of the pairs under the in-situ stress, and whether (m,) it is the same on both of their sides: of
-    sides that differ the mean."""
-    pairs = mesh.pairs
-    first, second = (_find_traction(model, mesh, mesh.node_region[each]) for each in (pairs.first, pairs.second))
+def bear_in_situ(model: Model, mesh: Mesh, gone: Bool | None = None) -> tuple[Real, Real, Bool]:
+    """p_n, p_s (m,) of the pairs under the in-situ stress, the mean of the sides whose region is not gone (r,), and
+    whether (m,) it is the same on both sides."""
+    regions = [mesh.node_region[each] for each in (mesh.pairs.first, mesh.pairs.second)]
+    first, second = (_find_traction(model, mesh, each) for each in regions)
     largest = float(np.abs(np.concatenate([first, second])).max(initial=0.0))
-    along = np.conj(pairs.normal) * 0.5 * (first + second)
+    borne = 0.5 * (first + second)
+    if gone is not None:
+        borne = np.where(gone[regions[0]], second, np.where(gone[regions[1]], first, borne))
+    along = np.conj(mesh.pairs.normal) * borne
     return along.real, along.imag, np.abs(first - second) <= SAME * largest
 
 

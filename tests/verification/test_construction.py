@@ -329,6 +329,28 @@ def test_the_gap_around_what_was_removed_is_no_jump(gap: float, tmp_path: Path) 
     assert errors.relative["jumps"][-1] == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.parametrize("stiffness", [{}, {"normal_stiffness": 1e4, "tangential_stiffness": 1e4}])
+@pytest.mark.parametrize("rock_first", [False, True])
+def test_what_is_removed_first_may_have_another_stress(
+    rock_first: bool, stiffness: dict[str, float], tmp_path: Path
+) -> None:
+    """The rock gives way in proportion to the part of its own stress that is released, whatever was in the hole."""
+    whole = pbem.run(make_tunnel([CUT]), tmp_path / "same.h5")
+    case = make_tunnel([CUT], interfaces={"wall": {"law": "bonded", **stiffness}})
+    case["materials"]["ore"] = {"young": 3 * YOUNG, "poisson": POISSON}
+    case["regions"]["core"]["material"] = "ore"
+    case["initial_stress"] = {"rock": IN_SITU["rock"], "ore": {"sxx": 2 * HORIZONTAL}}
+    if rock_first:
+        case["regions"] = dict(reversed(case["regions"].items()))
+    cut = pbem.run(case, tmp_path / "ore.h5")
+    expected, found = (each.displacement[:, find_own(each, "rock")] for each in (whole, cut))
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(found[0], 0.5 * found[1], atol=1e-9 * np.abs(expected).max())
+    energy = cut.energy
+    left = energy.external - energy.elastic - energy.removed
+    np.testing.assert_allclose(left, 0.0, atol=1e-6 * np.abs(energy.removed).max())
+
+
 @pytest.mark.parametrize("turn", [0.0, 30.0])
 @pytest.mark.parametrize("tractions_first", [False, True])
 def test_a_wall_whose_load_comes_to_be_along_other_axes(tractions_first: bool, turn: float, tmp_path: Path) -> None:

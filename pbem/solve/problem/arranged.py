@@ -8,6 +8,7 @@ import numpy as np
 
 from pbem.arrays import Real
 from pbem.contact.arrangement import begin_memory, find_arrangement
+from pbem.contact.at_rest import bear_in_situ
 from pbem.contact.closure import find_closure
 from pbem.contact.laws import Memory, start_memory
 from pbem.contact.loads import evaluate_load
@@ -22,11 +23,10 @@ from pbem.solve.problem.tangent import TangentOperator
 
 def describe_rest(problem: Problem) -> ContactState:
     """The pairs before any load: they bear the in-situ stress."""
-    pairs, laws = problem.mesh.pairs, problem.laws
+    laws = problem.laws
     memory = start_memory(laws)
-    known = evaluate_load(problem.model, problem.mesh, problem.outer, 0, 0.0).known[2 * problem.mesh.nodes :]
-    borne = (known[0::2] + 1j * known[1::2])[pairs.first]
-    p_n, p_s = (np.conj(pairs.normal) * borne).real, (np.conj(1j * pairs.normal) * borne).real
+    first = find_arrangement(problem.model, problem.mesh, problem.outer, 0)
+    p_n, p_s, _ = bear_in_situ(problem.model, problem.mesh, first.regions if first else None)
     return ContactState(memory.modes.mode, laws.gap, np.zeros(laws.count), p_n, p_s, memory.internal)
 
 

@@ -72,11 +72,13 @@ class Surroundings:
 
     legs: of all curves, one after the other; shapes: their geometry; regions: names of the curves of every region;
     blind: further pairs of legs (numbers) that do not see each other; cracks: names of the curves that are cracks;
+    last_bits: see Corner, by points;
     is_crack (legs,): whether a leg is one of these; is_mixed: whether some legs are and some are not.
     """
 
     def __init__(self, curves: Mapping[str, Curve], regions: Sequence[Sequence[str]],
-                 blind: Sequence[tuple[int, int]] = (), cracks: frozenset[str] = frozenset()) -> None:
+                 blind: Sequence[tuple[int, int]] = (), cracks: frozenset[str] = frozenset(),
+                 last_bits: Mapping[complex, float] | None = None) -> None:
         self.legs: list[Leg] = [leg for curve in curves.values() for leg in curve.legs]
         self.curve = [name for name, curve in curves.items() for _ in curve.legs]
         self.shapes = Elements.collect(self.legs)
@@ -92,7 +94,7 @@ class Surroundings:
         self.is_crack = np.array([name in cracks for name in self.curve], dtype=bool)
         self.is_mixed = bool(self.is_crack.any() and not self.is_crack.all())
         crack_legs = frozenset(np.flatnonzero(self.is_crack).tolist())
-        self.corners, met = _find_meetings(self.legs, self._members, crack_legs)
+        self.corners, met = _find_meetings(self.legs, self._members, crack_legs, last_bits or {})
         unseen = [min(pair) * len(self.legs) + max(pair) for pair in blind]
         self._unseen = np.union1d(met, np.array(unseen, dtype=np.int64))
 
@@ -158,7 +160,8 @@ class Corner:
     two legs `sides`; beside: further legs that end at the point, in corners that are no wedges; branching: whether
     three ends of cracks meet, and nothing else does; turning: whether two do, of a crack that does not go on smoothly
     and ends in a tip; bending: angle of the narrowest wedge between a crack and a face that bounds the region, or
-    infinity.
+    infinity; last_bit: length of the elements beside the point as a part of the shortest leg, where a crack ends on an
+    interface, or infinity.
     """
 
     point: complex
@@ -169,6 +172,7 @@ class Corner:
     branching: bool = False
     turning: bool = False
     bending: float = math.inf
+    last_bit: float = math.inf
 
 
 def _find_legs_of_tips(
@@ -184,10 +188,10 @@ def _find_legs_of_tips(
 
 
 def _find_meetings(
-    legs: Sequence[Leg], members: Sequence[Integer], cracks: frozenset[int]
+    legs: Sequence[Leg], members: Sequence[Integer], cracks: frozenset[int], last_bits: Mapping[complex, float]
 ) -> tuple[list[Corner], Integer]:
     """The corners, and codes of the pairs of legs that meet but enclose no wedge; members: legs of every region, as
-    legs of different regions do not see each other; cracks: legs of cracks."""
+    legs of different regions do not see each other; cracks: legs of cracks; last_bits: see Corner, by points."""
     regions: list[set[int]] = [set() for _ in legs]
     for region, own in enumerate(members):
         for number in own.tolist():
@@ -217,16 +221,18 @@ def _find_meetings(
         branching = len(ends) == 3 == len(widest) and of_cracks
         turning = len(ends) == 2 and len(widest) == 1 and of_cracks and widest[0][0] < math.pi - KINK
         turning = turning and ends[0][0] in of_tips
-        if found or branching or turning:
+        ending = point in last_bits
+        if found or branching or turning or ending:
             angle, one, other = min(found or widest)
-            every = branching or turning
+            every = branching or turning or ending
             beside = [
                 (leg, at_end) for leg, _, at_end in ends
                 if (leg, at_end) not in around and (every or any(regions[leg] & regions[at] for at, _ in around))
             ]
             bending = min((each for each, i, j in found if (i in cracks) != (j in cracks)), default=math.inf)
             corners.append(
-                Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning, bending))
+                Corner(point, tuple(around), angle, (one, other), tuple(beside), branching, turning, bending,
+                       last_bits.get(point, math.inf)))
     return corners, np.array(sorted(i * len(legs) + j for i, j in met - narrow), dtype=np.int64)
 
 

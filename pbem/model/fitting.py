@@ -14,6 +14,7 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.intersection import measure_distances
 from pbem.geometry.junction import format_point
 from pbem.geometry.tolerance import TIE
+from pbem.model.interface_ends import choose_last_bit, find_interface_ends, note_interface_ends
 from pbem.model.lengths import count_elements
 from pbem.model.model import Region
 from pbem.model.point_loads import PointLoad
@@ -62,12 +63,15 @@ def fit_curves(
     ]
     inside = [[load.place for load in loads if load.region == region.name and not load.on_boundary]
               for region in regions]
-    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, inside)
+    on_interfaces = find_interface_ends(curves, regions)
+    last_bits = {end.point: choose_last_bit(end.power) for end in on_interfaces}
+    sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, inside, last_bits)
     if sizes.excess is not None:
         return FittedCurves(curves, (), (), (_refuse(sizes.excess),))
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     graded, near = _grade_contacts(case, sizes.curves, contacts)
     notes = [*_note_added(curves, sizes.curves, any(inside)), *near, *_note_ties(ties), *_note_long(sizes.long),
+             *note_interface_ends(on_interfaces, kept, MOST_NAMED),
              *_note_slender(case, sizes.curves, regions), *_note_thin(case, sizes.curves, regions, bonded)]
     return FittedCurves(graded, ties, tuple(notes), ())
 

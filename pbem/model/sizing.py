@@ -67,18 +67,20 @@ def fit_lengths(
     kept: frozenset[str],
     order: int,
     loads: Sequence[Sequence[complex]] = (),
+    last_bits: Mapping[complex, float] | None = None,
 ) -> Sizes:
     """Divide the legs anew whose elements are longer than other faces, a crack tip or a point load allow.
 
     regions: curves of every region; loads: the places of point loads inside each of them; tips: per crack whether its
     start and its end have tip elements; kept: curves whose grading is the user's, which follow the rule beside tips
-    only; order: of the polynomials.
+    only; order: of the polynomials; last_bits: the shortest elements, as parts of legs, at points where cracks end on
+    interfaces.
     """
     every = [leg for curve in curves.values() for leg in curve.legs]
     slots = find_slots(every, [name for name, curve in curves.items() for _ in curve.legs], regions)
     surroundings = Surroundings(
         curves, [[side.curve for side in sides] for sides in regions], [(slot.first, slot.second) for slot in slots],
-        frozenset(side.curve for sides in regions for side in sides if side.forward is None),
+        frozenset(side.curve for sides in regions for side in sides if side.forward is None), last_bits,
     )
     wedges = find_wedges(surroundings, kept, order)
     inside = [(frozenset(side.curve for side in sides), np.array(places, dtype=complex))

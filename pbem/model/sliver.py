@@ -18,6 +18,9 @@ Nor do powers suffice where a crack turns sharply: the outer side of the corner 
 root the elements on both legs must follow, the less of it the shorter a leg (K of wings a tenth as long: 1 to 10 % at
 120 degrees with lengths at t^3). There lengths fall geometrically, too, and more slowly; where the grading is the
 user's, at corners that turn less as well, since nothing else is known of it.
+
+Where a crack ends on an interface with a softer material jumps vary with a still smaller power, and lengths fall
+geometrically to a last bit that follows from it (see pbem.model.interface_ends).
 """
 
 from __future__ import annotations
@@ -182,13 +185,16 @@ def find_wedges(
         lengths = [legs[number].length for number in numbers]
         sharp = SHARP_BESIDE_WING if order < 2 and min(lengths) < WING * max(lengths) else SHARP
         turning = turning and (given or math.pi - corner.angle >= sharp)
-        if not (branching or turning or corner.ends):
+        ending = math.isfinite(corner.last_bit) and asked >= LEAST_ASKED
+        if not (branching or turning or ending or corner.ends):
             continue
         corners.append(replace(corner, branching=branching, turning=turning))
         shortest = min(legs[number].length for number, _ in ends)
         bit = measure_last_bit(corner.angle, branching or turning) * shortest
         if turning and corner.angle < SHARPER:
             bit *= SHARPER_BIT
+        if ending:
+            bit = min(bit, corner.last_bit * min(lengths))
         bits.append(bit)
         if math.degrees(corner.angle) >= (TIED[-1] if turning else TIED[min(order, 2)]):
             continue

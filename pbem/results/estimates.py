@@ -15,7 +15,13 @@ from pbem.model.model import Model
 from pbem.results.absent import Absence
 from pbem.results.between import Violations
 from pbem.results.differences import measure_energy, subtract_displacements, sum_reactions, sum_sizes
-from pbem.results.rates import EndFinder, choose_force_divisor, choose_jump_divisors, list_force_shares
+from pbem.results.rates import (
+    EndFinder,
+    choose_force_divisor,
+    choose_jump_divisors,
+    list_factor_shares,
+    list_force_shares,
+)
 from pbem.results.tips import TipRules, collect_tip_rules
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState, Step
@@ -120,6 +126,7 @@ class Comparison:
             self._ends = EndFinder(mesh, beside)
             self._jump_divisor = choose_jump_divisors(model, beside, self._divisor)
             self._force_shares = list_force_shares(model, beside, self._divisor)
+            self._factor_shares = list_factor_shares(model, beside, self._divisor)
 
     @cached_property
     def _rules(self) -> TipRules:
@@ -187,15 +194,17 @@ class Comparison:
 
     def _subtract(self, step: Step, second: Step, beside: Beside, energy: Real) -> Estimates:
         """What the two solutions differ by, over the divisors (theory, 77)."""
-        by, of_forces = 1.0 / self._divisor, 1.0
+        by, of_forces, of_factors = 1.0 / self._divisor, 1.0, 1.0
         if self._divisor > 1:
-            of_forces = choose_force_divisor(energy.sum(axis=0) / self._modulus, self._force_shares, self._divisor)
+            square = energy.sum(axis=0) / self._modulus
+            of_forces = choose_force_divisor(square, self._force_shares, self._divisor)
+            of_factors = choose_force_divisor(square, self._factor_shares, self._divisor)
         forces = sum_reactions(self._model, self._mesh, step) - sum_reactions(beside.model, beside.mesh, second)
         forces = forces / of_forces
         opening, slip, traction_n, traction_s = self._subtract_pairs(step.contact, second.contact, beside)
         both = self._rules.evaluate_factors(step.contact), self._other_rules.evaluate_factors(second.contact)
         cracks = len(self._model.crack_tips)  # the two meshes need not see the same cracks along interfaces
-        factors = [by * np.abs(mine[:cracks] - other[:cracks]) for mine, other in zip(*both, strict=True)]
+        factors = [np.abs(mine[:cracks] - other[:cracks]) / of_factors for mine, other in zip(*both, strict=True)]
         moved = subtract_displacements(self._mesh, beside, step, second)
         least = self._bound_factors(step.contact, np.fmax(opening, slip))
         KI, KII = (np.maximum(each, least) for each in factors)
@@ -218,7 +227,7 @@ class Comparison:
 
     def _subtract_pairs(self, mine: ContactState, other: ContactState, beside: Beside) -> tuple[Real, Real, Real, Real]:
         """Per interface (i,): estimated errors, of opening and slip the largest, of the tractions the mean ones."""
-        opening, slip = (self._subtract_jumps(name, mine, other, beside) / self._jump_divisor for name in JUMPS)
+        opening, slip = (self._divide_jumps(name, mine, other, beside) for name in JUMPS)
         normal, tangential = self._subtract_tractions(mine, other, beside)
         weight = beside.mesh.pairs.weight
         of = dict(self._others)
@@ -233,6 +242,18 @@ class Comparison:
             found.append([*largest, *mean] if len(pairs) and seen else [np.nan] * 4)
         table = np.array(found).reshape(-1, 4)
         return table[:, 0], table[:, 1], table[:, 2], table[:, 3]
+
+    def _divide_jumps(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
+        """Estimated errors at the pairs of the second solution.
+
+        Where displacements follow a power near zero differences are divided by next to nothing, but jumps that are to
+        vanish at a crack's end are off by no more than what they are.
+        """
+        differences = self._subtract_jumps(name, mine, other, beside)
+        errors = differences / self._jump_divisor
+        most = np.abs(getattr(other, name) - (self._other_gap if name == "opening" else 0.0))
+        most = np.maximum(most, np.abs(differences))
+        return np.asarray(np.where(self._jump_divisor < 1, np.clip(errors, -most, most), errors))
 
     def _subtract_jumps(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
         """Differences at the pairs of the second solution; zero where the run has none."""
@@ -264,7 +285,7 @@ class Comparison:
         own, of = np.unique(pairs.slave // (beside.mesh.order + 1), return_inverse=True)
         if self.scales.jumps > ROUNDING * self.scales.displacement:
             for name in JUMPS:
-                errors = self._subtract_jumps(name, mine, other, beside) / (self._jump_divisor * self.scales.jumps)
+                errors = self._divide_jumps(name, mine, other, beside) / self.scales.jumps
                 mean = np.bincount(of, errors, len(own)) / np.bincount(of, minlength=len(own))
                 errors = errors - np.where(beside.mesh.tip[own] > 0, 0.0, mean)[of]
                 np.maximum.at(result, element, np.abs(errors))

@@ -15,6 +15,7 @@ from pbem.arrays import Bool, Integer, Real
 from pbem.contact.laws import SLIP
 from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
+from pbem.model.interface_ends import find_interface_ends
 from pbem.model.model import Model
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState
@@ -30,6 +31,9 @@ TIP, AT_TIP = 4.0, 2
 # same problems 1.5 to 2.5, but less where a crack turns sharply: see `find_corner_power`. Legs that turn by more
 # (radians) have a corner.
 CORNER, TURN = 2.0, 0.1
+# Displacements follow less than this power beside a crack that ends on an interface with a softer material: the errors
+# of forces and factors, too, fall with twice this power of the length of the element there.
+WEAK = 0.5
 # Forces err with the power 2 lambda of the length of the element next to a corner, near which the displacement follows
 # the power lambda of the distance: 0.545 in a re-entrant right angle, 0.6 to 0.8 between a side that is held and a free
 # one, or where two materials meet a side.
@@ -113,7 +117,7 @@ def choose_force_divisor(square: Real, shares: Real | None, smooth: float) -> fl
     """What differences of forces are to be divided by (theory, 126).
 
     square (e,): of the difference, on the elements of the run's mesh, as its energy over the modulus. shares: of
-    `list_force_shares`. smooth: away from corners.
+    `list_force_shares` or `list_factor_shares`. smooth: away from corners.
     """
     total = float(square.sum())
     return smooth if shares is None or not total > 0 else float(total / (square @ shares))
@@ -124,15 +128,29 @@ def list_force_shares(model: Model, beside: Beside, smooth: float) -> Real | Non
     `model`; None where nothing tells of corners. At them it falls by r^FORCE_RATE where the second solution's elements
     are r times as long. smooth: what it is divided by elsewhere.
     """
+    return _list_shares(model, beside, smooth, math.inf)
+
+
+def list_factor_shares(model: Model, beside: Beside, smooth: float) -> Real | None:
+    """The same for factors, of which only ends of cracks on interfaces with a softer material tell; None without."""
+    if all(end.power >= WEAK for end in list_corner_ends(model)):
+        return None
+    return _list_shares(model, beside, smooth, WEAK)
+
+
+def _list_shares(model: Model, beside: Beside, smooth: float, below: float) -> Real | None:
+    """below: corners with this power or more are as anything else."""
     if beside.kind != "merged":
         return None
     fine = (beside.carry.nearest // (beside.fine.order + 1)).reshape(beside.mesh.elements, -1)
     at_corner = _list_merged_ends(model, beside.model)
     by = np.full(beside.fine.elements, 1 / smooth)
     for name, own in list_curve_elements(beside.model, beside.mesh):
-        for element, ratio, _ in at_corner.get(name, ()):
-            at = fine[own[element]]
-            by[at] = np.maximum(by[at], 1 / (ratio**FORCE_RATE - 1))
+        for element, ratio, power in at_corner.get(name, ()):
+            if power < below or math.isinf(below):
+                at = fine[own[element]]
+                rate = 2 * power if power < WEAK else FORCE_RATE
+                by[at] = np.maximum(by[at], 1 / (ratio**rate - 1))
     return np.asarray(by)
 
 
@@ -172,12 +190,13 @@ def list_corner_ends(model: Model) -> list[LegEnd]:
             meeting.setdefault(leg.end, []).append((last, -leg.tangent(True)))
             number += leg.elements
     found: list[LegEnd] = []
-    for ends in meeting.values():
+    on_interfaces = {end.point: end.power for end in find_interface_ends(model.curves, model.regions)}
+    for point, ends in meeting.items():
         if len(ends) == 2:
             turn = abs(cmath.phase(-ends[0][1] / ends[1][1]))
             found += [replace(end, power=find_corner_power(turn)) for end, _ in ends if turn >= TURN]
         elif len(ends) > 2:  # the tip of a crack meets nothing
-            found += [end for end, _ in ends]
+            found += [replace(end, power=on_interfaces.get(point, math.inf)) for end, _ in ends]
     return found
 
 

@@ -1,8 +1,8 @@
 """Cracks that end on an interface: the power of the distance that the displacement follows there.
 
 Where the crack's material is the stiffer one, the power is below the 1/2 of a crack tip: 0.37 for a crack at a right
-angle to a material of 0.3 of its modulus, 0.25 at a tenth, 0.09 at a hundredth. Errors fall with twice this power of the
-length of the last element, whatever the order, so that lengths have to fall geometrically, and far.
+angle to a material of 0.3 of its modulus, 0.25 at a tenth, 0.09 at a hundredth. Errors fall with twice this power of
+the length of the last element, whatever the order, so that lengths have to fall geometrically, and far.
 """
 
 from __future__ import annotations

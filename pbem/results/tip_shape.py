@@ -32,6 +32,9 @@ ON_ELEMENT = 10
 MOST_DEGREE = 5
 # A straight crack turns by less than this (radians), and leaves its line by less than this part of its length.
 STRAIGHT = 1e-6
+# Stress along a crack is smooth up to where the crack turns by more (radians), or changes its curvature by more per
+# distance from the tip.
+BENT = 1e-2
 
 
 class TipForms:
@@ -217,8 +220,9 @@ class _Near:
         (theory, 70)
         """
         lateral = (3 - self.shape.kappa) / (1 + self.shape.kappa)
-        length = self.elements.arc_lengths(self.shape.local).ravel()
-        weight = np.sqrt(np.repeat(self.elements.lengths, len(self.shape.local)))
+        smooth = self._count_smooth()
+        length = self.elements.arc_lengths(self.shape.local)[:smooth].ravel()
+        weight = np.sqrt(np.repeat(self.elements.lengths[:smooth], len(self.shape.local)))
         reach = length.max()
         degree = min(MOST_DEGREE, (2 * len(length) + 1) // 3)
 
@@ -226,12 +230,24 @@ class _Near:
             powers = (length[:, None] / reach) ** np.arange(min(degree, len(length) - 1) + 1)
             return np.asarray(np.linalg.pinv(weight[:, None] * powers) * weight)
 
-        value = fit(degree - 1)[0]
-        slope = fit(degree)[1] / reach if len(length) > 1 else np.zeros(1)
+        value, slope = np.zeros((2, len(self.tangent)))
+        value[:len(length)] = fit(degree - 1)[0]
+        if len(length) > 1:
+            slope[:len(length)] = fit(degree)[1] / reach
         a = self.tangent[:, None]
         normal, stretched = (np.conj(1j * a) * self.on_faces).real, (np.conj(a) * self.across).real
         parallel = value @ (stretched - lateral * normal) + (slope @ self.mean).real
         return parallel, -slope + 0j, lateral * value
+
+    def _count_smooth(self) -> int:
+        """How many elements lead away from the tip before the crack turns, or its curvature jumps: what the jumps make
+        of stress along the crack grows like a logarithm there."""
+        elements, ends = self.elements, np.array([-1.0, 1.0])
+        leaves, arrives = elements.directions()
+        curvature = elements.curvature(ends)
+        turned = np.abs(np.angle(leaves[1:] / arrives[:-1])) > BENT
+        bent = np.abs(curvature[1:, 0] - curvature[:-1, 1]) * np.abs(elements.end[:-1]) > BENT
+        return int(np.argmax(np.append(turned | bent, True))) + 1
 
     def _divide_faces(self, by_length: bool = True) -> tuple[Real, Real]:
         """Coordinates s (e, q) on the elements within the circle, crowded at the tip, and weights of the length."""

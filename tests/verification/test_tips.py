@@ -97,6 +97,24 @@ def test_parallel_stress_of_an_edge_crack() -> None:
     np.testing.assert_allclose(found["J"][0, 1], found["KI"][0, 1] ** 2 / PLANE_MODULUS, rtol=1e-4)
 
 
+@pytest.mark.parametrize(("order", "elements"), [(1, 4), (2, 4), (2, 8), (3, 8)])
+@pytest.mark.parametrize("turn", [1.0, 0.6 - 0.8j])
+def test_parallel_stress_beyond_which_the_curvature_jumps(order: int, elements: int, turn: complex) -> None:
+    # A line, an arc and a line go on in each other: as on a mesh that has the arc far outside of the tips' circles.
+    bend = cmath.exp(1j * math.radians(20))
+
+    def find(order: int, elements: int, turn: complex) -> NDArray[np.float64]:
+        legs = [make_straight(turn * (-2 - 1j), turn * -1j, elements),
+                make_arc(turn * -1j, math.radians(110), elements),
+                make_straight(turn * bend, turn * bend * (1 + 0.8j), elements)]
+        legs[0], legs[2] = replace(legs[0], end=legs[1].start), replace(legs[2], start=legs[1].end)
+        mean, deviator = 0.75, 0.25 * turn**2
+        remote = (mean - deviator.real, mean + deviator.real, -deviator.imag)
+        return find_values(make_plane(remote, {"crack": legs}, order=order))["T"][0]
+
+    np.testing.assert_allclose(find(order, elements, turn), find(3, 40, 1.0), rtol=0.02)
+
+
 @pytest.mark.parametrize("seed", range(24))
 def test_griffith_crack_cut_and_graded_anyhow(seed: int) -> None:
     way = make_griffith(seed)

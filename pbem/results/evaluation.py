@@ -24,7 +24,7 @@ from pbem.results.contents import Elements, Nodes, Steps
 from pbem.results.opening import open_quietly
 from pbem.results.rebuilt import RebuiltRun, find_opposite_faces, rebuild_run
 from pbem.results.resampling import Resampling, resample
-from pbem.results.whereabouts import Whereabouts, find_points
+from pbem.results.whereabouts import ROUNDINGS, Whereabouts, find_points
 from pbem.solve.problem.particular_solutions import evaluate_particular_solutions
 
 Side = Literal["first", "second"]
@@ -34,6 +34,8 @@ DIRECT = 1_000_000
 TOLERANCE = 1e-6
 # Squares of distances to points beyond would be no numbers any more.
 FARTHEST = 1e100
+# A point is on a tip up to this part of the element there.
+NEAR_TIP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ class Evaluator:
         where.region[~finite], where.face[~finite] = -1, -1
         location = Location(where.region, where.face, where.s)
         field = self._place(own, location)
-        at_tip = _find_tips(own, tips - model.origin, where, run)
+        at_tip = _find_tips(reach, tips - model.origin, where, run)
         displacement, stress = np.empty((len(steps), len(own), 2)), np.empty((len(steps), len(own), 3))
         for k, values in enumerate(self._evaluate_steps(own, where, field, steps)):
             displacement[k] = np.stack([values.displacement.real, values.displacement.imag], axis=1)
@@ -241,13 +243,15 @@ def evaluate_face_limits(
     return Values(moved, stress)
 
 
-def _find_tips(points: Complex, tips: Complex, where: Whereabouts, run: RebuiltRun) -> Bool:
-    """Which points (q,) lie on a tip."""
-    on = np.flatnonzero((where.face >= 0) & (np.abs(where.s) == 1) & ~where.at_end)
-    at_tip = np.zeros(len(points), dtype=bool)
+def _find_tips(reach: Real, tips: Complex, where: Whereabouts, run: RebuiltRun) -> Bool:
+    """Which points (q,) lie on a tip; reach (q,): see `find_points`."""
+    # Beside the end of their element: what is written with finitely many digits need not lie on it.
+    beside = np.maximum(2 * NEAR_TIP, ROUNDINGS * np.finfo(float).eps * reach / (0.5 * run.faces.lengths[where.face]))
+    on = np.flatnonzero((where.face >= 0) & (1 - np.abs(where.s) <= beside) & ~where.at_end)
+    at_tip = np.zeros(len(reach), dtype=bool)
     if len(on) and len(tips):
         face = where.face[on]
         ends = np.where(where.s[on] < 0, run.faces.start[face], run.faces.end[face])
         distance = np.abs(ends[:, None] - tips).min(axis=1)
-        at_tip[on] = distance <= 1e-6 * run.faces.lengths[face]
+        at_tip[on] = distance <= NEAR_TIP * run.faces.lengths[face]
     return at_tip

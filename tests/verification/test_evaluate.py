@@ -208,6 +208,26 @@ def test_stress_at_a_tip_is_unknown_in_the_file_as_after_the_run(tmp_path: Path)
     np.testing.assert_allclose(stored.displacement[-1], after.displacement[-1], rtol=2e-3)
 
 
+@pytest.mark.parametrize("shift", [0j, 466023.1 + 6691590.7j])
+def test_stress_at_tips_of_any_direction_is_unknown(shift: complex, tmp_path: Path) -> None:
+    # Ends that are no round numbers in the coordinates of their elements.
+    ends = np.array([0.7 * np.exp(1j * k) for k in range(24)]) + 4 * np.arange(24) + shift
+    starts = ends - 1.3 * np.exp(1j * np.arange(24))
+    cracks = {f"c{k}": {"points": [[a.real, a.imag], [b.real, b.imag]], "elements": 4}
+              for k, (a, b) in enumerate(zip(starts, ends, strict=True))}
+    points = [point for crack in cracks.values() for point in crack["points"]]
+    case: dict[str, Any] = {
+        "materials": {"rock": {"young": 1e3, "poisson": 0.2}}, "curves": cracks,
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": list(cracks)}},
+        "remote": {"syy": 1.0, "sxx": 1.0}, "analysis": {"steps": 1}, "output": {"points": points},
+    }  # fmt: skip
+    results = pbem.run(case, tmp_path / "tips.h5")
+    assert results.interior is not None
+    assert np.isnan(results.interior.stress[-1]).all() and np.isfinite(results.interior.displacement[-1]).all()
+    assert np.isnan(results.evaluate(points).stress[-1]).all()
+    assert np.isfinite(results.evaluate(np.array(points)[::2] + 0.01).stress[-1]).all()
+
+
 def test_fields_beside_short_elements_on_maps(tmp_path: Path) -> None:
     """Cracks that cross at 4 degrees, with elements of 7e-6, where coordinates are rounded by 1e-7."""
     points = np.array([[0.31, 0.4], [-0.7, -0.2], [0.02, 0.3]])

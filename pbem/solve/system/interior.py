@@ -114,7 +114,8 @@ def _find_tips(model: Model, mesh: Mesh, points: Complex, location: Location) ->
         if is_tip
     ], dtype=complex)
     found = np.zeros(len(points), dtype=bool)
-    on = np.flatnonzero((location.element >= 0) & (np.abs(location.s) == 1))
+    # Beside the end of its element: what is written with finitely many digits need not lie on it.
+    on = np.flatnonzero((location.element >= 0) & (1 - np.abs(location.s) <= 2 * NEAR_TIP))
     if len(on) and len(tips):
         element = location.element[on]
         length = np.abs(mesh.end[element] - mesh.start[element])

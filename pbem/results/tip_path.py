@@ -49,15 +49,19 @@ class _Chain:
     ends_in_tip: bool
 
 
-def trace_paths(mesh: Mesh, element: Integer, end: Integer, most_whole: int) -> list[TipPaths]:
+def trace_paths(
+    mesh: Mesh, element: Integer, end: Integer, most_whole: int, loads: Complex | None = None
+) -> list[TipPaths]:
     """Paths of tips at the given ends (0 start, 1 end) of crack elements (k,).
 
-    A crack of more than most_whole elements is not followed to its other tip.
+    A crack of more than most_whole elements is not followed to its other tip. loads: places of point loads, which the
+    circles keep away from as from anything else.
     """
     chains = _follow(mesh, element, end, most_whole)
     point = np.where(end == 0, mesh.start[element], mesh.end[element])
     count = np.array([len(chain.elements) for chain in chains])
-    return [_trace_alike(mesh, tips, point[tips], [chains[tip] for tip in tips])
+    loads = np.zeros(0, dtype=complex) if loads is None else loads
+    return [_trace_alike(mesh, tips, point[tips], [chains[tip] for tip in tips], loads)
             for tips in (np.flatnonzero(count == length) for length in np.unique(count))]
 
 
@@ -66,7 +70,7 @@ def view_outward(mesh: Mesh, elements: Integer, outward: Bool) -> Elements:
     return mesh.geometry.select(elements).turn_back(~outward)
 
 
-def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain]) -> TipPaths:
+def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain], loads: Complex) -> TipPaths:
     elements = np.array([chain.elements for chain in chains])
     outward = np.array([chain.outward for chain in chains])
     whole = np.array([chain.ends_in_tip for chain in chains])
@@ -75,6 +79,8 @@ def _trace_alike(mesh: Mesh, tip: Integer, point: Complex, chains: list[_Chain])
     inside, along = _reach_along(start, end, seen.directions(), whole)
     own = np.repeat(np.arange(len(tip)), inside), elements[np.arange(elements.shape[1]) < inside[:, None]]
     clearance = measure_clearance(mesh, point, along, *own)
+    if len(loads):
+        clearance = np.minimum(clearance, np.abs(point[:, None] - loads).min(axis=1))
     middle = np.abs(seen.move(point[:, None], np.array(1.0)).sample(np.zeros(1))[..., 0])
     limit = np.minimum(along, REACH * clearance)
     fits = middle <= limit[:, None] * (1 + 1e-9)

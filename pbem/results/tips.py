@@ -170,7 +170,8 @@ def collect_tip_rules(model: Model, mesh: Mesh) -> TipRules:
     pair_of = np.full(mesh.nodes, -1)
     pair_of[mesh.pairs.first[mesh.pairs.crack]] = np.flatnonzero(mesh.pairs.crack)
     groups: list[_Alike] = []
-    for paths in trace_paths(mesh, element, number % 2, MOST_WHOLE):
+    loads = np.array([load.place for load in model.point_loads.values()], dtype=complex)
+    for paths in trace_paths(mesh, element, number % 2, MOST_WHOLE, loads):
         groups += _gather_alike(model, mesh, paths, number, pair_of)
     return TipRules(cracks, is_tip, gap, model, mesh, tuple(groups), interfaces)
 

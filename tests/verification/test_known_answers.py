@@ -204,3 +204,36 @@ def test_point_loads_that_add_elements_are_named() -> None:
 
 def describe_model_notes(tables: Tables) -> tuple[str, ...]:
     return build_model(pbem.Case(**tables)).notes
+
+
+def kelvin_stress(at: complex, load: complex, force: complex, poisson: float) -> np.ndarray:
+    """Stress (2, 2) at a point, of a force at another one of an infinite plane (plane strain)."""
+    r = at - load
+    e, f = np.array([r.real, r.imag]) / abs(r), np.array([force.real, force.imag])
+    along = e @ f
+    turned = np.outer(f, e) + np.outer(e, f) - along * np.eye(2)
+    return -((1 - 2 * poisson) * turned + 2 * along * np.outer(e, e)) / (4 * math.pi * (1 - poisson) * abs(r))
+
+
+@pytest.mark.parametrize(("order", "error"), [(2, 0.06), (3, 0.03)])
+@pytest.mark.parametrize("distance", [0.4, 0.1, 0.02])
+def test_the_parallel_stress_beside_point_loads(distance: float, order: int, error: float, tmp_path: Path) -> None:
+    """Of a straight crack that is open T is what the stresses along and across it differ by without the crack: what
+    relieves its faces has equal ones on its line, to the left and right of which it is symmetrical or nothing."""
+    turn, unit, poisson = np.exp(0.7j), 25.4, 0.25
+    tip, far = unit * turn, unit * turn * (0.2 + 0.6j)
+    load, force = tip + unit * distance * np.exp(1.9j), 0.2 * distance * unit * (0.6 - 0.8j)
+    results = pbem.run({
+        "materials": {"m": {"young": 1e3, "poisson": poisson}},
+        "curves": {"c": {"points": [[-tip.real, -tip.imag], [tip.real, tip.imag]], "elements": 8}},
+        "regions": {"p": {"material": "m", "infinite": True, "cracks": ["c"]}},
+        "interfaces": {"c": {"law": "open"}},
+        "remote": {"sxx": 1.0, "syy": 1.0},
+        "point_loads": {name: {"at": [z.real, z.imag], "fx": f.real, "fy": f.imag}
+                        for name, z, f in (("near", load, force), ("far", far, -force))},
+        "analysis": {"steps": 1, "order": order},
+    }, tmp_path / "loads.h5")  # fmt: skip
+    stress = kelvin_stress(tip, load, force, poisson) + kelvin_stress(tip, far, -force, poisson)
+    along, across = (np.array([z.real, z.imag]) for z in (turn, 1j * turn))
+    exact = along @ stress @ along - across @ stress @ across
+    assert results.tips["c"].T[-1, 1] == pytest.approx(exact, abs=error * np.abs(stress).max())

@@ -43,6 +43,8 @@ LEAST_BIT, MOST_BIT = 5e-5, 1e-2
 # Most of it where a crack branches off another, in a wedge or in none, and the least number of elements from there to
 # the other end, or to the middle of a leg that is refined at both ends, in the mean of the three legs.
 BRANCH_BIT, LEAST_ASKED = 6e-5, 5
+# The same number where a crack ends on an interface with a softer material: K is off by more there.
+LEAST_AT_INTERFACE = 3
 # The least turn (radians) of a crack in a corner towards which lengths fall geometrically, where the grading is chosen
 # (less: powers do); the least number of elements of a leg, in the mean of both, from the corner on.
 SHARP, LEAST_AT_TURN = math.radians(60.0) * (1 - TIE), 4
@@ -185,7 +187,7 @@ def find_wedges(
         lengths = [legs[number].length for number in numbers]
         sharp = SHARP_BESIDE_WING if order < 2 and min(lengths) < WING * max(lengths) else SHARP
         turning = turning and (given or math.pi - corner.angle >= sharp)
-        ending = math.isfinite(corner.last_bit) and asked >= LEAST_ASKED
+        ending = math.isfinite(corner.last_bit) and asked >= LEAST_AT_INTERFACE
         if not (branching or turning or ending or corner.ends):
             continue
         corners.append(replace(corner, branching=branching, turning=turning))

@@ -114,3 +114,33 @@ def test_the_estimate_where_lengths_are_the_users(softer: float, tmp_path_factor
 def test_ends_for_which_no_mesh_is_fine_enough_are_told(softer: float, told: bool) -> None:
     notes = build_model(pbem.Case(**make_plate(softer))).notes
     assert any("'crack'" in note and "much softer material" in note for note in notes) == told
+
+
+def make_layers(elements: int, order: int) -> Tables:
+    """A stiff layer between softer ones, stretched; one crack parts it, another one beside it ends within it."""
+    curves: Tables = {"base": [(-6, -4), (6, -4)], "top": [(6, 4), (-6, 4)]}
+    for number, (low, high) in enumerate(((-4, -0.5), (-0.5, 0.5), (0.5, 4))):
+        curves |= {f"right{number}": [(6, low), (6, high)], f"left{number}": [(-6, high), (-6, low)]}
+    for number, y in enumerate((-0.5, 0.5)):
+        curves |= {f"bond{number}l": [(-6, y), (0, y)], f"bond{number}r": [(0, y), (6, y)]}
+    curves |= {"through": [(0, -0.5), (0, 0.5)], "inside": [(1.5, -0.3), (1.5, 0.3)]}
+    bonds = [["bond0l", "bond0r"], ["bond1l", "bond1r"]]
+    return {
+        "materials": {"stiff": {"young": 1e3, "poisson": 0.25}, "soft": {"young": 50.0, "poisson": 0.3}},
+        "curves": {name: {"points": points, "elements": elements} for name, points in curves.items()},
+        "regions": {
+            "below": {"material": "soft", "boundary": ["base", "right0", *bonds[0], "left0"]},
+            "layer": {"material": "stiff", "boundary": [*bonds[0], "right1", *bonds[1], "left1"],
+                      "cracks": ["through", "inside"]},
+            "above": {"material": "soft", "boundary": [*bonds[1], "right2", "top", "left2"]},
+        },
+        "boundary": {f"{side}{number}": {"ux": 0.01 if side == "right" else -0.01, "ty": 0.0}
+                     for side in ("left", "right") for number in range(3)},
+        "analysis": {"steps": 1, "order": order},
+    }  # fmt: skip
+
+
+def test_a_crack_that_parts_a_stiff_layer_shields_another_one(tmp_path: Path) -> None:
+    coarse, fine = (pbem.run(make_layers(*each), tmp_path / f"{each[0]}.h5").tips["inside"].KI[-1]
+                    for each in ((8, 2), (20, 3)))
+    np.testing.assert_allclose(coarse, fine, rtol=1.5e-2)

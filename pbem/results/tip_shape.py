@@ -50,6 +50,7 @@ class TipForms:
 
     def __init__(self, shape: TipShape) -> None:
         self._shape = shape
+        self._limited: dict[int, tuple[Real, Complex, Real]] = {}
 
     @cached_property
     def intensity(self) -> Real:
@@ -81,6 +82,15 @@ class TipForms:
             vars(self)["intensity"] = whole.integrate_intensity()  # from the same field
         near = whole if shape.near == shape.elements.count else _Near(shape, shape.near)
         return near.integrate_release(), *whole.fit_parallel_stress()
+
+    def limit_parallel(self, most: int) -> tuple[Real, Complex, Real]:
+        """parallel, of_mean and of_normal if the stress along the crack is smooth on so many elements from the tip."""
+        if most > self._shape.cut:
+            return self.parallel, self.of_mean, self.of_normal
+        if most not in self._limited:
+            whole = _Near(self._shape, self._shape.elements.count)
+            self._limited[most] = whole.fit_parallel_stress(most)
+        return self._limited[most]
 
     def derive(self) -> None:
         """Derive all of them now, which takes less than one after the other."""
@@ -211,16 +221,16 @@ class _Near:
         form -= _multiply(values[2::2] - values[1:-1:2], 0.5 * (at_ends[2::2] + at_ends[1:-1:2]))
         return -form  # the jump is that of the upper against the lower face
 
-    def fit_parallel_stress(self) -> tuple[Real, Complex, Real]:
+    def fit_parallel_stress(self, most: int | None = None) -> tuple[Real, Complex, Real]:
         """The T-stress, the normal stress along the crack that stays finite at the tip: TipForms.parallel, of_mean,
         of_normal.
 
         Hooke's law gives it from the stretch of the faces in the mean, in which the square-root terms cancel. The near
         part of it is taken from the stress that the jumps make; the rest is smooth and continued to the tip.
-        (theory, 70)
+        most: elements that are used, at most. (theory, 70)
         """
         lateral = (3 - self.shape.kappa) / (1 + self.shape.kappa)
-        smooth = self._count_smooth()
+        smooth = self._count_smooth() if most is None else min(most, self._count_smooth())
         length = self.elements.arc_lengths(self.shape.local)[:smooth].ravel()
         weight = np.sqrt(np.repeat(self.elements.lengths[:smooth], len(self.shape.local)))
         reach = length.max()

@@ -8,10 +8,11 @@ import numpy as np
 
 from pbem.arrays import Bool, Complex, Integer, Real
 from pbem.bem.particular_solution import ParticularSolution
-from pbem.contact.laws import collect_laws
+from pbem.contact.laws import OPEN, collect_laws
 from pbem.geometry.elements import Elements
 from pbem.mesh.interpolation import split_faces
 from pbem.mesh.mesh import Mesh, sort_pairs
+from pbem.mesh.shape_functions import interpolate_shapes
 from pbem.model.material import Material
 from pbem.model.model import Model
 from pbem.results.interface_release import InterfaceRelease, prepare_interface_release
@@ -24,6 +25,8 @@ from pbem.solve.problem.step import ContactState, Step
 
 # A straight crack of more elements is not taken as a whole.
 MOST_WHOLE = 100
+# The pressure on open faces jumps between two elements where it differs by more than this part of the largest.
+UNEVEN = 0.1
 # Cracks whose elements are the same to this part of their lengths share their forms.
 ALIKE = 1e-9
 
@@ -123,15 +126,31 @@ class TipRules:
             near = group.pair[:, : len(forms.of_normal)]
             moved = mean[near] * np.conj(group.direction)[:, None]
             # A motion as a whole has no part in it.
-            moved = (moved - moved.mean(axis=1)[:, None]) @ forms.of_mean
-            value = modulus / group.length * (jumps @ forms.parallel + moved.real)
-            value += step.contact.traction_n[near] @ forms.of_normal
+            moved = moved - moved.mean(axis=1)[:, None]
+            value, even = np.zeros(len(near)), self._count_even(step.contact, near)
+            for count in np.unique(even).tolist():
+                own = even == count
+                parallel, of_mean, of_normal = forms.limit_parallel(count)
+                value[own] = modulus / group.length[own] * (jumps[own] @ parallel + (moved[own] @ of_mean).real)
+                value[own] += step.contact.traction_n[near[own]] @ of_normal
             value -= modulus * np.array([
                 particulars[region][0].swelling.strain_along(at[None], along[None])[0]
                 for region, at, along in zip(group.region, group.place, group.direction, strict=True)
             ])
             T[group.tip] = value + self._evaluate_initial(group, [balanced for balanced, _ in particulars])
         return T.reshape(-1, 2)
+
+    def _count_even(self, contact: ContactState, near: Integer) -> Integer:
+        """On how many elements (k,) from tips on, with the pairs near (k, m (p + 1)), the pressure on open faces does
+        not jump: the stress along the crack jumps with it."""
+        per_element = self.mesh.order + 1
+        pressure = contact.traction_n[near].reshape(len(near), -1, per_element)
+        is_open = (contact.mode[near] == OPEN).reshape(pressure.shape).all(axis=2)
+        at_ends = np.array([[-1.0], [1.0]]) ** np.arange(per_element) @ interpolate_shapes(self.mesh.crack_local)
+        step = np.abs(pressure[:, :-1] @ at_ends[1] - pressure[:, 1:] @ at_ends[0])
+        largest = np.abs(pressure).max(axis=(1, 2))
+        jumps = (step > UNEVEN * largest[:, None]) & is_open[:, :-1] & is_open[:, 1:]
+        return np.asarray(np.argmax(np.column_stack([jumps, np.ones(len(near), dtype=bool)]), axis=1) + 1)
 
     def _start(self) -> Real:
         return np.where(self.is_tip, 0.0, np.nan)

@@ -237,3 +237,26 @@ def test_the_parallel_stress_beside_point_loads(distance: float, order: int, err
     along, across = (np.array([z.real, z.imag]) for z in (turn, 1j * turn))
     exact = along @ stress @ along - across @ stress @ across
     assert results.tips["c"].T[-1, 1] == pytest.approx(exact, abs=error * np.abs(stress).max())
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("wetted", [0.3, 0.8, 0.97])
+def test_the_parallel_stress_where_fluid_lags_behind_the_tips(wetted: float, order: int, tmp_path: Path) -> None:
+    """T is what the stresses along and across the crack differ by, less the pressure at the tip, which is none: KI by
+    Tada, Paris and Irwin for a pressure on the middle part."""
+    ends = (1 - wetted, 1 - wetted + 1e-9, 1 + wetted, 1 + wetted + 1e-9)
+    pressure = {"table": [[0, 0], *([s, p] for s, p in zip(ends, (0, 3.0, 3.0, 0), strict=True))]}
+    turn = np.exp(2.1j)
+    stress = 0.35 + 0.15 * np.array([-1, 1]) * (turn**2).real
+    results = pbem.run({
+        "materials": {"m": {"young": 1e3, "poisson": 0.25}},
+        "curves": {"c": {"points": [[-turn.real, -turn.imag], [turn.real, turn.imag]], "elements": 8}},
+        "regions": {"p": {"material": "m", "infinite": True, "cracks": ["c"]}},
+        "interfaces": {"c": {"law": "open", "pressure": pressure}},
+        "remote": {"sxx": stress[0], "syy": stress[1], "sxy": -0.15 * (turn**2).imag},
+        "analysis": {"steps": 1, "order": order},
+    }, tmp_path / "lag.h5")  # fmt: skip
+    tips = results.tips["c"]
+    KI = 0.5 * math.sqrt(math.pi) + 6 / math.sqrt(math.pi) * math.asin(wetted)
+    np.testing.assert_allclose(tips.KI[-1], KI, rtol=1e-9)
+    np.testing.assert_allclose(tips.T[-1], 0.2 - 0.5, atol=1e-9)

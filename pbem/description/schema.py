@@ -81,7 +81,7 @@ class CurveTable(Table):
     expression: tuple[Text, Text] | None = Field(
         None,
         description='x and y as functions of `t` from 0 to 1, e.g. `["2*t", "0.1*sin(2*pi*t)"]`; the elements are '
-        "straight, with their ends on the curve",
+        "arcs through three points of the curve, or straight where it has corners or inflections",
     )
     elements: Elements | None = Field(
         None,

@@ -18,6 +18,9 @@ from pbem.geometry.tolerance import Tolerance, join_points
 
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
 WIDEST_ARC = 45.0
+# An element of a curve by expressions is straight if it turns by less (radians), or if the curve leaves the arc by more
+# than this part of its rise: the two halves of a corner do by 0.25.
+LEAST_BENT, ROUND = 1e-4, 0.15
 # Squares of coordinates must not overflow.
 LARGEST = 1e100
 
@@ -74,11 +77,12 @@ class Division:
 
 
 def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Curve | Fault:
-    """A curve of x and y as functions of t from 0 to 1: one straight leg for each element, between points of the curve;
-    t is uniform unless the division says more."""
+    """A curve of x and y as functions of t from 0 to 1: one leg for each element, between points of the curve; t is
+    uniform unless the division says more. See `_bend`."""
     path = ("curves", name, "expression")
     count = sum(division.count([1.0]))
-    t = Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
+    ends = Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
+    t = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(4) / 4).ravel(), ends[-1])
     try:
         x, y = (read_expression(text, t=t) for text in texts)
     except ExpressionError as error:
@@ -86,11 +90,28 @@ def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Cu
     for axis, values in (("x", x), ("y", y)):
         wrong = ~(np.abs(values) <= LARGEST)
         if wrong.any():
-            at = int(np.argmax(wrong))
+            at = 4 * int(np.argmax(wrong[::4])) if wrong[::4].any() else int(np.argmax(wrong))
             found = f"{axis} = {values[at]:g} at t = {t[at]:g}"
             return Fault.at(path, found, f"a number of at most {LARGEST:g} everywhere")
-    points = (x + 1j * y).tolist()
-    return Curve(name, tuple(Leg(a, b, 1) for a, b in pairwise(points)))
+    points = (np.zeros(len(t)) + x + 1j * y).tolist()
+    return Curve(name, tuple(_bend(points[at:at + 5]) for at in range(0, 4 * count, 4)))
+
+
+def _bend(points: Sequence[complex]) -> Leg:
+    """A leg of one element through the first, the middle and the last of five points: an arc, as a chord leads away
+    from the ends in wrong directions. Straight where the others tell of a corner or of an inflection."""
+    start, before, middle, after, end = points
+    straight = Leg(start, end, 1)
+    if middle in (start, end) or start == end:
+        return straight
+    sweep = 2 * cmath.phase((end - middle) / (middle - start))
+    if not LEAST_BENT <= abs(sweep) <= math.radians(WIDEST_ARC):
+        return straight
+    center = 0.5 * (start + end) + 0.5j * (end - start) / math.tan(0.5 * sweep)
+    rise, radius = abs(middle - 0.5 * (start + end)), abs(start - center)
+    if max(abs(abs(each - center) - radius) for each in (before, after)) > ROUND * rise:
+        return straight
+    return Leg(start, end, 1, center=center, sweep=sweep)
 
 
 def draw_polyline(name: str, points: Sequence[complex], division: Division) -> Curve:

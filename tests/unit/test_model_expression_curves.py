@@ -1,4 +1,4 @@
-"""Curves given by expressions become chains of straight elements between points of the curve."""
+"""Curves given by expressions become chains of elements between points of the curve, arcs through a third one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ def with_bottom(line: str) -> str:
 def test_points_lie_on_the_curve_and_elements_between() -> None:
     model = build(with_bottom(f"{WAVE}, elements = 40"))
     legs = model.curves["bottom"].legs
-    assert len(legs) == 40 and all(leg.elements == 1 and leg.center is None for leg in legs)
+    assert len(legs) == 40 and all(leg.elements == 1 for leg in legs)
+    middles = np.array([complex(leg.point(np.array(0.5))) for leg in legs])
+    assert middles.imag == pytest.approx(0.1 * np.sin(np.pi * middles.real), abs=1e-5)
     t = np.linspace(0, 1, 41)
     points = np.array([leg.start for leg in legs] + [legs[-1].end])
     assert points == pytest.approx(2 * t + 0.1j * np.sin(2 * np.pi * t), abs=1e-14)
@@ -41,6 +43,16 @@ def test_points_lie_on_the_curve_and_elements_between() -> None:
 def test_grading_acts_on_t(grading: str, expected: list[float]) -> None:
     curve = build(with_bottom(f'{WAVE}, elements = [8], grading = "{grading}", power = 2')).curves["bottom"]
     assert np.array([leg.start.real for leg in curve.legs] + [2.0]) == pytest.approx(2 * np.array(expected), abs=1e-14)
+
+
+def test_a_circle_is_drawn_exactly_and_corners_stay() -> None:
+    round_one, pointed = (
+        build(with_bottom(f"expression = {each}, elements = 5")).curves["bottom"].legs
+        for each in ('["1 - cos(pi*t)", "-sin(pi*t)"]', '["2*t", "0.4*(abs(1 - 2*t) - 1)"]')
+    )
+    assert np.array([leg.center for leg in round_one]) == pytest.approx(1, abs=1e-12)
+    assert sum(leg.sweep for leg in round_one) == pytest.approx(np.pi, abs=1e-12)
+    assert all(leg.center is None for leg in pointed)  # the corner lies in the middle of the third
 
 
 def test_constant_component() -> None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import pbem
 from pbem.exact import (
     arc_crack_intensity,
     arc_crack_parallel_stress,
@@ -328,3 +330,17 @@ def test_an_initial_gap_does_not_count() -> None:
     plain = find_factors(make_plane((0.0, 1.0, 0.0), crack, FREE))["crack"]
     wide = find_factors(make_plane((0.0, 1.0, 0.0), crack, replace(FREE, gap=0.01)))["crack"]
     np.testing.assert_allclose(wide[0], plain[0], rtol=1e-10)
+
+
+@pytest.mark.parametrize("elements", [4, 8, 16])
+def test_a_crack_by_expressions_is_as_curved_as_they_are(elements: int, tmp_path: Path) -> None:
+    half = math.radians(60)
+    results = pbem.run({
+        "materials": {"rock": {"young": 1e3, "poisson": 0.2}},
+        "curves": {"arc": {"expression": [f"cos({2 * half}*t)", f"sin({2 * half}*t)"], "elements": elements}},
+        "regions": {"plane": {"material": "rock", "infinite": True, "cracks": ["arc"]}},
+        "remote": {"sxx": 1.0, "syy": 1.0}, "analysis": {"steps": 1},
+    }, tmp_path / "arc.h5")  # fmt: skip
+    tips, exact = results.tips["arc"], arc_crack_intensity(1.0, half, 1.0)
+    found = np.array([np.abs(each[-1]) for each in (tips.KI, tips.KII)])
+    np.testing.assert_allclose(found, np.transpose([exact, exact]), atol={4: 2e-3, 8: 3e-4, 16: 1e-4}[elements])

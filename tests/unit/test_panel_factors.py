@@ -1,4 +1,4 @@
-"""Dense factors in panels of columns: residuals are those of a stable elimination, on any number of ranks."""
+"""Dense factors in panels of rows: residuals are those of a stable elimination, on any number of ranks."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from pbem.case.build import parse_model
 from pbem.mesh.generate import generate_mesh
 from pbem.solve.petsc.session import petsc_options
 from pbem.solve.system.choice import choose_system
+from pbem.solve.tangent.panel_factors import deal_equations
 
 # Of each size a singular matrix, then a regular one whose pivots are far from its diagonal; ranks have unequal shares.
 SOLVE = """
@@ -31,9 +33,10 @@ for rows in (5, 13, 129, 500):
     given = random.standard_normal((rows, COLUMNS))
     factors = PanelFactors(world, own.stop - own.start, rows)
     for each in (singular, matrix):
-        factors.begin_filling()
-        for column in range(0, rows, 50):
-            factors.fill_columns(column, each[own, column:column + 50])
+        def form(first, values):
+            values[:] = each[own][first:first + len(values)]
+
+        factors.fill(form)
         try:
             factors.factorise()
         except ConvergenceError as error:
@@ -79,6 +82,17 @@ Launch = Callable[..., subprocess.CompletedProcess[str]]
 def test_residuals_are_of_rounding(ranks: int, mpirun_snippet: Launch) -> None:
     done = mpirun_snippet(ranks, SOLVE, timeout=60.0)
     assert done.stdout.splitlines() == [f"solved on {rank}" for rank in range(ranks)], done.stderr
+
+
+@pytest.mark.parametrize("counts", [[4, 4, 4], [12, 0, 0], [1, 0, 11], [2, 9, 1], [0, 6, 6], [5, 3, 4]])
+def test_no_more_equations_change_ranks_than_are_too_many(counts: list[int]) -> None:
+    places = np.array([0, 0, 1, 1, 2, 2, 0, 0, 1, 1, 2, 2])
+    equations, moved = deal_equations(places, np.array(counts))
+    owners = np.repeat([0, 1, 2], counts)
+    assert sorted(equations) == list(range(12))
+    of = owners[equations]
+    assert sorted(map(tuple, moved)) == sorted((a, b) for a, b in zip(of, places, strict=True) if a != b)
+    assert len(moved) == sum(max(count - 4, 0) for count in counts)
 
 
 def test_shares_are_refused_where_scalapack_has_to_be_used_only() -> None:

@@ -27,6 +27,9 @@ def test_products_are_taken_off_in_place(rows: int, inner: int, across: int) -> 
     take_off_product(part, surround(left)[0], surround(right)[0])
     bound = 2 * inner * EPS * (abs(values) + abs(left) @ abs(right))
     assert (abs(part - (values - left @ right)) <= bound).all()
+    part[:] = values
+    take_off_product(part, surround(left)[0], surround(right.T)[0], transposed=True)
+    assert (abs(part - (values - left @ right)) <= bound).all()
     part[:] = 7.0
     assert (whole == 7.0).all()
 
@@ -42,6 +45,9 @@ def test_divisions_are_undone_by_products(rows: int, across: int, lower: bool) -
     part, whole = surround(values)
     divide_by_triangle(part, surround(given)[0], lower)
     assert (abs(part @ triangle - values) <= 2 * across * EPS * (abs(part) @ abs(triangle) + abs(values))).all()
+    part[:] = values
+    divide_by_triangle(part, surround(given)[0], lower, transposed=True)
+    assert (abs(part @ triangle.T - values) <= 2 * across * EPS * (abs(part) @ abs(triangle.T) + abs(values))).all()
     part[:] = 7.0
     assert (whole == 7.0).all()
 
@@ -49,6 +55,7 @@ def test_divisions_are_undone_by_products(rows: int, across: int, lower: bool) -
 def test_nothing_is_done_with_nothing() -> None:
     values = np.ones((3, 2))
     take_off_product(values, np.zeros((3, 0)), np.zeros((0, 2)))
+    take_off_product(values, np.zeros((3, 0)), np.zeros((2, 0)), transposed=True)
     take_off_product(np.ones((0, 2)), np.ones((0, 4)), np.ones((4, 2)))
     divide_by_triangle(np.ones((0, 2)), np.eye(2), True)
     assert (values == 1.0).all()

@@ -22,8 +22,9 @@ from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved, TangentOperator, describe_residual, size_residual
 from pbem.solve.tangent.condensation import PairBases, PairSolution, Split, respond_pairs, solve_pairs
 from pbem.solve.tangent.load_basis import LoadBasis
+from pbem.solve.tangent.mapped_columns import apply_narrow
 from pbem.solve.tangent.pair_columns import PairColumns, start_columns
-from pbem.solve.tangent.reference import Reference, TangentRows, apply_narrow
+from pbem.solve.tangent.reference import Reference, TangentRows
 
 # A condensed system of a worse reciprocal condition is not trusted: the factors are made anew in the present modes.
 LEAST_RCOND = 1e-11

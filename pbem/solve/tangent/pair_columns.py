@@ -10,7 +10,8 @@ from scipy import sparse
 from pbem.arrays import Integer, Real
 from pbem.mesh.numbering import number_components
 from pbem.parallel import gather_rows
-from pbem.solve.tangent.reference import Reference, apply_narrow, form_columns
+from pbem.solve.tangent.mapped_columns import apply_narrow, form_columns
+from pbem.solve.tangent.reference import Reference
 
 # Right-hand sides that are solved together; they and their solutions are held beside the factors.
 COLUMNS_AT_ONCE = 1024

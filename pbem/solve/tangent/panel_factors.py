@@ -1,14 +1,16 @@
-"""LU factors of a dense matrix whose columns are dealt to several ranks in panels, in the place of the matrix.
+"""LU factors of a dense matrix whose rows are dealt to several ranks in panels, in the place of the matrix.
 
-Panel by panel the rank that has it eliminates with row interchanges and passes it on, and every rank brings its own
-columns up to date (theory, source 38); the rank that has the next panel begins with that, so that nobody waits for it.
-Almost all is products of matrices, as wide as the processor likes them; with ScaLAPACK solutions for many right-hand
-sides take four times as long.
+Each rank keeps the rows that it has formed, but for those that it has more than others: the order of the equations is
+chosen so that its rows are panels. What is factorised is the transpose, whose columns they are, P A' Q' = L U with the
+order Q of the equations and the interchanges P of the unknowns. Panel by panel the rank that has it eliminates and
+passes it on, and every rank brings its own columns up to date (theory, source 38); the rank that has the next panel
+begins with that, so that nobody waits for it. Almost all is products of matrices, as wide as the processor likes them;
+with ScaLAPACK solutions for many right-hand sides take four times as long.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +19,7 @@ from scipy.linalg import lapack
 
 from pbem.arrays import Integer, Real
 from pbem.errors import ConvergenceError
-from pbem.parallel import add_up, gather_rows
+from pbem.parallel import gather_rows
 from pbem.solve.petsc.linear import OPERATIONS_OF_A_CALL, OPERATIONS_OF_AN_ENTRY, SINGLE
 from pbem.solve.petsc.refactoring import FactorWork
 from pbem.solve.tangent.panel_passing import Coming, Passing, receive_ahead
@@ -27,6 +29,10 @@ from pbem.solve.tangent.part_products import divide_by_triangle, take_off_produc
 WIDEST, LEAST, PANELS = 192, 16, 8
 # Columns of a transposed array that are copied at a time: what is near to them in memory stays in the cache.
 COPIED = 128
+# Columns of the panels with which many right-hand sides are solved for at a time.
+WIDE = 384
+# Rows that are formed at a time: little beside the matrix, so few that they are in the cache.
+ROWS_AT_ONCE = 64
 # Of so many right-hand sides it pays that each rank solves for some of them, to which all panels have to come.
 MANY = 16
 
@@ -43,7 +49,8 @@ class PanelFactors:
         self._rows_of = [slice(int(a), int(b)) for a, b in pairwise(ends)]
         width = int(np.clip(rows // (PANELS * comm.size), LEAST, WIDEST))
         self._cuts = [*range(0, rows, width), rows]
-        self._panel_of = np.arange(rows) // width
+        self._rank_of = np.arange(rows) // width % comm.size
+        self._equations, self._moved = deal_equations(self._rank_of, np.diff(ends))
         # Transposed: of this rank's columns, one after the other; every column is contiguous.
         self._columns = np.zeros((0, rows))
         self._pivots, self._order = np.zeros(rows, dtype=np.int32), np.arange(rows)
@@ -54,23 +61,30 @@ class PanelFactors:
         """Bytes of this rank's columns."""
         return self._columns.nbytes
 
-    def begin_filling(self) -> None:
-        """Make an empty matrix in place of the former and its factors."""
-        own = np.count_nonzero(self._panel_of % self.comm.size == self.comm.rank)
-        self._columns = np.zeros((0, 0))  # the former first
-        self._columns = np.empty((own, self.rows))
+    def fill(self, form: Callable[[int, Real], None]) -> None:
+        """Take another matrix in place of the former and its factors.
 
-    def fill_columns(self, first: int, values: Real) -> None:
-        """Set some columns (local_rows, k), from the first on, of this rank's rows."""
-        end, size = first + values.shape[1], self.comm.size
-        given: list[list[Real]] = [[] for _ in range(size)]
-        for panel in range(self._panel_of[first], self._panel_of[end - 1] + 1):
-            begin, stop = max(self._cuts[panel], first), min(self._cuts[panel + 1], end)
-            given[panel % size].append(values[:, begin - first : stop - first].T)
-        at, after = self._place(np.array([first, end])).tolist()
-        shapes = [(after - at, rows.stop - rows.start) for rows in self._rows_of]
-        for rows, part in zip(self._rows_of, self._exchange(given, shapes), strict=True):
-            self._columns[at:after, rows] = part
+        form: puts this rank's rows from a given one on into an array (k, rows).
+        """
+        rank, size = self.comm.rank, self.comm.size
+        self._columns = np.zeros((0, 0))  # the former first
+        self._columns = np.empty((np.count_nonzero(self._rank_of == rank), self.rows))
+        mine = self._rows_of[rank]
+        kept = mine.stop - mine.start - np.count_nonzero(self._moved[:, 0] == rank)
+        for begin in range(0, kept, ROWS_AT_ONCE):
+            form(begin, self._columns[begin : min(begin + ROWS_AT_ONCE, kept)])
+        # What others have more than they keep comes behind.
+        given, at = kept, kept
+        for begin in range(0, len(self._moved), ROWS_AT_ONCE):
+            some = self._moved[begin : begin + ROWS_AT_ONCE]
+            sent = np.empty((np.count_nonzero(some[:, 0] == rank), self.rows))
+            form(given, sent)
+            given += len(sent)
+            counts = [[np.count_nonzero((some == pair).all(axis=1)) for pair in pairs] for pairs in (
+                [(rank, each) for each in range(size)], [(each, rank) for each in range(size)])]
+            taken = self._columns[at : at + sum(counts[1])]
+            self.comm.Alltoallv([sent, np.multiply(counts[0], self.rows)], [taken, np.multiply(counts[1], self.rows)])
+            at += len(taken)
 
     def factorise(self) -> None:
         """Factorise the filled matrix. Raises ConvergenceError ("singular tangent") on all ranks alike."""
@@ -142,90 +156,88 @@ class PanelFactors:
     def solve_columns(self, rhs: Real) -> Real:
         """This rank's rows (local_rows, k) of the solutions for its rows of many right-hand sides."""
         if rhs.shape[1] < MANY:
-            whole = self._solve_few(gather_rows(self.comm, rhs)[self._order].T)
+            values = gather_rows(self.comm, rhs)[self._equations].T.copy()
+            self._solve_few(values)
+            whole = np.empty_like(values)
+            whole[:, self._order] = values
             return np.ascontiguousarray(whole[:, self._rows_of[self.comm.rank]].T)
         share = np.linspace(0, rhs.shape[1], self.comm.size + 1).astype(int)
         cuts = [slice(a, b) for a, b in pairwise(share)]
         mine = cuts[self.comm.rank].stop - cuts[self.comm.rank].start
         lengths = [rows.stop - rows.start for rows in self._rows_of]
-        parts = self._exchange([[rhs[:, cut].T] for cut in cuts], [(mine, length) for length in lengths])
-        values = np.take(np.concatenate(parts, axis=1), self._order, axis=1)
+        parts = self._exchange([rhs[:, cut].T for cut in cuts], [(mine, length) for length in lengths])
+        values = np.take(np.concatenate(parts, axis=1), self._equations, axis=1)
         self._solve_many(values)
+        values = np.take(values, np.argsort(self._order), axis=1)
         here = lengths[self.comm.rank]
-        found = self._exchange([[values[:, rows]] for rows in self._rows_of],
+        found = self._exchange([values[:, rows] for rows in self._rows_of],
                                [(cut.stop - cut.start, here) for cut in cuts])
         result = np.empty((here, rhs.shape[1]))
         fill_by_blocks(result, np.concatenate(found, axis=0).T)
         return result
 
     def _solve_many(self, values: Real) -> None:
-        """Put the solutions in the place of this rank's right-hand sides (k, rows), in the order of the pivots."""
+        """Put the solutions in the place of this rank's right-hand sides (k, rows), both in the order of elimination.
+        """
+        together = range(0, len(self._cuts) - 1, max(1, WIDE // self._cuts[1]))
+        groups = [(begin, end) for begin, end in pairwise([*together, len(self._cuts) - 1])]
+        for group, upper in zip(groups, self._pass_on(groups, below=False), strict=True):
+            first, last = (self._cuts[panel] for panel in group)
+            take_off_product(values[:, first:last], values[:, :first], upper[:, :first], transposed=True)
+            divide_by_triangle(values[:, first:last], upper[:, first:], lower=False, transposed=True)
+        for group, lower in zip(groups[::-1], self._pass_on(groups[::-1], below=True), strict=True):
+            first, last = (self._cuts[panel] for panel in group)
+            take_off_product(values[:, first:last], values[:, last:], lower[:, last - first :], transposed=True)
+            divide_by_triangle(values[:, first:last], lower[:, : last - first], lower=True, transposed=True)
+
+    def _solve_few(self, values: Real) -> None:
+        """As `_solve_many`, for right-hand sides that all ranks know; panels stay where they are."""
         panels = range(len(self._cuts) - 1)
-        for panel, lower in zip(panels, self._pass_on(panels, below=True), strict=True):
-            first, last = self._cuts[panel], self._cuts[panel + 1]
-            divide_by_triangle(values[:, first:last], lower[:, : last - first], lower=True)
-            take_off_product(values[:, last:], values[:, first:last], lower[:, last - first :])
-        for panel, upper in zip(panels[::-1], self._pass_on(panels[::-1], below=False), strict=True):
-            first, last = self._cuts[panel], self._cuts[panel + 1]
-            divide_by_triangle(values[:, first:last], upper[:, first:], lower=False)
-            take_off_product(values[:, :first], values[:, first:last], upper[:, :first])
+        for lower in (False, True):
+            taken = np.zeros((len(values), len(self._columns)))  # what the solution so far takes from this rank's
+            for panel in reversed(panels) if lower else panels:
+                first, last, at = self._cuts[panel], self._cuts[panel + 1], self._count_before(panel)
+                root = panel % self.comm.size
+                found = np.ascontiguousarray(values[:, first:last])
+                if root == self.comm.rank:
+                    found -= taken[:, at : at + last - first]
+                    divide_by_triangle(found, self._columns[at : at + last - first, first:last], lower, transposed=True)
+                self.comm.Bcast(found, root=root)
+                values[:, first:last] = found
+                rest = slice(0, at) if lower else slice(self._count_before(panel + 1), len(self._columns))
+                taken[:, rest] += found @ self._columns[rest, first:last].T
 
-    def _solve_few(self, values: Real) -> Real:
-        """The solutions (k, rows) for right-hand sides that all ranks know; panels stay where they are."""
-        panels, size, own = len(self._cuts) - 1, self.comm.size, self.comm.rank
-        solved = np.zeros_like(values)
-        for lower in (True, False):
-            taken = np.zeros_like(values)  # what this rank's panels take from the right-hand sides
-            for panel in range(panels) if lower else reversed(range(panels)):
-                first, last = self._cuts[panel], self._cuts[panel + 1]
-                part = np.ascontiguousarray(taken[:, first:last])
-                total = np.empty_like(part)
-                self.comm.Reduce(part, total, root=panel % size)
-                if panel % size == own:
-                    at = self._count_before(panel)
-                    columns = self._columns[at : at + last - first]
-                    given = np.ascontiguousarray((values if lower else solved)[:, first:last]) - total
-                    divide_by_triangle(given, columns[:, first:last], lower)
-                    solved[:, first:last] = given
-                    rest = slice(last, self.rows) if lower else slice(0, first)
-                    taken[:, rest] += solved[:, first:last] @ columns[:, rest]
-        return add_up(self.comm, solved)
-
-    def _pass_on(self, panels: Sequence[int], below: bool) -> Iterator[Real]:
-        """The panels' columns (w, rows), transposed, on every rank: of their first row and all below it, or all above
-        it and their own.
+    def _pass_on(self, groups: Sequence[tuple[int, int]], below: bool) -> Iterator[Real]:
+        """The columns (w, rows) of groups of panels, transposed, on every rank: of their first row and all below it, or
+        all above it and their own.
         """
         passing = Passing(self.comm)
-        for (found,) in receive_ahead(self._send(panel, below, passing) for panel in panels):
+        for (found,) in receive_ahead(self._send(begin, end, below, passing) for begin, end in groups):
             yield found
         passing.finish()
 
-    def _send(self, panel: int, below: bool, passing: Passing) -> Coming:
-        first, last = self._cuts[panel], self._cuts[panel + 1]
+    def _send(self, begin: int, end: int, below: bool, passing: Passing) -> Coming:
+        first, last = self._cuts[begin], self._cuts[end]
         rows = slice(first, self.rows) if below else slice(0, last)
-        root, at = panel % self.comm.size, self._count_before(panel)
-        shape = (last - first, rows.stop - rows.start)
-        mine = root == self.comm.rank
-        found = np.ascontiguousarray(self._columns[at : at + last - first, rows]) if mine else np.empty(shape)
-        return passing.send((found,), root)
+        found, requests = np.empty((last - first, rows.stop - rows.start)), []
+        for panel in range(begin, end):
+            root, at = panel % self.comm.size, self._count_before(panel)
+            part = found[self._cuts[panel] - first : self._cuts[panel + 1] - first]
+            if root == self.comm.rank:
+                part[:] = self._columns[at : at + len(part), rows]
+            requests += passing.send((part,), root).requests
+        return Coming((found,), requests)
 
     def _count_before(self, panel: int) -> int:
         """How many of this rank's columns are in panels before this one."""
-        return int(self._place(np.array([self._cuts[panel]]))[0])
-
-    def _place(self, columns: Integer) -> Integer:
-        """How many of this rank's columns are before these (k,): where they are, if they are its own."""
         size, rank, width = self.comm.size, self.comm.rank, self._cuts[1]
-        panel = columns // width
-        before = (panel + size - 1 - rank) // size  # own panels before
-        within = np.where((panel % size == rank), columns - panel * width, 0)
-        return np.minimum(before * width + within, len(self._columns))
+        return min((panel + size - 1 - rank) // size * width, len(self._columns))
 
-    def _exchange(self, given: list[list[Real]], shapes: list[tuple[int, int]]) -> list[Real]:
-        """Arrays of these shapes from all ranks, for the arrays given to each, one below the other."""
-        sizes, counts = [sum(part.size for part in parts) for parts in given], [rows * width for rows, width in shapes]
+    def _exchange(self, given: list[Real], shapes: list[tuple[int, int]]) -> list[Real]:
+        """Arrays of these shapes from all ranks, for the arrays given to each."""
+        sizes, counts = [part.size for part in given], [rows * width for rows, width in shapes]
         sent, taken, end = np.empty(sum(sizes)), np.empty(sum(counts)), 0
-        for part in (part for parts in given for part in parts):
+        for part in given:
             fill_by_blocks(sent[end : end + part.size].reshape(part.shape), part)
             end += part.size
         self.comm.Alltoallv([sent, sizes], [taken, counts])
@@ -235,6 +247,25 @@ class PanelFactors:
     def destroy(self) -> None:
         """Free the storage."""
         self._columns = np.zeros((0, self.rows))
+
+
+def deal_equations(rank_of: Integer, counts: Integer) -> tuple[Integer, Integer]:
+    """The order of the equations (rows,) in which those at the places of a rank are its own, as far as that goes.
+
+    rank_of (rows,): whose a place is. counts (ranks,): equations of each rank, one rank after the other. Also, of those
+    that change ranks, from which to which (m, 2), in the order of both.
+    """
+    begins = np.cumsum(counts) - counts
+    equations, left, empty = np.empty(len(rank_of), dtype=np.int64), [], []
+    for rank, (begin, count) in enumerate(zip(begins, counts, strict=True)):
+        places = np.flatnonzero(rank_of == rank)
+        kept = min(len(places), count)
+        equations[places[:kept]] = np.arange(begin, begin + kept)
+        left.append(np.arange(begin + kept, begin + count))
+        empty.append(places[kept:])
+    from_rank = np.repeat(np.arange(len(counts)), [len(each) for each in left])
+    equations[np.concatenate(empty)] = np.concatenate(left)
+    return equations, np.stack([from_rank, rank_of[np.concatenate(empty)]], axis=1)
 
 
 def fill_by_blocks(target: Real, source: Real) -> None:

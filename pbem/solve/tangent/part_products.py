@@ -34,25 +34,27 @@ def _find(name: str, arguments: int) -> Callable[..., None]:
 _dgemm, _dtrsm = _find("dgemm", 13), _find("dtrsm", 11)
 
 
-def take_off_product(values: Real, left: Real, right: Real) -> None:
-    """values (k, r) -= left (k, w) @ right (w, r); they do not overlap."""
-    rows, across = values.shape
-    assert left.shape == (rows, len(right)) and right.shape[1] == across
+def take_off_product(values: Real, left: Real, right: Real, transposed: bool = False) -> None:
+    """values (k, r) -= left (k, w) @ right (w, r), or right.T of right (r, w); they do not overlap."""
+    (rows, across), inner = values.shape, left.shape[1]
+    assert len(left) == rows and right.shape == ((across, inner) if transposed else (inner, across))
     if values.size and left.size:
         _dgemm(
-            b"N", b"N", _count(across), _count(rows), _count(len(right)), MINUS_ONE, *_describe(right),
-            *_describe(left), ONE, *_describe(values),
+            b"T" if transposed else b"N", b"N", _count(across), _count(rows), _count(inner), MINUS_ONE,
+            *_describe(right), *_describe(left), ONE, *_describe(values),
         )  # fmt: skip
 
 
-def divide_by_triangle(values: Real, triangle: Real, lower: bool) -> None:
-    """values (k, w) become X with X T = values; T.T, T = triangle (w, w), is unit lower or upper triangular."""
+def divide_by_triangle(values: Real, triangle: Real, lower: bool, transposed: bool = False) -> None:
+    """values (k, w) become X with X T = values, T = triangle (w, w) or triangle.T; triangle.T is unit lower or upper
+    triangular.
+    """
     rows, across = values.shape
     assert triangle.shape == (across, across)
     if values.size:
         _dtrsm(
-            b"L", b"L" if lower else b"U", b"N", b"U" if lower else b"N", _count(across), _count(rows), ONE,
-            *_describe(triangle), *_describe(values),
+            b"L", b"L" if lower else b"U", b"T" if transposed else b"N", b"U" if lower else b"N", _count(across),
+            _count(rows), ONE, *_describe(triangle), *_describe(values),
         )  # fmt: skip
 
 

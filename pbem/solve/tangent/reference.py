@@ -23,59 +23,13 @@ from pbem.clock import clock
 from pbem.parallel import gather_parts, gather_rows
 from pbem.solve.petsc.linear import LinearSolver, choose_method
 from pbem.solve.problem.problem import Problem
+from pbem.solve.tangent.mapped_columns import form_columns, map_columns, take_rows
 from pbem.solve.tangent.panel_factors import PanelFactors
 
 # Columns that are formed at a time: little beside the matrix, much beside the cost of a call.
 COLUMNS_AT_ONCE = 512
 # Products with so many vectors take longer than to form the matrix for them.
 FORMED = 64
-
-
-def form_columns(
-    operator: RowOperator, block: RegionRows, constraints: sparse.csr_matrix, columns: Integer, wanted: Integer
-) -> Real:
-    """Some of a block's rows of B M, dense (wanted, columns), in some columns of the constraint map M.
-
-    wanted: positions in block.rows, rising. Most columns of M have one or two entries: the products are those of single
-    columns of B, taking one entry of every column of M at a time.
-    """
-    chosen = constraints[:, columns].tocsc()
-    stored = chosen[block.columns].tocsc()
-    counts = np.diff(stored.indptr)
-    rows = take_rows(block.matrix, wanted)
-    values = np.empty((len(wanted), len(columns)))
-    if not counts.all():
-        values.fill(0.0)
-    for depth in range(int(counts.max(initial=0))):
-        of = np.flatnonzero(counts > depth)
-        at = stored.indptr[of] + depth
-        if depth == 0 and len(of) == len(columns):
-            # The indices are right: numpy need not keep a copy in case they are not.
-            np.take(rows, stored.indices[at], axis=1, out=values, mode="clip")
-            values *= stored.data[at]
-        else:
-            values[:, of] += np.take(rows, stored.indices[at], axis=1) * stored.data[at]
-    free = (operator.free[block.rows[wanted]] @ chosen).tocoo()
-    values[free.row, free.col] += free.data
-    return values
-
-
-def apply_narrow(operator: RowOperator, v: Real) -> Real:
-    """This rank's rows of B v, as operator.apply, for a v (4 nodes,) of few entries that lie near to each other."""
-    result: Real = operator.free @ v
-    for block in operator.blocks:
-        at = np.flatnonzero(v[block.columns])
-        if len(at):
-            span = slice(int(at[0]), int(at[-1]) + 1)
-            result[block.rows] += block.matrix[:, span] @ v[block.columns[span]]
-    return result
-
-
-def take_rows(matrix: Real, rows: Integer) -> Real:
-    """Some rows, rising; without a copy if they are neighbours."""
-    if len(rows) and rows[-1] - rows[0] + 1 == len(rows):
-        return matrix[rows[0] : rows[-1] + 1]
-    return matrix[rows]
 
 
 @dataclass(frozen=True)
@@ -134,19 +88,39 @@ class Reference:
         chosen = [columns[kept[columns]] for columns in self.block_unknowns]
         wanted = [np.flatnonzero(kept[self.own][block.rows]) for block in self.operator.blocks]
         with clock.piece("matrix"):
-            if self.method == "lu":
-                self._fill_dense(constraints, wanted)
+            if isinstance(self.factors, PanelFactors):
+                self._fill_panels(self.factors, constraints, wanted)
+            elif self.method == "lu":
+                self._fill_dense(self.factors, constraints, wanted)
             else:
                 self._fill_sparse(constraints, chosen, wanted)
             self.free_blocks = self._invert_free_blocks(constraints)
         with clock.piece("factors", 8.0 * len(self.kept_rows) * int(kept.sum())):
             self.factors.factorise()
 
-    def _fill_dense(self, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
+    def _fill_panels(self, factors: PanelFactors, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
+        """Rows of all columns at a time."""
+        local, columns = np.cumsum(self.kept[self.own]) - 1, np.flatnonzero(self.kept)
+        mapped = [(map_columns(self.operator, block, constraints, columns), local[block.rows[rows]], rows)
+                  for block, rows in zip(self.operator.blocks, wanted, strict=True)]
+
+        def form(first: int, values: Real) -> None:
+            for block, places, rows in mapped:
+                some = slice(*np.searchsorted(places, [first, first + len(values)]))
+                if len(rows[some]) == len(values):
+                    block.evaluate(rows[some], values)
+                elif len(rows[some]):
+                    part = np.empty((len(rows[some]), len(columns)))
+                    block.evaluate(rows[some], part)
+                    values[places[some] - first] = part
+
+        factors.fill(form)
+
+    def _fill_dense(self, factors: LinearSolver, constraints: sparse.csr_matrix, wanted: list[Integer]) -> None:
         """Columns of all rows at a time, as they may have to change ranks."""
         operator, numbers = self.operator, np.flatnonzero(self.kept)
         local = np.cumsum(self.kept[self.own]) - 1
-        self.factors.begin_filling()
+        factors.begin_filling()
         for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
             columns = numbers[begin : begin + COLUMNS_AT_ONCE]
             values = np.zeros((len(self.kept_rows), len(columns)))
@@ -157,7 +131,7 @@ class Reference:
                         values = part
                     else:
                         values[local[block.rows[rows]]] = part
-            self.factors.fill_columns(begin, values)
+            factors.fill_columns(begin, values)
 
     def _fill_sparse(self, constraints: sparse.csr_matrix, chosen: list[Integer], wanted: list[Integer]) -> None:
         """Dense blocks of the regions."""

@@ -117,13 +117,9 @@ def assemble_rows(
             blocks.append(RegionRows(int(region), rows, columns, matrix))
             continue
         matrix = np.empty((2 * len(own), len(columns)))
-        scratch = _allocate_scratch(sources[region])
-        for part, where in _list_chunks(own, mesh.traction_equation, scratch):
-            traction = bool(mesh.traction_equation[part[0]])
-            values = _evaluate_columns(
-                mesh, sources[region], int(region), part, columns, traction, scratch, int(region) in finite
-            )
-            matrix[where] = -np.repeat(scale[part], 2)[:, None] * values
+        evaluate = _RowsOfRegion(mesh, sources[region], int(region), columns, int(region) in finite)
+        for part, where in _list_chunks(own, mesh.traction_equation, evaluate.points):
+            evaluate.put(part, bool(mesh.traction_equation[part[0]]), -scale[part], matrix, where)
         blocks.append(RegionRows(int(region), rows, columns, matrix))
     return RowOperator(first_node, last_node, tuple(blocks), collect_free_terms(mesh, nodes, scale))
 
@@ -142,9 +138,9 @@ def assemble_displacement_rows(
         at = np.flatnonzero(node_region[nodes] == region)
         columns = _needed_columns(mesh, int(region), needed)
         matrix = np.empty((2 * len(at), len(columns)))
-        scratch = _allocate_scratch(sources[region])
-        for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), scratch):
-            matrix[where] = _evaluate_columns(mesh, sources[region], int(region), part, columns, False, scratch)
+        evaluate = _RowsOfRegion(mesh, sources[region], int(region), columns)
+        for part, where in _list_chunks(nodes[at], np.zeros(mesh.nodes, dtype=bool), evaluate.points):
+            evaluate.put(part, False, np.ones(len(part)), matrix, where)
         blocks.append(RegionRows(int(region), number_components(at), columns, matrix))
     return blocks
 
@@ -175,13 +171,11 @@ def _add_outer(matrix: Real, rows: Integer, columns: Integer, added: Real, value
 
     What lies side by side is not copied: a body's matrix is large, and this took longer than its kernels.
     """
-    beside = all(len(each) > 0 and each[-1] - each[0] == len(each) - 1 and (np.diff(each) == 1).all()
-                 for each in (rows, columns))
-    if not beside:
+    beside, across = join_neighbours(rows), join_neighbours(columns)
+    if not (isinstance(beside, slice) and isinstance(across, slice)):
         matrix[np.ix_(rows, columns)] += np.outer(added, values)
         return
-    target = matrix[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    for row, factor in zip(target, added, strict=True):
+    for row, factor in zip(matrix[beside, across], added, strict=True):
         row += factor * values
 
 
@@ -231,16 +225,8 @@ def _own_columns(mesh: Mesh, region: int, columns: Integer) -> Integer:
     )
 
 
-def _allocate_scratch(sources: Sources) -> tuple[Real, Real]:
-    """Room for the rows of some points: displacements and tractions of all elements."""
-    width = 2 * sources.count * len(sources.local)
-    points = max(1, CHUNK_BYTES // (2 * 2 * 8 * width))
-    return np.empty((2 * points, width)), np.zeros((2 * points, width))
-
-
-def _list_chunks(nodes: Integer, traction: Bool, scratch: tuple[Real, Real]) -> list[tuple[Integer, Integer]]:
-    """Runs of nodes with the same equation that fit into the scratch memory, and their rows in the block."""
-    most = len(scratch[0]) // 2
+def _list_chunks(nodes: Integer, traction: Bool, most: int) -> list[tuple[Integer, Integer]]:
+    """Runs of at most so many nodes with the same equation, and their rows in the block."""
     chunks = []
     for kind in (False, True):
         at = np.flatnonzero(traction[nodes] == kind)
@@ -250,45 +236,72 @@ def _list_chunks(nodes: Integer, traction: Bool, scratch: tuple[Real, Real]) -> 
     return chunks
 
 
-def _evaluate_columns(
-    mesh: Mesh,
-    sources: Sources,
-    region: int,
-    nodes: Integer,
-    columns: Integer,
-    traction: bool,
-    scratch: tuple[Real, Real],
-    free: bool = False,
-) -> Real:
-    """Values at nodes (displacement, or traction on the node's normal) in the given columns of v.
+class _RowsOfRegion:
+    """Values at nodes of a region in some columns of v, with room for those of `points` nodes at a time."""
 
-    free: translations of the region leave nothing, see _restore_translations.
-    """
-    own = _region_nodes(mesh, region)
-    first = own[0]
-    on = mesh.node_element[nodes] - mesh.node_element[first]
-    of_displacement = columns < 2 * mesh.nodes
-    with_tractions = bool((~of_displacement).any())
-    displacement, tractions = evaluate_rows(
-        sources, mesh.position[nodes], on, mesh.normal[nodes] if traction else None, with_tractions,
-        mesh.node_local[nodes], scratch,
-    )
-    if free:
-        _restore_translations(displacement, ~mesh.node_crack[own], nodes - first, 0.0 if traction else 0.5)
-    parts = [displacement[:, columns[of_displacement] - 2 * first]]
-    if tractions is not None:
-        parts.append(tractions[:, columns[~of_displacement] - 2 * (mesh.nodes + first)])
-    return np.concatenate(parts, axis=1)
+    def __init__(
+        self, mesh: Mesh, sources: Sources, region: int, columns: Integer, free: bool = False
+    ) -> None:
+        """free: translations of the region leave nothing, see _restore_translations."""
+        own = _region_nodes(mesh, region)
+        self._mesh, self._sources, self._first = mesh, sources, int(own[0])
+        of_displacement = columns < 2 * mesh.nodes
+        self._displacements = join_neighbours(columns[of_displacement] - 2 * self._first)
+        self._tractions = join_neighbours(columns[~of_displacement] - 2 * (mesh.nodes + self._first))
+        self._count = int(np.count_nonzero(of_displacement))
+        self._with_tractions = self._count < len(columns)
+        self._bounding = ~mesh.node_crack[own] if free else None
+        self._translations = _translate(~mesh.node_crack[own]) if free else np.zeros((0, 2))
+        width = 2 * sources.count * len(sources.local)
+        self.points = max(1, CHUNK_BYTES // (2 * 2 * 8 * width))
+        self._scratch = np.empty((2 * self.points, width)), np.zeros((2 * self.points, width))
+
+    def put(self, nodes: Integer, traction: bool, factors: Real, matrix: Real, where: Integer) -> None:
+        """Put factors (k,) times the values at nodes (k,), displacement, or traction on the node's normal, in rows of a
+        matrix (rows, columns).
+        """
+        mesh, first = self._mesh, self._first
+        displacement, tractions = evaluate_rows(
+            self._sources, mesh.position[nodes], mesh.node_element[nodes] - mesh.node_element[first],
+            mesh.normal[nodes] if traction else None, self._with_tractions, mesh.node_local[nodes], self._scratch,
+        )
+        if self._bounding is not None:
+            _restore_translations(
+                displacement, self._translations, self._bounding, nodes - first, 0.0 if traction else 0.5)
+        rows, scale = join_neighbours(where), np.repeat(factors, 2)[:, None]
+        _multiply_into(matrix, rows, slice(0, self._count), displacement[:, self._displacements], scale)
+        if tractions is not None:
+            _multiply_into(matrix, rows, slice(self._count, None), tractions[:, self._tractions], scale)
 
 
-def _restore_translations(rows: Real, bounding: Bool, own: Integer, half: float) -> None:
+def join_neighbours(places: Integer) -> slice | Integer:
+    """The same places as a slice if each is the one after the last: what is taken with it is not copied."""
+    if len(places) and places[-1] - places[0] == len(places) - 1 and (np.diff(places) == 1).all():
+        return slice(int(places[0]), int(places[-1]) + 1)
+    return places
+
+
+def _multiply_into(matrix: Real, rows: slice | Integer, columns: slice, values: Real, scale: Real) -> None:
+    """matrix[rows, columns] = scale * values, at once where the rows are neighbours."""
+    if isinstance(rows, slice):
+        np.multiply(values, scale, out=matrix[rows, columns])
+    else:
+        matrix[rows, columns] = values * scale
+
+
+def _translate(bounding: Bool) -> Real:
+    """Displacements (2 n, 2) of a region's nodes in its translations along x and y, jumps on cracks."""
+    result: Real = np.repeat(bounding, 2)[:, None] * np.tile(np.eye(2), (len(bounding), 1))
+    return result
+
+
+def _restore_translations(rows: Real, translations: Real, bounding: Bool, own: Integer, half: float) -> None:
     """Let rows (2 k, 2 n) of a region's displacements give half of its translations, which the free terms take off.
 
     What rounding leaves is taken off the points' own columns, in place. bounding (n,): nodes that are on no crack.
     own (k,): which of the nodes the points are. Points on cracks, whose own column is a jump, stay as they are.
     (theory, 130)
     """
-    translations = np.repeat(bounding, 2)[:, None] * np.tile(np.eye(2), (len(bounding), 1))
     left = (rows @ translations).reshape(-1, 2, 2) - half * np.eye(2)
     on = np.flatnonzero(bounding[own])
     at, columns = (2 * each[:, None] + np.arange(2) for each in (on, own[on]))

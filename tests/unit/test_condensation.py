@@ -21,7 +21,7 @@ from pbem.solve.petsc.refactoring import Effort, FactorWork
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved
 from pbem.solve.system.assembly import assemble_problem
-from pbem.solve.tangent.condensation import PairBases, Split, solve_pairs
+from pbem.solve.tangent.condensation import PairBases, Split, factorise_pairs, solve_pairs
 from pbem.solve.tangent.condensed import CondensedTangent
 from pbem.solve.tangent.factored import FactoredTangent
 from pbem.solve.tangent.load_basis import LoadBasis
@@ -252,7 +252,7 @@ def test_the_small_system_is_that_of_its_definition() -> None:
     parts[2][:3] = 0.0  # three pairs as in the reference, of which one has no offset
     parts[3][0] = 0.0
     split = Split(*parts)
-    solution = solve_pairs(coupling, given, split)
+    solution = solve_pairs(factorise_pairs(coupling, split), given, split)
     for x, wanted in zip(solution.unknowns.T, given.T, strict=True):
         a = np.einsum("mij,mj->mi", split.a_tangent, x.reshape(count, 2)) + split.a_offset
         np.testing.assert_allclose(a.ravel() + coupling @ split.find_b(x[:, None])[:, 0], wanted, atol=1e-12)
@@ -262,8 +262,28 @@ def test_the_small_system_is_that_of_its_definition() -> None:
 def test_a_singular_small_system_is_known_by_its_condition() -> None:
     none = np.zeros((1, 2))
     split = Split(np.zeros((1, 2, 2)), none, np.eye(2)[None], none)
-    assert solve_pairs(np.ones((2, 2)), np.ones((2, 1)), split).rcond < 1e-15
-    assert solve_pairs(np.full((2, 2), np.nan), np.ones((2, 1)), split).rcond == 0.0
+    for coupling in (np.ones((2, 2)), np.zeros((2, 2)), np.full((2, 2), np.nan)):
+        factors = factorise_pairs(coupling, split)
+        assert factors.rcond < 1e-15
+        assert solve_pairs(factors, np.ones((2, 1)), split).rcond == factors.rcond
+
+
+def test_factors_of_the_small_system_serve_while_tangents_stay() -> None:
+    random = np.random.default_rng(5)
+    count = 6
+    coupling = random.normal(size=(2 * count, 2 * count))
+    one, other = (Split(*(random.normal(size=(count, *shape)) for shape in ((2, 2), (2,), (2, 2), (2,))))
+                  for _ in range(2))
+    factors = factorise_pairs(coupling, one)
+    moved = replace(one, a_offset=other.a_offset, b_offset=other.b_offset)
+    assert factors.serve(coupling, one) and factors.serve(coupling, moved)
+    given = random.normal(size=(2 * count, 2))
+    x = solve_pairs(factors, given, moved).unknowns
+    a = (moved.a_tangent @ x.reshape(count, 2, 2) + moved.a_offset[:, :, None]).reshape(2 * count, 2)
+    np.testing.assert_allclose(a + coupling @ moved.find_b(x), given, atol=1e-12)
+    assert not factors.serve(coupling, replace(one, a_tangent=other.a_tangent))
+    assert not factors.serve(coupling, replace(one, b_tangent=other.b_tangent))
+    assert not factors.serve(coupling.copy(), one)  # of other columns
 
 
 def test_states_are_split_and_put_together() -> None:

@@ -86,25 +86,70 @@ class PairSolution:
     residual: float
 
 
-def solve_pairs(coupling: Real, given: Real, split: Split) -> PairSolution:
-    """x_c of k pairs; coupling W_cc (2 k, 2 k), given y_c (2 k, c) for each of c solutions (theory, 59)."""
+@dataclass(frozen=True)
+class PairFactors:
+    """LU factors of the small system, for the pairs (s,) of k that are not as in the reference (`changed`).
+
+    coupling W_cc (2 k, 2 k) and split: of which laws. factors (2 s, 2 s), pivots (2 s,): None if it is singular.
+    rcond: reciprocal condition in the 1-norm, 0 if it is singular.
+    """
+
+    coupling: Real
+    split: Split
+    changed: Integer
+    factors: Real | None
+    pivots: Integer | None
+    rcond: float
+
+    def serve(self, coupling: Real, split: Split) -> bool:
+        """Whether they are those of other laws too: from one step to the next most often no tangent changes."""
+        mine = self.split
+        return (self.coupling is coupling and np.array_equal(mine.b_tangent, split.b_tangent)
+                and np.array_equal(mine.a_tangent, split.a_tangent))
+
+    def solve(self, rhs: Real) -> Real:
+        """The unknowns (2 s, c); zeros if there are none."""
+        if self.factors is None or not len(rhs):
+            return np.zeros_like(rhs)
+        result: Real = lapack.dgetrs(self.factors, self.pivots, rhs)[0]
+        return result
+
+
+def factorise_pairs(coupling: Real, split: Split) -> PairFactors:
+    """Factors of the system of k pairs with laws so split; coupling W_cc (2 k, 2 k)."""
     changed = np.flatnonzero((split.b_tangent != 0).any(axis=(1, 2)))
-    own, unknowns, rcond, residual = number_components(changed), np.zeros(given.shape), 1.0, 0.0
+    own = number_components(changed)
+    if not len(changed):
+        return PairFactors(coupling, split, changed, None, None, 1.0)
+    matrix = _couple(coupling if len(own) == len(coupling) else coupling[np.ix_(own, own)], split.take(changed))
+    norm = float(np.abs(matrix).sum(axis=0).max())
+    if not np.isfinite(norm):
+        return PairFactors(coupling, split, changed, None, None, 0.0)
+    factors, pivots, failed = lapack.dgetrf(matrix, overwrite_a=1)
+    if failed:
+        return PairFactors(coupling, split, changed, None, None, 0.0)
+    return PairFactors(coupling, split, changed, factors, pivots, float(lapack.dgecon(factors, norm)[0]))
+
+
+def solve_pairs(factors: PairFactors, given: Real, split: Split) -> PairSolution:
+    """x_c of k pairs, given y_c (2 k, c) for each of c solutions, by factors that serve (theory, 59)."""
+    coupling, own = factors.coupling, number_components(factors.changed)
+    unknowns, residual = np.zeros(given.shape), 0.0
     constant = given - split.a_offset.ravel()[:, None]
     rhs = constant - (coupling @ split.b_offset.ravel())[:, None]
     rest = np.ones(len(given), dtype=bool)
     rest[own] = False
-    if len(changed):
-        tangent = split.take(changed)
-        matrix = _couple(coupling[np.ix_(own, own)], tangent)
-        unknowns[own], rcond = _solve_dense(matrix, rhs[own])
+    if len(own):
         size = float(np.linalg.norm(rhs[own]))
-        residual = float(np.linalg.norm(matrix @ unknowns[own] - rhs[own])) / size if size > 0 else 0.0
+        unknowns[own] = factors.solve(rhs[own])
         rhs = constant - coupling @ split.find_b(unknowns)
+        along = split.a_tangent[factors.changed] @ unknowns[own].reshape(-1, 2, given.shape[1])
+        left = rhs[own] - along.reshape(len(own), given.shape[1])
+        residual = float(np.linalg.norm(left)) / size if size > 0 else 0.0
     others = np.flatnonzero(rest[::2])
     solved = np.linalg.solve(split.a_tangent[others], rhs[rest].reshape(len(others), 2, given.shape[1]))
     unknowns[rest] = solved.reshape(2 * len(others), given.shape[1])
-    return PairSolution(unknowns, rcond, residual)
+    return PairSolution(unknowns, factors.rcond, residual)
 
 
 def _couple(coupling: Real, split: Split) -> Real:
@@ -135,17 +180,3 @@ def respond_pairs(coupling: Real, split: Split, at: Integer, a_offset: Real, b_o
             forces[2 * place + i, 2 * columns + j] += a_offset[:, i, j]
     result: Real = np.linalg.solve(matrix, -forces)[number_components(place)]
     return result
-
-
-def _solve_dense(matrix: Real, rhs: Real) -> tuple[Real, float]:
-    """Solution and reciprocal condition in the 1-norm; zeros if there is none."""
-    if not len(rhs):
-        return rhs, 1.0
-    if not np.isfinite(matrix).all():
-        return np.zeros_like(rhs), 0.0
-    norm = float(np.abs(matrix).sum(axis=0).max())
-    factors, pivots, failed = lapack.dgetrf(matrix)
-    if failed:
-        return np.zeros_like(rhs), 0.0
-    rcond = float(lapack.dgecon(factors, norm)[0])
-    return lapack.dgetrs(factors, pivots, rhs)[0], rcond

@@ -20,7 +20,15 @@ from pbem.parallel import broadcast, gather_rows
 from pbem.solve.petsc.refactoring import Effort
 from pbem.solve.problem.problem import Problem
 from pbem.solve.problem.tangent import Solved, TangentOperator, describe_residual, size_residual
-from pbem.solve.tangent.condensation import PairBases, PairSolution, Split, respond_pairs, solve_pairs
+from pbem.solve.tangent.condensation import (
+    PairBases,
+    PairFactors,
+    PairSolution,
+    Split,
+    factorise_pairs,
+    respond_pairs,
+    solve_pairs,
+)
 from pbem.solve.tangent.load_basis import LoadBasis
 from pbem.solve.tangent.mapped_columns import apply_narrow
 from pbem.solve.tangent.pair_columns import PairColumns, start_columns
@@ -89,6 +97,7 @@ class CondensedTangent(TangentOperator):
         self.reference = Reference(problem, rows, np.flatnonzero(self.eliminated), panels)
         self.unknowns = number_components(pairs.slave[self.varying])
         self.known: Known | None = None
+        self._factors: PairFactors | None = None  # of the last system of the pairs, on the first rank
 
     def solve(
         self, constraints: ConstraintMap, load: Load, law: Linearisation, forcing: float = 0.0
@@ -150,7 +159,7 @@ class CondensedTangent(TangentOperator):
         """
         problem = self.problem
         loads = LoadBasis(problem.unknowns, self.reference.rows) if self.known is None else self.known.loads
-        self.known = None  # its columns too, before there are others
+        self.known = self._factors = None  # its columns too, before there are others
         tangent = self._refer(law)
         none = np.zeros(tangent.shape[:2])
         self.reference.form(problem.constrain(Linearisation(tangent, none, law.leader), load).matrix)
@@ -241,7 +250,11 @@ class CondensedTangent(TangentOperator):
         found: PairSolution | None = None
         of_pairs = self.unknowns.reshape(-1, 2)
         if problem.comm.rank == 0:
-            found = solve_pairs(columns.coupling, given[of_pairs[known].ravel()], split.take(known))
+            own = split.take(known)
+            if self._factors is None or not self._factors.serve(columns.coupling, own):
+                self._factors = None  # before there are others
+                self._factors = factorise_pairs(columns.coupling, own)
+            found = solve_pairs(self._factors, given[of_pairs[known].ravel()], own)
         found = broadcast(problem.comm, found)
         assert found is not None
         unknowns = given - columns.combine(split.take(known).find_b(found.unknowns))

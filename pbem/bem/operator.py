@@ -291,8 +291,7 @@ def _multiply_into(matrix: Real, rows: slice | Integer, columns: slice, values: 
 
 def _translate(bounding: Bool) -> Real:
     """Displacements (2 n, 2) of a region's nodes in its translations along x and y, jumps on cracks."""
-    result: Real = np.repeat(bounding, 2)[:, None] * np.tile(np.eye(2), (len(bounding), 1))
-    return result
+    return np.where(np.repeat(bounding, 2)[:, None], np.tile(np.eye(2), (len(bounding), 1)), 0.0)
 
 
 def _restore_translations(rows: Real, translations: Real, bounding: Bool, own: Integer, half: float) -> None:

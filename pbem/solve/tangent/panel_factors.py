@@ -22,13 +22,12 @@ from pbem.errors import ConvergenceError
 from pbem.parallel import gather_rows
 from pbem.solve.petsc.linear import OPERATIONS_OF_A_CALL, OPERATIONS_OF_AN_ENTRY, SINGLE
 from pbem.solve.petsc.refactoring import FactorWork
+from pbem.solve.tangent.column_shares import bring_home, exchange, list_rows, multiply_rows, share_columns
 from pbem.solve.tangent.panel_passing import Coming, Passing, receive_ahead
 from pbem.solve.tangent.part_products import divide_by_triangle, take_off_product
 
 # Columns of a panel: each rank has at least so many panels, as it idles with the last one.
 WIDEST, LEAST, PANELS = 192, 16, 8
-# Columns of a transposed array that are copied at a time: what is near to them in memory stays in the cache.
-COPIED = 128
 # Columns of the panels with which many right-hand sides are solved for at a time.
 WIDE = 384
 # Rows that are formed at a time: little beside the matrix, so few that they are in the cache.
@@ -45,12 +44,12 @@ class PanelFactors:
 
     def __init__(self, comm: MPI.Intracomm, local_rows: int, rows: int) -> None:
         self.comm, self.rows = comm, rows
-        ends = np.concatenate([[0], np.cumsum(comm.allgather(local_rows))])
-        self._rows_of = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self._rows_of = list_rows(comm, local_rows)
         width = int(np.clip(rows // (PANELS * comm.size), LEAST, WIDEST))
         self._cuts = [*range(0, rows, width), rows]
         self._rank_of = np.arange(rows) // width % comm.size
-        self._equations, self._moved = deal_equations(self._rank_of, np.diff(ends))
+        self._equations, self._moved = deal_equations(
+            self._rank_of, np.array([each.stop - each.start for each in self._rows_of]))
         # Transposed: of this rank's columns, one after the other; every column is contiguous.
         self._columns = np.zeros((0, rows))
         self._pivots, self._order = np.zeros(rows, dtype=np.int32), np.arange(rows)
@@ -161,20 +160,22 @@ class PanelFactors:
             whole = np.empty_like(values)
             whole[:, self._order] = values
             return np.ascontiguousarray(whole[:, self._rows_of[self.comm.rank]].T)
-        share = np.linspace(0, rhs.shape[1], self.comm.size + 1).astype(int)
-        cuts = [slice(a, b) for a, b in pairwise(share)]
-        mine = cuts[self.comm.rank].stop - cuts[self.comm.rank].start
-        lengths = [rows.stop - rows.start for rows in self._rows_of]
-        parts = self._exchange([rhs[:, cut].T for cut in cuts], [(mine, length) for length in lengths])
+        return bring_home(self.comm, self._solve_shares(rhs), self._rows_of)
+
+    def solve_and_multiply(self, rhs: Real, count: int, form: Callable[[slice], Real]) -> tuple[Real, Real]:
+        """As `solve_columns`, and this rank's rows (count, k) of products with the solutions; see `multiply_rows`."""
+        values = self._solve_shares(rhs)
+        return bring_home(self.comm, values, self._rows_of), multiply_rows(self.comm, values, count, form)
+
+    def _solve_shares(self, rhs: Real) -> Real:
+        """The solutions (k / ranks, rows) for this rank's share of right-hand sides (local_rows, k)."""
+        shares = share_columns(self.comm, rhs.shape[1])
+        mine = shares[self.comm.rank].stop - shares[self.comm.rank].start
+        parts = exchange(self.comm, [rhs[:, share].T for share in shares],
+                         [(mine, rows.stop - rows.start) for rows in self._rows_of])
         values = np.take(np.concatenate(parts, axis=1), self._equations, axis=1)
         self._solve_many(values)
-        values = np.take(values, np.argsort(self._order), axis=1)
-        here = lengths[self.comm.rank]
-        found = self._exchange([values[:, rows] for rows in self._rows_of],
-                               [(cut.stop - cut.start, here) for cut in cuts])
-        result = np.empty((here, rhs.shape[1]))
-        fill_by_blocks(result, np.concatenate(found, axis=0).T)
-        return result
+        return np.take(values, np.argsort(self._order), axis=1)
 
     def _solve_many(self, values: Real) -> None:
         """Put the solutions in the place of this rank's right-hand sides (k, rows), both in the order of elimination.
@@ -233,17 +234,6 @@ class PanelFactors:
         size, rank, width = self.comm.size, self.comm.rank, self._cuts[1]
         return min((panel + size - 1 - rank) // size * width, len(self._columns))
 
-    def _exchange(self, given: list[Real], shapes: list[tuple[int, int]]) -> list[Real]:
-        """Arrays of these shapes from all ranks, for the arrays given to each."""
-        sizes, counts = [part.size for part in given], [rows * width for rows, width in shapes]
-        sent, taken, end = np.empty(sum(sizes)), np.empty(sum(counts)), 0
-        for part in given:
-            fill_by_blocks(sent[end : end + part.size].reshape(part.shape), part)
-            end += part.size
-        self.comm.Alltoallv([sent, sizes], [taken, counts])
-        ends = np.cumsum(counts)[:-1]
-        return [part.reshape(shape) for part, shape in zip(np.split(taken, ends), shapes, strict=True)]
-
     def destroy(self) -> None:
         """Free the storage."""
         self._columns = np.zeros((0, self.rows))
@@ -266,9 +256,3 @@ def deal_equations(rank_of: Integer, counts: Integer) -> tuple[Integer, Integer]
     from_rank = np.repeat(np.arange(len(counts)), [len(each) for each in left])
     equations[np.concatenate(empty)] = np.concatenate(left)
     return equations, np.stack([from_rank, rank_of[np.concatenate(empty)]], axis=1)
-
-
-def fill_by_blocks(target: Real, source: Real) -> None:
-    """target[:] = source, three times as fast where one of them is the transpose of an array."""
-    for begin in range(0, source.shape[1], COPIED):
-        target[:, begin : begin + COPIED] = source[:, begin : begin + COPIED]

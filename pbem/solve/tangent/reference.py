@@ -23,6 +23,7 @@ from pbem.clock import clock
 from pbem.parallel import gather_parts, gather_rows
 from pbem.solve.petsc.linear import LinearSolver, choose_method
 from pbem.solve.problem.problem import Problem
+from pbem.solve.tangent.column_shares import multiply_rows, share_columns
 from pbem.solve.tangent.mapped_columns import form_columns, map_columns, take_rows
 from pbem.solve.tangent.panel_factors import PanelFactors
 
@@ -170,52 +171,55 @@ class Reference:
         most: iterations. Raises ConvergenceError ("linear solver").
         """
         with clock.piece("GMRES", rhs.nbytes):
-            return self._complete(rhs[:, None], self.solver.solve(rhs[self.kept_rows], most)[:, None])[:, 0]
+            kept = self.solver.solve(rhs[self.kept_rows], most)[:, None]
+            if self.kept.all():
+                return kept[:, 0]
+            return self._complete(rhs[:, None], kept, self._multiply_cracks(kept))[:, 0]
 
     def solve_columns(self, rhs: Real) -> Real:
         """This rank's rows (rows, k) of the solutions for many right-hand sides, by the factors alone."""
         with clock.piece("columns", rhs.nbytes):
-            return self._complete(rhs, self.factors.solve_columns(rhs[self.kept_rows]))
+            given, factors = rhs[self.kept_rows], self.factors
+            if self.kept.all():
+                return factors.solve_columns(given)
+            if isinstance(factors, PanelFactors) and rhs.shape[1] >= FORMED:
+                return self._complete(rhs, *factors.solve_and_multiply(given, len(self.crack_rows), self._form_cracks))
+            kept = factors.solve_columns(given)
+            return self._complete(rhs, kept, self._multiply_cracks(kept))
 
-    def _complete(self, rhs: Real, kept: Real) -> Real:
-        """Add the eliminated unknowns (rows, k) to the solution for the others (theory, 60)."""
-        if self.kept.all():
-            return kept
-        assert self.present is not None
-        problem = self.problem
-        whole = np.zeros((problem.unknowns, rhs.shape[1]))
-        whole[self.kept] = gather_parts(problem.comm, kept.ravel()).reshape(-1, rhs.shape[1])
-        left = rhs[self.crack_rows] - self._multiply_cracks(whole)
-        result = np.empty((self.rows, rhs.shape[1]))
+    def _complete(self, rhs: Real, kept: Real, product: Real) -> Real:
+        """Add the eliminated unknowns (rows, k) to the solution for the others; product: A_cf x_f (theory, 60)."""
+        left, result = rhs[self.crack_rows] - product, np.empty((self.rows, rhs.shape[1]))
         result[self.kept_rows] = kept
         result[self.crack_rows] = np.matmul(self.free_blocks, left.reshape(-1, 2, rhs.shape[1])).reshape(left.shape)
         return result
 
-    def _multiply_cracks(self, whole: Real) -> Real:
-        """This rank's rows of A_cf x (crack rows, c), for many x (unknowns, c) without the eliminated unknowns.
+    def _multiply_cracks(self, kept: Real) -> Real:
+        """This rank's rows of A_cf x_f (crack rows, c), for its rows of many x_f.
 
-        For so many that it pays A_cf is formed first, which is half as wide as B, and every rank multiplies some of
-        them by all of its rows, as cracks may lie on few ranks.
+        For so many that it pays A_cf is formed first, which is half as wide as B.
         """
         assert self.present is not None
-        if whole.shape[1] < FORMED:
-            result = np.zeros((len(self.crack_rows), whole.shape[1]))
-            for block, rows, places in self._list_crack_rows():
-                result[places] += take_rows(block.matrix, rows) @ (self.present[block.columns] @ whole)
-            return result
         comm = self.problem.comm
-        share = np.linspace(0, whole.shape[1], comm.size + 1).astype(int)
-        counts = comm.allgather(len(self.crack_rows))
-        mine, numbers = whole[:, share[comm.rank] : share[comm.rank + 1]], np.flatnonzero(self.kept)
-        product = np.zeros((sum(counts), mine.shape[1]))
-        for begin in range(0, len(numbers), COLUMNS_AT_ONCE):
-            columns = numbers[begin : begin + COLUMNS_AT_ONCE]
-            formed = np.zeros((len(self.crack_rows), len(columns)))
-            for block, rows, places in self._list_crack_rows():
-                formed[places] += form_columns(self.operator, block, self.present, columns, rows)
-            product += gather_rows(comm, formed) @ mine[columns]
-        before = sum(counts[: comm.rank])
-        return gather_rows(comm, product.T)[:, before : before + len(self.crack_rows)].T
+        whole = gather_rows(comm, kept)
+        if kept.shape[1] >= FORMED:
+            mine = whole[:, share_columns(comm, kept.shape[1])[comm.rank]].T
+            return multiply_rows(comm, mine, len(self.crack_rows), self._form_cracks)
+        result = np.zeros((len(self.crack_rows), kept.shape[1]))
+        every = np.zeros((self.problem.unknowns, kept.shape[1]))
+        every[self.kept] = whole
+        for block, rows, places in self._list_crack_rows():
+            result[places] += take_rows(block.matrix, rows) @ (self.present[block.columns] @ every)
+        return result
+
+    def _form_cracks(self, columns: slice) -> Real:
+        """This rank's rows of A_cf (crack rows, columns)."""
+        assert self.present is not None
+        of = np.flatnonzero(self.kept)[columns]
+        formed = np.zeros((len(self.crack_rows), len(of)))
+        for block, rows, places in self._list_crack_rows():
+            formed[places] += form_columns(self.operator, block, self.present, of, rows)
+        return formed
 
     def _list_crack_rows(self) -> list[tuple[RegionRows, Integer, Integer]]:
         """Blocks with rows of eliminated unknowns, these rows in the block, and their places among crack_rows."""

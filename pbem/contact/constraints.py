@@ -97,19 +97,37 @@ def build_constraints(
     gone (k,): nodes on interfaces and cracks of regions that are gone. (theory, 44, 96)
     """
     entries = _Entries(mesh.nodes)
+    _constrain_outer_nodes(entries, outer, traction_scale)
+    _constrain_pairs(entries, mesh, law)
+    for rigid in outer.rigid:
+        own = constrain_rigid_nodes(rigid, mesh.nodes, load.rigid[rigid.number], traction_scale)
+        entries.add_entries(own.rows, own.columns, own.values)
+    matrix = entries.build()
+    if gone is not None and len(gone):
+        matrix = _hold_still(matrix, gone, traction_scale)
+    constant = build_offset(mesh, outer, gap, law, load, traction_scale, gone)
+    return ConstraintMap(matrix, constant, given=_measure_given(constant, load, traction_scale))
+
+
+def build_offset(
+    mesh: Mesh, outer: OuterNodes, gap: Real, law: Linearisation, load: Load, traction_scale: float,
+    gone: Integer | None = None,
+) -> Real:
+    """The offset (4 nodes,) of the map by itself; see build_constraints."""
     offset = np.zeros((2, mesh.nodes), dtype=complex)
-    _constrain_outer_nodes(entries, offset, outer, load, traction_scale)
-    _constrain_pairs(entries, offset, mesh, gap, law, load.carried)
+    for k in range(2):
+        direction, known = outer.direction[:, k], outer.displacement_known[:, k]
+        for field, taken in ((DISPLACEMENT, known), (TRACTION, ~known)):
+            offset[field, outer.node[taken]] += load.values[taken, k] * direction[taken]
+    _offset_pairs(offset, mesh, gap, law, load.carried)
     offset[TRACTION] += evaluate_fluid(mesh, load.pressure)
     constant = np.stack([offset.real, offset.imag], axis=2).ravel()
     for rigid in outer.rigid:
         own = constrain_rigid_nodes(rigid, mesh.nodes, load.rigid[rigid.number], traction_scale)
-        entries.add_entries(own.rows, own.columns, own.values)
         constant[own.offset_rows] += own.offset
-    matrix = entries.build()
     if gone is not None and len(gone):
-        matrix, constant = _hold_still(matrix, constant, gone, traction_scale)
-    return ConstraintMap(matrix, constant, given=_measure_given(constant, load, traction_scale))
+        constant *= _list_moving(gone, mesh.nodes)
+    return constant
 
 
 def _measure_given(constant: Real, load: Load, traction_scale: float) -> float:
@@ -120,25 +138,27 @@ def _measure_given(constant: Real, load: Load, traction_scale: float) -> float:
     return float(np.linalg.norm([np.linalg.norm(part) for part in parts]))
 
 
-def _hold_still(
-    matrix: sparse.csr_matrix, constant: Real, gone: Integer, traction_scale: float
-) -> tuple[sparse.csr_matrix, Real]:
+def _list_moving(gone: Integer, nodes: int) -> Real:
+    """1 for the entries of v (4 nodes,) of nodes that are not gone, 0 for those of the others."""
+    rows, own = np.ones(4 * nodes), number_components(gone)
+    rows[own], rows[2 * nodes + own] = 0.0, 0.0
+    return rows
+
+
+def _hold_still(matrix: sparse.csr_matrix, gone: Integer, traction_scale: float) -> sparse.csr_matrix:
     """The map in which these nodes do not move and their tractions are their own unknowns, and nothing else depends on
     these: of a region that is gone, a state that is zero and disturbs no other (theory, 96)."""
-    nodes = len(constant) // 4
-    own = number_components(gone)
-    rows, columns = np.ones(4 * nodes), np.ones(2 * nodes)
-    rows[own], rows[2 * nodes + own], columns[own] = 0.0, 0.0, 0.0
+    nodes = matrix.shape[0] // 4
+    own, columns = number_components(gone), np.ones(2 * nodes)
+    columns[own] = 0.0
     still = sparse.csr_matrix((np.full(len(own), traction_scale), (2 * nodes + own, own)), shape=matrix.shape)
-    left = (sparse.diags(rows) @ matrix @ sparse.diags(columns) + still).tocsr()
+    left = (sparse.diags(_list_moving(gone, nodes)) @ matrix @ sparse.diags(columns) + still).tocsr()
     left.eliminate_zeros()
-    return left, rows * constant
+    return left
 
 
-def _constrain_outer_nodes(
-    entries: _Entries, offset: Complex, outer: OuterNodes, load: Load, traction_scale: float
-) -> None:
-    """Displacement and traction of outer nodes by their unknowns and the prescribed values (theory, 45)."""
+def _constrain_outer_nodes(entries: _Entries, outer: OuterNodes, traction_scale: float) -> None:
+    """Displacement and traction of outer nodes by their unknowns; prescribed values are in the offset (theory, 45)."""
     for k in range(2):
         direction, known = outer.direction[:, k], outer.displacement_known[:, k]
         unknown = 2 * outer.node + k
@@ -148,26 +168,18 @@ def _constrain_outer_nodes(
         sprung = outer.stiffness[:, k] > 0
         spring = -outer.stiffness[sprung, k] * direction[sprung]
         entries.add(TRACTION, outer.node[sprung], unknown[sprung], spring)
-        for field, taken in ((DISPLACEMENT, known), (TRACTION, ~known)):
-            offset[field, outer.node[taken]] += load.values[taken, k] * direction[taken]
 
 
-def _constrain_pairs(
-    entries: _Entries, offset: Complex, mesh: Mesh, gap: Real, law: Linearisation, carried: Real
-) -> None:
+def _constrain_pairs(entries: _Entries, mesh: Mesh, law: Linearisation) -> None:
     """The slave node follows the other side but for the jump; the other side carries the opposite of its traction.
 
-    The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge. carried (m, 2): what
-    opened faces still carry besides their law.
+    The jump is that of the pair's leader, which is itself but in the corner of a narrow wedge.
     (theory, 47, 65, 95)
     """
     pairs, links = mesh.pairs, mesh.links
     n, s = pairs.normal, 1j * pairs.normal
     givers = links.traction_pair
     led = law.leader
-    constant_jump = pairs.sense * ((law.offset[led, G_N] - gap[led]) * n + law.offset[led, G_S] * s)
-    borne_n, borne_s = law.offset[:, P_N] + carried[:, 0], law.offset[:, P_S] + carried[:, 1]
-    constant_traction = -pairs.sense * (borne_n * n + borne_s * s)
     for k in range(2):
         unknown = 2 * pairs.slave + k
         jump = pairs.sense * (law.tangent[led, G_N, k] * n + law.tangent[led, G_S, k] * s)
@@ -178,9 +190,21 @@ def _constrain_pairs(
         entries.add(DISPLACEMENT, links.carrier, 2 * links.carrier + k, np.full(len(links.carrier), 1j**k))
         follower = pairs.slave[links.displacement_pair]
         entries.add(DISPLACEMENT, follower, 2 * links.displacement_node + k, links.displacement_weight * 1j**k)
+
+
+def _offset_pairs(offset: Complex, mesh: Mesh, gap: Real, law: Linearisation, carried: Real) -> None:
+    """The constant part of what `_constrain_pairs` says; carried (m, 2): what opened faces still carry besides their
+    law.
+    """
+    pairs, links, led = mesh.pairs, mesh.links, law.leader
+    n, s = pairs.normal, 1j * pairs.normal
+    constant_jump = pairs.sense * ((law.offset[led, G_N] - gap[led]) * n + law.offset[led, G_S] * s)
+    borne_n, borne_s = law.offset[:, P_N] + carried[:, 0], law.offset[:, P_S] + carried[:, 1]
+    constant_traction = -pairs.sense * (borne_n * n + borne_s * s)
     offset[DISPLACEMENT, pairs.slave] += constant_jump
     offset[TRACTION, pairs.slave] += constant_traction
-    np.subtract.at(offset[TRACTION], links.traction_node, links.traction_weight * constant_traction[givers])
+    given = links.traction_weight * constant_traction[links.traction_pair]
+    np.subtract.at(offset[TRACTION], links.traction_node, given)
 
 
 def evaluate_fluid(mesh: Mesh, pressure: Real) -> Complex:

@@ -202,7 +202,7 @@ class CondensedTangent(TangentOperator):
         offset = np.zeros_like(law.offset)
         offset[self.fixed] = fixed
         offset[self.varying, G_N] = problem.laws.gap[self.varying]
-        constant = problem.constrain(Linearisation(known.laws, offset, law.leader), load).offset
+        constant = problem.find_offset(Linearisation(known.laws, offset, law.leader), load)
         vector = join_load(constant, load, problem.traction_scale)
         loads, parts = known.loads.extend(vector, lambda: problem.apply(constant, load), self._solve_load)
         found = LoadSolution(load, fixed, constant, *loads.combine(parts))

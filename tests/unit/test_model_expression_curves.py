@@ -55,6 +55,22 @@ def test_a_circle_is_drawn_exactly_and_corners_stay() -> None:
     assert all(leg.center is None for leg in pointed)  # the corner lies in the middle of the third
 
 
+@pytest.mark.parametrize(
+    ("expression", "elements", "turn"),
+    [
+        ('["1 - cos(pi*t)", "-sin(pi*t)"]', 3, "60"),
+        ('["1 - cos(pi*t)", "-sin(pi*t)"]', 5, ""),  # arcs
+        ('["2*t", "0.8*(abs(1 - 2*t) - 1)"]', 8, ""),  # one corner
+        ('["2*t", "-0.1*sin(20*pi*t)"]', 20, ""),  # turns to and fro
+    ],
+)
+def test_elements_that_turn_by_too_much_to_be_arcs_are_told(expression: str, elements: int, turn: str) -> None:
+    notes = build(with_bottom(f"expression = {expression}, elements = {elements}")).notes
+    told = [note for note in notes if "are straight" in note]
+    assert len(told) == bool(turn)
+    assert all(f"by up to {turn} degrees" in note and "'bottom'" in note for note in told)
+
+
 def test_constant_component() -> None:
     curve = build(with_bottom('expression = ["2*t", "0"], elements = 4')).curves["bottom"]
     assert [leg.end for leg in curve.legs] == [0.5, 1.0, 1.5, 2.0]

@@ -14,7 +14,7 @@ from pbem.errors import Fault
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
 from pbem.geometry.expression import ExpressionError, read_expression
-from pbem.geometry.tolerance import Tolerance, join_points
+from pbem.geometry.tolerance import TIE, Tolerance, join_points
 
 # Degrees that one circular element may turn by: beyond, its shape functions are far from polynomials of the arc length.
 WIDEST_ARC = 45.0
@@ -105,7 +105,7 @@ def _bend(points: Sequence[complex]) -> Leg:
     if middle in (start, end) or start == end:
         return straight
     sweep = 2 * cmath.phase((end - middle) / (middle - start))
-    if not LEAST_BENT <= abs(sweep) <= math.radians(WIDEST_ARC):
+    if not LEAST_BENT <= abs(sweep) <= math.radians(WIDEST_ARC) * (1 + TIE):
         return straight
     center = 0.5 * (start + end) + 0.5j * (end - start) / math.tan(0.5 * sweep)
     rise, radius = abs(middle - 0.5 * (start + end)), abs(start - center)

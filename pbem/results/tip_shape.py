@@ -230,7 +230,7 @@ class _Near:
         most: elements that are used, at most. (theory, 70)
         """
         lateral = (3 - self.shape.kappa) / (1 + self.shape.kappa)
-        smooth = self._count_smooth() if most is None else min(most, self._count_smooth())
+        smooth = self._count_smooth() if most is None else min(max(most, self._least), self._count_smooth())
         length = self.elements.arc_lengths(self.shape.local)[:smooth].ravel()
         weight = np.sqrt(np.repeat(self.elements.lengths[:smooth], len(self.shape.local)))
         reach = length.max()
@@ -257,7 +257,12 @@ class _Near:
         curvature = elements.curvature(ends)
         turned = np.abs(np.angle(leaves[1:] / arrives[:-1])) > BENT
         bent = np.abs(curvature[1:, 0] - curvature[:-1, 1]) * np.abs(elements.end[:-1]) > BENT
-        return int(np.argmax(np.append(turned | bent, True))) + 1
+        return max(int(np.argmax(np.append(turned | bent, True))) + 1, self._least)
+
+    @property
+    def _least(self) -> int:
+        """The fewest elements that tell a slope: constant ones have one point each."""
+        return min(1 if len(self.shape.local) > 1 else 2, self.elements.count)
 
     def _divide_faces(self, by_length: bool = True) -> tuple[Real, Real]:
         """Coordinates s (e, q) on the elements within the circle, crowded at the tip, and weights of the length."""

@@ -142,8 +142,10 @@ class TipRules:
 
     def _count_even(self, contact: ContactState, near: Integer) -> Integer:
         """On how many elements (k,) from tips on, with the pairs near (k, m (p + 1)), the pressure on open faces does
-        not jump: the stress along the crack jumps with it."""
+        not jump: the stress along the crack jumps with it. Of constant elements, which always jump, all."""
         per_element = self.mesh.order + 1
+        if per_element == 1:
+            return np.full(len(near), near.shape[1])
         pressure = contact.traction_n[near].reshape(len(near), -1, per_element)
         is_open = (contact.mode[near] == OPEN).reshape(pressure.shape).all(axis=2)
         at_ends = np.array([[-1.0], [1.0]]) ** np.arange(per_element) @ interpolate_shapes(self.mesh.crack_local)

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from pbem.errors import Fault
+from pbem.geometry.shape import Division, draw_expression
 from tests.unit.case_sample import BLOCKS, SQUARE, add_curves, build, change, find_faults, find_only_fault
 
 BOTTOM = "bottom = { points = [[0, 0], [2, 0]], elements = 8 }"
@@ -43,6 +45,15 @@ def test_points_lie_on_the_curve_and_elements_between() -> None:
 def test_grading_acts_on_t(grading: str, expected: list[float]) -> None:
     curve = build(with_bottom(f'{WAVE}, elements = [8], grading = "{grading}", power = 2')).curves["bottom"]
     assert np.array([leg.start.real for leg in curve.legs] + [2.0]) == pytest.approx(2 * np.array(expected), abs=1e-14)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_all_elements_of_a_circle_anywhere_are_arcs_up_to_45_degrees(seed: int) -> None:
+    x, y, radius = np.random.default_rng(seed).uniform([-9, -9, 0.1], [9, 9, 9])
+    one, other = (f"{at} + {radius}*{turn}(2*pi*t)" for at, turn in ((x, "cos"), (y, "sin")))
+    circle = draw_expression("c", (one, other), Division(8))
+    assert not isinstance(circle, Fault)
+    assert [leg.sweep for leg in circle.legs] == pytest.approx([math.radians(45)] * 8)
 
 
 def test_a_circle_is_drawn_exactly_and_corners_stay() -> None:

@@ -260,3 +260,32 @@ def test_the_parallel_stress_where_fluid_lags_behind_the_tips(wetted: float, ord
     KI = 0.5 * math.sqrt(math.pi) + 6 / math.sqrt(math.pi) * math.asin(wetted)
     np.testing.assert_allclose(tips.KI[-1], KI, rtol=1e-9)
     np.testing.assert_allclose(tips.T[-1], 0.2 - 0.5, atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_the_parallel_stress_where_the_pressure_varies(order: int, tmp_path: Path) -> None:
+    """Constant elements jump everywhere, which tells of no jump of the pressure."""
+    results = pbem.run({
+        "materials": {"m": {"young": 1e3, "poisson": 0.25}},
+        "curves": {"c": {"points": [[-1, 0], [1, 0]], "elements": 8}},
+        "regions": {"p": {"material": "m", "infinite": True, "cracks": ["c"]}},
+        "interfaces": {"c": {"law": "open", "pressure": {"expression": "2 + 1.5*x"}}},
+        "remote": {"sxx": 1.0, "syy": 1.0},
+        "analysis": {"steps": 1, "order": order},
+    }, tmp_path / "varying.h5")  # fmt: skip
+    np.testing.assert_allclose(results.tips["c"].T[-1], [-0.5, -3.5], atol=0.1 if order == 0 else 1e-9)
+
+
+def test_the_parallel_stress_of_one_constant_element_before_a_turn(tmp_path: Path) -> None:
+    """One point tells no slope, which bears all of the far stress."""
+    found = {}
+    for order, elements in ((0, [1, 4]), (2, [12, 48])):
+        found[order] = pbem.run({
+            "materials": {"m": {"young": 1e3, "poisson": 0.25}},
+            "curves": {"c": {"points": [[-1, 0], [0, 0], [1, 0.05]], "elements": elements}},
+            "regions": {"p": {"material": "m", "infinite": True, "cracks": ["c"]}},
+            "interfaces": {"c": {"law": "open"}},
+            "remote": {"sxx": 2.0, "syy": 1.0},
+            "analysis": {"steps": 1, "order": order},
+        }, tmp_path / f"turn{order}.h5").tips["c"].T[-1, 0]  # fmt: skip
+    assert found[0] == pytest.approx(found[2], rel=0.03)

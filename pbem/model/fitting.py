@@ -66,7 +66,7 @@ def fit_curves(
     ]
     inside = [[load.place for load in loads if load.region == region.name and not load.on_boundary]
               for region in regions]
-    on_interfaces = find_interface_ends(curves, regions)
+    on_interfaces = find_interface_ends(curves, regions, bonded)
     last_bits = {end.point: choose_last_bit(end.power) for end in on_interfaces}
     sizes = fit_lengths(curves, sides, with_elements, kept, case.analysis.order, inside, last_bits)
     if sizes.excess is not None:

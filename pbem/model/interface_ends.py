@@ -45,39 +45,42 @@ class InterfaceEnd:
 @dataclass(frozen=True)
 class _Ray:
     """A leg as seen from one of its ends: angle of its direction; materials on its left and on its right when leaving
-    the point (None: nothing is there); crack: its name if it is one, else empty."""
+    the point (None: nothing is there); bonded: whether it holds both together; crack: its name if it is one, else
+    empty."""
 
     angle: float
     left: Material | None
     right: Material | None
+    bonded: bool
     crack: str
 
 
-def find_interface_ends(curves: Mapping[str, Curve], regions: Sequence[Region]) -> tuple[InterfaceEnd, ...]:
+def find_interface_ends(
+    curves: Mapping[str, Curve], regions: Sequence[Region], bonded: Collection[str]
+) -> tuple[InterfaceEnd, ...]:
     """The ends of cracks on an interface with a softer material, in the order of the points; without those whose power
-    is MOST or more."""
+    is MOST or more. bonded: curves that always hold two regions together; others are taken for free on both sides."""
     sides: dict[str, list[Material | None]] = {}
     cracks = {crack: region.material for region in regions for crack in region.cracks}
     for region in regions:
         for side in (side for loop in region.loops for side in loop.sides):
             sides.setdefault(side.curve, [None, None])[0 if side.forward else 1] = region.material
     sides |= {crack: [material, material] for crack, material in cracks.items()}
-    shared = {name for name, (left, right) in sides.items() if left and right and name not in cracks}
-    if not shared or not cracks:
+    if not bonded or not cracks:
         return ()
     rays: dict[complex, list[_Ray]] = {}
     for name, curve in curves.items():
         left, right = sides.get(name, (None, None))
-        crack = name if name in cracks else ""
+        held, crack = name in bonded and bool(left and right), name if name in cracks else ""
         for leg in curve.legs:
-            rays.setdefault(leg.start, []).append(_Ray(cmath.phase(leg.tangent(False)), left, right, crack))
-            rays.setdefault(leg.end, []).append(_Ray(cmath.phase(-leg.tangent(True)), right, left, crack))
+            rays.setdefault(leg.start, []).append(_Ray(cmath.phase(leg.tangent(False)), left, right, held, crack))
+            rays.setdefault(leg.end, []).append(_Ray(cmath.phase(-leg.tangent(True)), right, left, held, crack))
     found = []
     for point, around in rays.items():
         ending = [ray for ray in around if ray.crack]
         stiff = max((ray.left.plane_modulus for ray in ending if ray.left), default=0.0)
         others = [ray.left.plane_modulus for ray in around if ray.left and not ray.crack]
-        if ending and any(not ray.crack and ray.left and ray.right for ray in around) and min(others) < stiff:
+        if ending and any(ray.bonded for ray in around) and min(others) < stiff:
             power = _find_power(sorted(around, key=lambda ray: ray.angle))
             if power < MOST:
                 found.append(InterfaceEnd(ending[0].crack, point, power))
@@ -112,8 +115,7 @@ def _find_power(around: Sequence[_Ray]) -> float:
     sectors = tuple((ray.left.kappa, ray.left.shear_modulus) if ray.left else None for ray in around)
     largest = max(each[1] for each in sectors if each)
     scaled = tuple(each and (round(each[0], 12), round(each[1] / largest, 12)) for each in sectors)
-    bonded = tuple(not ray.crack and ray.left is not None and ray.right is not None for ray in around)
-    return _solve(angles, scaled, bonded)
+    return _solve(angles, scaled, tuple(ray.bonded for ray in around))
 
 
 @lru_cache(maxsize=256)

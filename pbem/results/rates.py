@@ -17,6 +17,7 @@ from pbem.mesh.carry import list_curve_elements
 from pbem.mesh.mesh import Mesh
 from pbem.model.interface_ends import find_interface_ends
 from pbem.model.model import Model
+from pbem.model.thin_bodies import list_bonded
 from pbem.solve.estimate.coarser_mesh import Beside
 from pbem.solve.problem.step import ContactState
 
@@ -190,7 +191,8 @@ def list_corner_ends(model: Model) -> list[LegEnd]:
             meeting.setdefault(leg.end, []).append((last, -leg.tangent(True)))
             number += leg.elements
     found: list[LegEnd] = []
-    on_interfaces = {end.point: end.power for end in find_interface_ends(model.curves, model.regions)}
+    bonded = list_bonded(model.interfaces, model.stages)
+    on_interfaces = {end.point: end.power for end in find_interface_ends(model.curves, model.regions, bonded)}
     for point, ends in meeting.items():
         if len(ends) == 2:
             turn = abs(cmath.phase(-ends[0][1] / ends[1][1]))

@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 import pbem
 from pbem.model.build import build_model
 from pbem.model.interface_ends import find_interface_ends
+from pbem.model.thin_bodies import list_bonded
 
 Tables = dict[str, Any]
 
@@ -75,7 +76,7 @@ def zak_williams(softer: float, poisson: float = 0.25) -> float:
 @pytest.mark.parametrize("turn", [1.0, 0.6 + 0.8j])
 def test_the_power_is_that_of_zak_and_williams(softer: float, turn: complex) -> None:
     model = build_model(pbem.Case(**make_plate(softer, turn=turn)))
-    (end,) = find_interface_ends(model.curves, model.regions)
+    (end,) = find_interface_ends(model.curves, model.regions, list_bonded(model.interfaces, model.stages))
     assert (end.crack, abs(end.point)) == ("crack", pytest.approx(0, abs=1e-12))
     assert end.power == pytest.approx(zak_williams(softer), rel=1e-6)
 
@@ -83,7 +84,19 @@ def test_the_power_is_that_of_zak_and_williams(softer: float, turn: complex) -> 
 @pytest.mark.parametrize("softer", [1.0, 3.0])
 def test_beyond_the_same_or_a_stiffer_material_powers_are_as_usual(softer: float) -> None:
     model = build_model(pbem.Case(**make_plate(softer)))
-    assert find_interface_ends(model.curves, model.regions) == ()
+    assert find_interface_ends(model.curves, model.regions, list_bonded(model.interfaces, model.stages)) == ()
+
+
+@pytest.mark.parametrize("law", [{"law": "frictionless"}, {"law": "open"}, {"law": "coulomb", "friction": 0.5},
+                                 {"law": "bonded", "normal_stiffness": 1e3, "tangential_stiffness": 1e3}])
+def test_beyond_an_interface_that_does_not_hold_powers_are_as_usual(law: dict[str, Any]) -> None:
+    case = make_plate(0.01)
+    held, free = (build_model(pbem.Case(**case | {"interfaces": each}))
+                  for each in ({}, {"lower": law, "upper": law}))
+    assert list_bonded(held.interfaces, held.stages) and not list_bonded(free.interfaces, free.stages)
+    graded, usual = (sum(leg.elements for leg in each.curves["crack"].legs) for each in (held, free))
+    assert usual < graded
+    assert not any("softer material" in note for note in free.notes)
 
 
 @pytest.mark.parametrize(("softer", "order", "error"), [(0.3, 1, 2e-3), (0.3, 2, 6e-4), (0.1, 2, 2e-3), (0.1, 3, 3e-4),

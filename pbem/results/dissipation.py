@@ -71,12 +71,13 @@ class PairWork:
     taken: float
 
 
-def record_pairs_at_rest(laws: PairLaws, p_n: Real, p_s: Real) -> PairRecord:
+def record_pairs_at_rest(laws: PairLaws, p_n: Real, p_s: Real, opening: Bool | None = None) -> PairRecord:
     """Before any load; p_n, p_s (m,): tractions of the in-situ stress, which the pairs bear, but for joints that take
-    it as a load: these begin without."""
+    it as a load: these begin without. opening (m,): pairs that open in the first stage, from what they would bear."""
     memory = start_memory(laws)
-    p_n = np.where((laws.compliance_n > 0) & (laws.at_rest_n == 0), 0.0, p_n)
-    p_s = np.where((laws.compliance_s > 0) & (laws.at_rest_s == 0), 0.0, p_s)
+    loaded = True if opening is None else ~opening
+    p_n = np.where((laws.compliance_n > 0) & (laws.at_rest_n == 0) & loaded, 0.0, p_n)
+    p_s = np.where((laws.compliance_s > 0) & (laws.at_rest_s == 0) & loaded, 0.0, p_s)
     zeros = np.zeros(laws.count)
     bond = np.where(laws.at_rest_n != 0, measure_stiffening(laws, p_n, zeros), 0.0)
     return PairRecord(

@@ -117,7 +117,9 @@ class StoredEnergy:
         ]  # fmt: skip
         self._is_tool = np.array([each.rigid for each in model.regions])[self._faces.region]
         self._in_situ = self._sample_in_situ()
-        self._pairs_at_rest = record_pairs_at_rest(self.laws, *bear_in_situ(model, mesh)[:2])
+        first = find_arrangement(model, mesh, self.outer, 0)
+        self._pairs_at_rest = record_pairs_at_rest(
+            self.laws, *bear_in_situ(model, mesh)[:2], opening=None if first is None else first.opening)
 
     @property
     def pair_weight(self) -> Real:

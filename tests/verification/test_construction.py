@@ -351,6 +351,27 @@ def test_what_is_removed_first_may_have_another_stress(
     np.testing.assert_allclose(left, 0.0, atol=1e-6 * np.abs(energy.removed).max())
 
 
+@pytest.mark.parametrize("steps", [1, 2])
+@pytest.mark.parametrize("stressed", ["rock", "ore"])
+def test_what_opens_first_between_different_stresses_releases_the_same_with_a_joint(
+    stressed: str, steps: int, tmp_path: Path
+) -> None:
+    """The faces are free in the end, and go there from the mean of what both sides push with, elastic joint or not."""
+    energies = []
+    for stiffness in ({}, {"normal_stiffness": 1e4, "tangential_stiffness": 1e4}):
+        case = make_tunnel([{"name": "part", "steps": steps, "open": ["wall"]}],
+                           interfaces={"wall": {"law": "bonded", **stiffness}})
+        case["materials"]["ore"] = {"young": 3 * YOUNG, "poisson": POISSON}
+        case["regions"]["core"]["material"] = "ore"
+        case["initial_stress"] = {stressed: {"sxx": HORIZONTAL, "syy": VERTICAL}}
+        energies.append(pbem.run(case, tmp_path / "parted.h5", force=True).energy)
+    rigid, jointed = energies
+    assert abs(rigid.removed[-1]) > 0.1 * abs(rigid.elastic[-1])
+    for name in ("external", "elastic", "removed"):
+        expected, found = (getattr(each, name)[-1] for each in (rigid, jointed))
+        assert found == pytest.approx(expected, rel=1e-6), name
+
+
 @pytest.mark.parametrize("turn", [0.0, 30.0])
 @pytest.mark.parametrize("tractions_first", [False, True])
 def test_a_wall_whose_load_comes_to_be_along_other_axes(tractions_first: bool, turn: float, tmp_path: Path) -> None:

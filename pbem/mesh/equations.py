@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pbem.geometry.curve import Curve
+from pbem.model.beside_cracks import LegNumber, find_legs_beside_cracks
 from pbem.model.model import Model, Region
 from pbem.model.sight import Strip, find_strips
 from pbem.wording import list_names
@@ -25,12 +26,13 @@ class Equations:
 
 
 def choose_equations(model: Model) -> Equations:
-    """What the scheme asks for, but for three exceptions.
+    """What the scheme asks for, but for four exceptions.
 
     A rigid motion of a closed inner curve produces nothing in the region outside it through the traction equation, so
     that an inner loop always keeps the displacement equation; with DBEM the side across it takes the traction equation.
     Traction equations on both faces of a narrow slot say nearly the same: there one of the faces keeps the displacement
     equation, as on the faces of a crack; both do on the faces of a thin part, which a traction equation hardly bends.
+    The same holds for faces beside a crack of the region.
     Elements at corners, ends of contact and changes of condition keep the displacement equation, see `_keep_ends`.
     """
     inner = find_inner_curves(model)
@@ -45,10 +47,13 @@ def choose_equations(model: Model) -> Equations:
                  for leg, asks in enumerate(legs) if asks]  # fmt: skip
         strips = find_strips(model, region, asked) if len(asked) > 1 else []
         kept = _cover_strips(strips)
+        notes += _explain_strips(model, region, strips, kept)
+        beside = find_legs_beside_cracks(model, region, [leg for leg in asked if leg not in kept])
+        notes += _explain_beside(model, region, beside)
+        kept = kept.union(beside)
         for curve in {curve for curve, _ in kept}:
             legs = traction[number, curve]
             traction[number, curve] = tuple(asks and (curve, leg) not in kept for leg, asks in enumerate(legs))
-        notes += _explain_strips(model, region, strips, kept)
     elements = {
         (number, curve): _keep_ends(model.curves[curve], legs) for (number, curve), legs in traction.items()
     }
@@ -105,6 +110,17 @@ def _explain_strips(
         f"{model.analysis.scheme} has traction equations on both faces, which do not distinguish them"
         for curve, strip in narrowest.items()
     ]
+
+
+def _explain_beside(model: Model, region: Region, beside: Mapping[LegNumber, str]) -> list[str]:
+    """A sentence on the curves that keep the displacement equation beside cracks."""
+    if not beside:
+        return []
+    curves, cracks = (list_names(list(dict.fromkeys(names)), MOST_NOTES)
+                      for names in ([curve for curve, _ in beside], beside.values()))
+    return [f"region {region.name} keeps the displacement equation on {curves}, beside {cracks}: "
+            f"{model.analysis.scheme} has a traction equation there, which hardly resists the bending of what is in "
+            "between"]
 
 
 def _explain_inner_loops(model: Model, inner: Mapping[str, frozenset[str]]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from pbem.arrays import Real
 from pbem.errors import Fault
 from pbem.geometry.curve import Curve, Leg
 from pbem.geometry.elements import Elements
@@ -21,6 +22,8 @@ WIDEST_ARC = 45.0
 # An element of a curve by expressions is straight if it turns by less (radians), or if the curve leaves the arc by more
 # than this part of its rise: the two halves of a corner do by 0.25.
 LEAST_BENT, ROUND = 1e-4, 0.15
+# Parts of an element at whose ends it is looked whether a curve turns within.
+LOOKED_AT = 12
 # Squares of coordinates must not overflow.
 LARGEST = 1e100
 
@@ -81,7 +84,7 @@ def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Cu
     uniform unless the division says more. See `_bend`."""
     path = ("curves", name, "expression")
     count = sum(division.count([1.0]))
-    ends = Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
+    ends = _divide_parameter(division, count)
     t = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(4) / 4).ravel(), ends[-1])
     try:
         x, y = (read_expression(text, t=t) for text in texts)
@@ -95,6 +98,30 @@ def draw_expression(name: str, texts: tuple[str, str], division: Division) -> Cu
             return Fault.at(path, found, f"a number of at most {LARGEST:g} everywhere")
     points = (np.zeros(len(t)) + x + 1j * y).tolist()
     return Curve(name, tuple(_bend(points[at:at + 5]) for at in range(0, 4 * count, 4)))
+
+
+def measure_straight(texts: tuple[str, str], division: Division, curve: Curve) -> float:
+    """The largest angle (degrees) by which a curve, drawn by `draw_expression`, turns within an element that is
+    straight; 0 if none is. Corners at the ends of elements are not within."""
+    count = len(curve.legs)
+    ends = _divide_parameter(division, count)
+    t = ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0.0, 1.0, LOOKED_AT + 1)
+    with np.errstate(all="ignore"):
+        try:
+            x, y = ((np.zeros(t.size) + read_expression(text, t=t.ravel())).reshape(t.shape) for text in texts)
+        except ExpressionError:  # between the points that the curve was drawn through
+            return 0.0
+        chord = np.diff(x + 1j * y, axis=1)
+        turns = np.abs(np.angle(chord[:, 1:] / chord[:, :-1]))
+    # Chords leave out what the curve turns by in halves of the first and of the last.
+    total = np.degrees(turns.sum(axis=1) + 0.5 * (turns[:, 0] + turns[:, -1]))
+    straight = np.array([leg.center is None for leg in curve.legs])
+    return float(np.nanmax(np.where(straight & np.isfinite(total), total, 0.0), initial=0.0))
+
+
+def _divide_parameter(division: Division, count: int) -> Real:
+    """t (count + 1,) at the ends of the elements of a curve by expressions."""
+    return Leg(0j, 1 + 0j, count, division.refine_start, division.refine_end, division.power).element_fractions()
 
 
 def _bend(points: Sequence[complex]) -> Leg:

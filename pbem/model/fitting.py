@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import cmath
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +13,6 @@ from pbem.errors import Fault
 from pbem.geometry.curve import Curve
 from pbem.geometry.intersection import measure_distances
 from pbem.geometry.junction import format_point
-from pbem.geometry.shape import WIDEST_ARC
 from pbem.geometry.tolerance import TIE
 from pbem.model.interface_ends import choose_last_bit, find_interface_ends, note_interface_ends
 from pbem.model.lengths import count_elements
@@ -74,28 +71,9 @@ def fit_curves(
     ties = tuple(tie for tie in sizes.wedges.ties if tie.curve in jointed)
     graded, near = _grade_contacts(case, sizes.curves, contacts)
     notes = [*_note_added(curves, sizes.curves, any(inside)), *near, *_note_ties(ties), *_note_long(sizes.long),
-             *_note_straight(case, curves), *note_interface_ends(on_interfaces, kept, MOST_NAMED),
+             *note_interface_ends(on_interfaces, sizes.curves, kept, MOST_NAMED),
              *_note_slender(case, sizes.curves, regions), *_note_thin(case, sizes.curves, regions, bonded)]
     return FittedCurves(graded, ties, tuple(notes), ())
-
-
-def _note_straight(case: Case, curves: Mapping[str, Curve]) -> list[str]:
-    """Curves by expressions that turn on from element to element by more than an arc may: these stay straight, and a
-    crack's last one then leads in a direction that is off by half of what it should turn by."""
-    widest = {}
-    for name, curve in curves.items():
-        if case.curves[name].expression:
-            turns = np.array([cmath.phase(after.tangent(False) / before.tangent(True))
-                              for before, after in pairwise(curve.legs)])
-            on = np.minimum(turns[1:] * np.sign(turns[:-1]), np.abs(turns[:-1]))  # of both joints of an element
-            if len(on) and np.degrees(on.max()) > WIDEST_ARC:
-                widest[name] = np.degrees(on.max())
-    if not widest:
-        return []
-    return [f"Curves by expressions turn by up to {max(widest.values()):.3g} degrees from one element to the next: "
-            f"{list_names([repr(name) for name in widest], MOST_NAMED)}. Such elements are straight, and factors, "
-            f"stresses and reactions may be far off, which estimates do not tell. Elements that turn by less than "
-            f"{WIDEST_ARC:g} degrees are arcs: give more of them."]
 
 
 def _note_slender(case: Case, curves: Mapping[str, Curve], regions: Sequence[Region]) -> list[str]:

@@ -20,6 +20,7 @@ from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
 from pbem.model.material import Material
 from pbem.model.model import Region
+from pbem.model.sliver import LEAST_AT_INTERFACE
 from pbem.wording import list_names
 
 # Powers that are looked for. From the largest on, elements at t^3 do; the least is that of a contrast of 3e4.
@@ -31,6 +32,8 @@ COST = 0.25
 AIM, LEAST_BIT = 2e-4, 1e-9
 # Errors of K that are told.
 TOLD = 3e-3
+# Last elements that are not longer by this factor are as they were chosen: they are parts of the shortest leg there.
+AS_CHOSEN = 10.0
 
 
 @dataclass(frozen=True)
@@ -93,19 +96,40 @@ def choose_last_bit(power: float) -> float:
     return float(max((AIM / COST) ** (0.5 / power), LEAST_BIT))
 
 
-def note_interface_ends(ends: Collection[InterfaceEnd], kept: Collection[str], most_named: int) -> list[str]:
-    """What is told of ends where no mesh is fine enough; kept: curves whose grading is the user's."""
-    doubtful = {}
+def note_interface_ends(
+    ends: Collection[InterfaceEnd], curves: Mapping[str, Curve], kept: Collection[str], most_named: int
+) -> list[str]:
+    """What is told of ends where no mesh is fine enough, and of those with too few elements for lengths that fall
+    towards them; curves: as they are divided; kept: those whose grading is the user's."""
+    doubtful: dict[bool, dict[str, tuple[float, float]]] = {False: {}, True: {}}
     for end in ends:
-        error = COST * choose_last_bit(end.power) ** (2 * end.power)
+        bit = choose_last_bit(end.power)
+        found = _measure_last_bit(curves[end.crack], end.point)
+        error = COST * max(found, bit) ** (2 * end.power)
         if error > TOLD and end.crack not in kept:
-            doubtful[f"'{end.crack}' at {format_point(end.point)}"] = (error, end.power)
-    if not doubtful:
-        return []
-    error, power = max(doubtful.values())
-    return [f"Cracks end on an interface with a much softer material: {list_names(list(doubtful), most_named)}. "
+            doubtful[found > AS_CHOSEN * bit][f"'{end.crack}' at {format_point(end.point)}"] = (error, end.power)
+    notes = []
+    if doubtful[False]:
+        error, power = max(doubtful[False].values())
+        notes.append(
+            f"Cracks end on an interface with a much softer material: {list_names(list(doubtful[False]), most_named)}. "
             f"Displacements there follow powers of the distance down to {power:.2g}, so that factors and openings "
-            f"depend on the last element, however short it is: by {100 * error:.2g} % or more."]
+            f"depend on the last element, however short it is: by {100 * error:.2g} % or more.")
+    if doubtful[True]:
+        error, power = max(doubtful[True].values())
+        notes.append(
+            "Cracks end on an interface with a softer material, on too few elements for lengths that fall towards it: "
+            f"{list_names(list(doubtful[True]), most_named)}. Displacements there follow powers of the distance down "
+            f"to {power:.2g}, and factors and openings may be off by {100 * error:.2g} %. With {LEAST_AT_INTERFACE} or "
+            "more elements on each leg that ends there lengths fall far enough.")
+    return notes
+
+
+def _measure_last_bit(crack: Curve, point: complex) -> float:
+    """Length of the longest of a crack's elements beside a point where it ends, as a part of its leg."""
+    bits = [1.0 - leg.element_fractions()[-2] for leg in crack.legs if leg.end == point]
+    bits += [leg.element_fractions()[1] for leg in crack.legs if leg.start == point]
+    return float(max(bits, default=0.0))
 
 
 def _find_power(around: Sequence[_Ray]) -> float:

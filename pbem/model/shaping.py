@@ -16,26 +16,31 @@ from pbem.geometry.arc_ends import MovedEnd, meet_arcs
 from pbem.geometry.curve import Curve
 from pbem.geometry.junction import format_point
 from pbem.geometry.shape import (
+    WIDEST_ARC,
     Division,
     draw_circle,
     draw_expression,
     draw_polyline,
     join_ends,
     measure_extent,
+    measure_straight,
 )
 from pbem.geometry.tolerance import Tolerance, make_tolerance
 from pbem.model.roles import Roles
+from pbem.wording import list_names
 
 # Squares of lengths must not underflow.
 SMALLEST = 1e-100
-# Ends that are named in one note.
+# Ends and curves that are named in one note.
 MOST_NAMED = 8
+# Straight elements of curves that turn by more (degrees) within them are told.
+MOST_STRAIGHT = 15.0
 
 
 @dataclass(frozen=True)
 class Shapes:
     """curves: in the order of the file, without those that have faults; tolerance: which points agree; notes: for the
-    user, of ends that were moved."""
+    user, of ends that were moved and of straight elements on curves that turn."""
 
     curves: Mapping[str, Curve]
     size: float
@@ -54,6 +59,7 @@ def shape_curves(case: Case, roles: Roles) -> Shapes:
             faults.append(curve)
         else:
             curves[name] = curve
+    straight = _note_straight(case, curves)
     size, largest = measure_extent(curves)
     tolerance = _find_tolerance(curves, roles, largest)
     if curves and not size > SMALLEST:
@@ -76,7 +82,7 @@ def shape_curves(case: Case, roles: Roles) -> Shapes:
             faults.append(Fault.at(("curves", name, key), f"{total} elements", expected))
             del curves[name]
     curves, moved = meet_arcs({name: table.boundary for name, table in case.regions.items()}, curves)
-    return Shapes(curves, size, tolerance, tuple(faults), tuple(_describe_moved(moved)))
+    return Shapes(curves, size, tolerance, tuple(faults), (*_describe_moved(moved), *straight))
 
 
 def _describe_moved(moved: Sequence[MovedEnd]) -> list[str]:
@@ -88,6 +94,21 @@ def _describe_moved(moved: Sequence[MovedEnd]) -> list[str]:
             f"{f', and {more} more' if more else ''}."]
 
 
+def _note_straight(case: Case, curves: Mapping[str, Curve]) -> list[str]:
+    """Elements of curves by expressions that stay straight where the curve turns: where a crack ends so, it leads in a
+    direction that is off by half of what the element should turn by."""
+    drawn = {name: table.expression for name, table in case.curves.items() if table.expression and name in curves}
+    turns = {name: measure_straight(texts, _read_division(case.curves[name]), curves[name])
+             for name, texts in drawn.items()}
+    told = {name: turn for name, turn in turns.items() if turn > MOST_STRAIGHT}
+    if not told:
+        return []
+    return [f"Curves by expressions turn by up to {max(told.values()):.3g} degrees within elements that are straight: "
+            f"{list_names([repr(name) for name in told], MOST_NAMED)}. Factors, stresses and reactions may be far off, "
+            f"which estimates do not tell. Elements that turn by less than {WIDEST_ARC:g} degrees in one sense are "
+            "arcs, and corners need ends of elements: give more of them."]
+
+
 def _find_tolerance(curves: Mapping[str, Curve], roles: Roles, largest: float) -> Tolerance:
     """largest: the largest coordinate of all curves."""
     regions = {name: frozenset((region,)) for name, region in (*roles.outer.items(), *roles.cracks.items())}
@@ -97,8 +118,7 @@ def _find_tolerance(curves: Mapping[str, Curve], roles: Roles, largest: float) -
 
 
 def _draw(name: str, table: CurveTable) -> Curve | Fault:
-    refine_start, refine_end = (table.grading in (end, "both") for end in ("start", "end"))
-    division = Division(table.elements, table.size, table.power, refine_start, refine_end)
+    division = _read_division(table)
     if table.expression is not None:
         return draw_expression(name, table.expression, division)
     if table.center is not None:
@@ -106,6 +126,11 @@ def _draw(name: str, table: CurveTable) -> Curve | Fault:
         return draw_circle(name, complex(*table.center), table.radius, division, table.angles)
     assert table.points is not None
     return draw_polyline(name, [complex(*point) for point in table.points], division)
+
+
+def _read_division(table: CurveTable) -> Division:
+    refine_start, refine_end = (table.grading in (end, "both") for end in ("start", "end"))
+    return Division(table.elements, table.size, table.power, refine_start, refine_end)
 
 
 def find_corners(case: Case) -> Complex:

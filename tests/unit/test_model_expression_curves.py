@@ -70,16 +70,36 @@ def test_a_circle_is_drawn_exactly_and_corners_stay() -> None:
     ("expression", "elements", "turn"),
     [
         ('["1 - cos(pi*t)", "-sin(pi*t)"]', 3, "60"),
+        ('["1 - cos(pi*t)", "-sin(pi*t)"]', 2, "90"),
+        ('["1 - cos(pi*t)", "-sin(pi*t)"]', 1, "180"),
         ('["1 - cos(pi*t)", "-sin(pi*t)"]', 5, ""),  # arcs
+        ('["1 - cos(pi*t)", "-0.3*sin(pi*t)"]', 9, "50.6"),  # of 20 degrees of t at the ends of the ellipse
+        ('["1 - cos(pi*t)", "-0.3*sin(pi*t)"]', 40, ""),
         ('["2*t", "0.8*(abs(1 - 2*t) - 1)"]', 8, ""),  # one corner
-        ('["2*t", "-0.1*sin(20*pi*t)"]', 20, ""),  # turns to and fro
+        ('["2*t", "0.1*(abs(4*t - 1) - 2*abs(4*t - 2) + abs(4*t - 3))"]', 4, ""),  # a corner at each end
+        ('["2*t", "0.1*(abs(4*t - 1) - 2*abs(4*t - 2) + abs(4*t - 3))"]', 1, "87.2"),  # three corners within
+        ('["2*t", "-0.1*sin(20*pi*t)"]', 20, "146"),  # turns to and fro
     ],
 )
-def test_elements_that_turn_by_too_much_to_be_arcs_are_told(expression: str, elements: int, turn: str) -> None:
-    notes = build(with_bottom(f"expression = {expression}, elements = {elements}")).notes
-    told = [note for note in notes if "are straight" in note]
+@pytest.mark.parametrize("place", [0, 1e6])
+def test_straight_elements_of_curves_that_turn_are_told(
+    expression: str, elements: int, turn: str, place: float,
+) -> None:
+    moved = expression.replace('["', f'["{place} + ')
+    corners = change(with_bottom(f"expression = {moved}, elements = {elements}"),
+                     *((f"[[{a}], [{b}]]", f"[[{place + float(a[0])}{a[1:]}], [{place + float(b[0])}{b[1:]}]]")
+                       for a, b in (("2, 0", "2, 2"), ("2, 2", "0, 2"), ("0, 2", "0, 0"))))  # fmt: skip
+    told = [note for note in build(corners).notes if "elements that are straight" in note]
     assert len(told) == bool(turn)
     assert all(f"by up to {turn} degrees" in note and "'bottom'" in note for note in told)
+
+
+def test_the_joint_of_a_closed_curve_is_told_of() -> None:
+    hole = 'hole = {{ expression = ["1 + 0.3*cos(2*pi*t)", "1 + 0.3*sin(2*pi*t)"], elements = {} }}'
+    for elements, turn in ((6, "60"), (8, "")):
+        text = change(add_curves(SQUARE, hole.format(elements)), ('"left"]', '"left", "hole"]'))
+        told = [note for note in build(text).notes if "elements that are straight" in note]
+        assert [f"by up to {turn} degrees" in note and "'hole'" in note for note in told] == [True] * bool(turn)
 
 
 def test_constant_component() -> None:

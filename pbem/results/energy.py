@@ -193,7 +193,7 @@ class EnergyBalance:
 
     def _relieve(self, old: EnergyState, new: EnergyState) -> float:
         """Work, in the step from rest, of in-situ stress on faces that the pairs did not bear."""
-        weight, pairs = self._stored.facing, self._stored.pair_weight
+        weight, pairs = self._stored.jointed, self._stored.pair_weight
         on_faces = sum_work(weight, old.traction, new.displacement - old.displacement)
         opened, slid = new.pairs.g_n - old.pairs.g_n, new.pairs.g_s - old.pairs.g_s
         return 0.5 * (on_faces + float(pairs @ (old.pairs.p_n * opened + old.pairs.p_s * slid)))

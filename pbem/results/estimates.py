@@ -19,6 +19,7 @@ from pbem.results.rates import (
     EndFinder,
     choose_force_divisor,
     choose_jump_divisors,
+    find_weak_ends,
     list_factor_shares,
     list_force_shares,
 )
@@ -125,6 +126,7 @@ class Comparison:
             self._least_factor_error = 0.0 if as_they_are else LEAST_FACTOR_ERROR
             self._ends = EndFinder(mesh, beside)
             self._jump_divisor = choose_jump_divisors(model, beside, self._divisor)
+            self._weak = find_weak_ends(model, beside)
             self._force_shares = list_force_shares(model, beside, self._divisor)
             self._factor_shares = list_factor_shares(model, beside, self._divisor)
 
@@ -253,7 +255,7 @@ class Comparison:
         errors = differences / self._jump_divisor
         most = np.abs(getattr(other, name) - (self._other_gap if name == "opening" else 0.0))
         most = np.maximum(most, np.abs(differences))
-        return np.asarray(np.where(self._jump_divisor < 1, np.clip(errors, -most, most), errors))
+        return np.asarray(np.where(self._weak, np.clip(errors, -most, most), errors))
 
     def _subtract_jumps(self, name: str, mine: ContactState, other: ContactState, beside: Beside) -> Real:
         """Differences at the pairs of the second solution; zero where the run has none."""

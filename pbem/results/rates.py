@@ -104,6 +104,17 @@ def choose_jump_divisors(model: Model, beside: Beside, smooth: float) -> Real:
     return np.asarray(result[coarse.pairs.slave // (coarse.order + 1)])
 
 
+def find_weak_ends(model: Model, beside: Beside) -> Bool:
+    """Pairs of the second solution (c,) on elements beside ends of cracks on interfaces with a softer material, where
+    jumps that vanish at the end follow a power below WEAK; model: of the run."""
+    coarse, weak = beside.mesh, np.zeros(beside.mesh.elements, dtype=bool)
+    if beside.kind == "merged":
+        at_corner = _list_merged_ends(model, beside.model)
+        for name, own in list_curve_elements(beside.model, coarse):
+            weak[own[[element for element, _, power in at_corner.get(name, ()) if power < WEAK]]] = True
+    return np.asarray(weak[coarse.pairs.slave // (coarse.order + 1)])
+
+
 def find_corner_power(turn: float) -> float:
     """The power lambda of the distance that the displacement follows outside a corner by which a free face turns
     (radians, 0 to pi): of sin(lambda w) = -lambda sin(w) with w = pi + turn that from 1/2 to 1 (theory, 125)."""

@@ -138,7 +138,7 @@ class StoredEnergy:
         return np.where(self._is_tool, self.weight, 0.0)
 
     @property
-    def facing(self) -> Real:
+    def jointed(self) -> Real:
         """The weights of faces of interfaces, cracks and contacts, without those whose other side is gone."""
         weight = np.array(self._elastic)
         weight[self.outer.node] = 0.0

@@ -23,6 +23,7 @@ from pbem.results.rates import (
     choose_force_divisor,
     choose_jump_divisors,
     find_corner_power,
+    find_weak_ends,
     list_force_shares,
 )
 from pbem.solve.estimate.coarser_mesh import Beside, put_beside
@@ -90,6 +91,24 @@ def test_differences_of_jumps_are_divided_by_what_the_place_is(plate: Model) -> 
     np.testing.assert_allclose(read_elements(beside, "before", divisors), [TIP, TIP, SMOOTH, SMOOTH])
     np.testing.assert_allclose(read_elements(beside, "after", divisors), [SMOOTH, SMOOTH, TIP, TIP])
     np.testing.assert_allclose(read_elements(beside, "branch", divisors), [CORNER, SMOOTH, TIP, TIP])
+
+
+def test_ends_on_a_softer_material_alone_are_weak(plate: Model) -> None:
+    # Where a crack turns differences are divided by less than 1, too, but jumps need not vanish.
+    assert choose_jump_divisors(plate, put(plate), SMOOTH).min() < 1 and not find_weak_ends(plate, put(plate)).any()
+    beyond = """beyond = { points = [[4, -4], [8, -4], [8, 4], [4, 4]], elements = 4, grading = "none" }
+[regions.soft]
+material = "clay"
+boundary = ["right", "upper", "beyond"]
+[materials.clay]
+young = 50.0
+poisson = 0.2
+"""
+    model = parse_model(PLATE.replace("[regions.plate]", beyond + "[regions.plate]"))[1]
+    beside = put(model)
+    weak = find_weak_ends(model, beside)
+    assert read_elements(beside, "branch", weak).tolist() == [True, False, False, False]
+    assert not any(read_elements(beside, name, weak).any() for name in ("leg", "wing", "before", "after"))
 
 
 def test_differences_at_a_corner_say_more_where_its_elements_were_much_shorter(plate: Model) -> None:

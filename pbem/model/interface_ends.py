@@ -121,7 +121,8 @@ def note_interface_ends(
             "Cracks end on an interface with a softer material, on too few elements for lengths that fall towards it: "
             f"{list_names(list(doubtful[True]), most_named)}. Displacements there follow powers of the distance down "
             f"to {power:.2g}, and factors and openings may be off by {100 * error:.2g} %. With {LEAST_AT_INTERFACE} or "
-            "more elements on each leg that ends there lengths fall far enough.")
+            f"more elements on each leg that ends there, {2 * LEAST_AT_INTERFACE} on those refined at both ends, "
+            "lengths fall far enough.")
     return notes
 
 

@@ -129,8 +129,8 @@ def test_ends_for_which_no_mesh_is_fine_enough_are_told(softer: float, told: boo
     assert any("'crack'" in note and "much softer material" in note for note in notes) == told
 
 
-@pytest.mark.parametrize(("softer", "elements", "told"), [(0.1, 2, True), (0.1, 3, False), (0.01, 1, True),
-                                                          (1.0, 1, False)])
+@pytest.mark.parametrize(("softer", "elements", "told"), [(0.1, 2, True), (0.1, 3, True), (0.1, 6, False),
+                                                          (0.01, 1, True), (1.0, 1, False)])
 @pytest.mark.parametrize("turn", [1.0, 0.6 + 0.8j])
 def test_too_few_elements_for_lengths_that_fall_are_told(
     softer: float, elements: int, told: bool, turn: complex,
@@ -139,7 +139,7 @@ def test_too_few_elements_for_lengths_that_fall_are_told(
     for name in ("crack", "lower", "upper"):
         case["curves"][name]["elements"] = elements
     notes = [note for note in build_model(pbem.Case(**case)).notes if "too few elements" in note]
-    assert ["'crack' at" in note and "3 or more" in note for note in notes] == [True] * told
+    assert ["'crack' at" in note and "6 on those refined at both ends" in note for note in notes] == [True] * told
 
 
 def make_layers(elements: int, order: int) -> Tables:

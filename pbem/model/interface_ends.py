@@ -26,7 +26,7 @@ from pbem.wording import list_names
 # Powers that are looked for. From the largest on, elements at t^3 do; the least is that of a contrast of 3e4.
 LEAST, MOST, TRIED = 1e-3, 0.47, 240
 # The error of K is this part of K times the last bit (as a part of its leg) to twice the power. Measured with materials
-# of 1/3 to 1/100 of the modulus, a right angle.
+# of 1/3 to 1/100 of the modulus, a right angle; on two elements a leg, at 1/10, 7.0 % for 7.7 %.
 COST = 0.25
 # The error that the bit is chosen for, and the least bit, as coordinates are rounded.
 AIM, LEAST_BIT = 2e-4, 1e-9
